@@ -8,7 +8,8 @@ running, and a random piece of keys with one stop key in it arrives in one read 
 places, as after a link that hung. The same while a question of Control, of the proof or of Frames
 stands or is carried out, and on two panels of one line of which either gets the stop. Then keys:
 random ones, alone and in pieces, and each by itself, with the drive not armed. Counted is every
-write that is no stop; each must be 0.
+write that is no stop; each must be 0. Last, ends: every signal, resizes, keys while a line opens,
+and an error in the drawing of each screen, each with a motor running.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import asdict, dataclass
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.hands_ends import Endings, count_ends
 from tests.line.pty_panel import (
     COMMAND,
     LINE_SETTLED,
@@ -257,6 +259,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bursts", type=int, default=60)
     parser.add_argument("--keys", type=int, default=1500)
+    parser.add_argument("--resizes", type=int, default=600)
+    parser.add_argument("--ends", type=int, default=30, help="cases of each kind of end, at most")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     chance = random.Random(arguments.seed)
@@ -269,11 +273,17 @@ def main() -> None:
     for name, sizes in (("keys, not armed", MIXED), ("each by itself", (1,))):
         with panel_on_a_pty() as panel:
             unarmed(panel, chance, arguments.keys, found[name], sizes)
+    ends = count_ends(chance, arguments.ends, arguments.resizes)
     table = Table("", *(name.replace("_", " ") for name in asdict(Counted())))
     for name, counted in found.items():
         table.add_row(name, *(str(number) for number in asdict(counted).values()))
     Console().print(table)
-    print(json.dumps({name: asdict(counted) for name, counted in found.items()}))
+    ends_table = Table("", *(name.replace("_", " ") for name in asdict(Endings())))
+    for name, counted_ends in ends.items():
+        ends_table.add_row(name, *(f"{number:.3g}" for number in asdict(counted_ends).values()))
+    Console().print(ends_table)
+    figures = {name: asdict(one) for name, one in found.items()}
+    print(json.dumps(figures | {name: asdict(one) for name, one in ends.items()}))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,9 @@ load, which may be in flight, with the silence behind it, and the stop frame its
 
 Once more with a terminal that nobody reads, so that the screen is stuck; and then, to compare,
 with the same key handled as Textual does it by itself, in the loop that draws.
+
+Last, a stop of all drives of the same line: from the call to the last byte of the last frame of
+the first wave, as a ratio to so many exchanges of a stop frame one behind the other.
 """
 
 from __future__ import annotations
@@ -31,7 +34,9 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.table import Table
@@ -39,6 +44,12 @@ from rich.table import Table
 from benchmarks.fleet import fleet
 from benchmarks.wire import ROOT, Exchange, WireLine, share
 from tests.answering import read_answering
+from tui.bus.line import Line
+from tui.bus.link import SerialLink
+from tui.drive.profile.library import load
+from tui.session.drive import DriveSession
+from tui.session.fleet import Fleet
+from tui.session.journal import Journal
 from tui.simulator import LineTiming
 
 KEY = b"\x1b[24~"
@@ -52,6 +63,7 @@ STUCK_AFTER = 3.0
 """Seconds of full redraws after which a terminal that is not read takes nothing more."""
 WITHIN = 4.0
 """Seconds in which a stop frame counts for its key."""
+ALL_PRESSES = 5
 COMMANDS = {(1, 0xFA00)}
 """Device and register of the stop frames: the watched drive is an Altivar 21."""
 
@@ -67,9 +79,7 @@ def panel() -> None:
     from tui.bus.api import Priority
     from tui.bus.errors import LineError
     from tui.drive.errors import DriveError
-    from tui.drive.profile.library import load
     from tui.session.console import DriveConsole
-    from tui.session.drive import DriveSession
     from tui.session.monitor.monitor import Monitor
     from tui.session.read.reader import Reader
 
@@ -254,6 +264,62 @@ def is_stop(exchange: Exchange) -> bool:
     return request[1] == 6 and (request[0], register) in COMMANDS
 
 
+# All drives
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """One stop of all drives: until the last first frame, and the least that it can take, in s."""
+
+    took: float
+    least: float
+    missing: int
+    """Drives that were sent no frame."""
+
+
+def measure_all(wire: WireLine, drives: dict[int, str], presses: int) -> list[Wave]:
+    """Stop all drives of the line so many times, as the panel does, while they are looked at."""
+    wire.set_up(drives, LineTiming(19200, "8E1", True))
+    line = Line(link_of(wire))
+    line.open(wait=PATIENCE)
+    with TemporaryDirectory() as folder:
+        journal = Journal(Path(folder))
+        fleet = Fleet(line, journal)
+        try:
+            for address, family in drives.items():
+                fleet.take(DriveSession(line, address, load(family)))
+            end = time.monotonic() + PATIENCE
+            while len(fleet.line_watch.states) < len(drives) and time.monotonic() < end:
+                time.sleep(0.1)
+            return [stop_all(wire, fleet) for _ in range(presses)]
+        finally:
+            fleet.forget()
+            line.close()
+            journal.close()
+
+
+def link_of(wire: WireLine) -> SerialLink:
+    """The line for a program in this process."""
+    return SerialLink(wire.path, wire.timing.baud, wire.timing.format)
+
+
+def stop_all(wire: WireLine, fleet: Fleet) -> Wave:
+    """One stop of all drives."""
+    time.sleep(SETTLING)
+    wire.take()
+    pressed = time.monotonic()
+    fleet.stop(fleet.sessions)
+    time.sleep(WITHIN)
+    first: dict[int, Exchange] = {}
+    for exchange in wire.take():
+        if exchange.began > pressed and exchange.request[0] and exchange.request[1] == 6:
+            first.setdefault(exchange.request[0], exchange)
+    last = max((one.began for one in first.values()), default=pressed)
+    took = last + 8 * wire.times.character - pressed
+    least = sum(wire.times.shortest(one) for one in first.values())
+    return Wave(took, least, len(fleet.sessions) - len(first))
+
+
 # Telling
 
 
@@ -301,9 +367,16 @@ def main() -> None:
     line = WireLine()
     try:
         results = [measure(line, drives, case, options.presses) for case in CASES]
+        waves = measure_all(line, drives, ALL_PRESSES)
     finally:
         line.close()
     Console(width=110).print(table_of(results, options.drives))
+    ratios = sorted(one.took / one.least for one in waves)
+    missing = sum(one.missing for one in waves)
+    print(
+        f"stop all, last frame of the first wave / {options.drives} exchanges:"
+        f" median {median(ratios):.2f}, worst {ratios[-1]:.2f}, drives without a frame: {missing}"
+    )
     told = [
         {
             "case": one.name,
@@ -316,7 +389,12 @@ def main() -> None:
         }
         for one in results
     ]
-    print(json.dumps({"benchmark": "stop", "drives": options.drives, "cases": told}))
+    everything = {"ratios": ratios, "missing": missing}
+    print(
+        json.dumps(
+            {"benchmark": "stop", "drives": options.drives, "cases": told, "all": everything}
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -15,11 +15,12 @@ MOST_METHODS = 15
 """Public methods and properties of one class; those of its bases count there."""
 
 EXCEPTIONS: dict[str, tuple[int, str]] = {
-    "bus/api.py:ModbusLine": (20, "what all of a line is asked for; the fake has the same"),
-    "bus/fake.py:FakeLine": (18, "the same as the line that it stands for"),
-    "bus/fake.py": (325, "a line in one place, its use shown at the top"),
+    "bus/api.py:ModbusLine": (21, "what all of a line is asked for; the fake has the same"),
+    "bus/fake.py:FakeLine": (19, "the same as the line that it stands for"),
+    "bus/fake.py": (336, "a line in one place, its use shown at the top"),
+    "bus/line.py:Line": (16, "all that ModbusLine names, one method for each kind of request"),
     "bus/shared_facts.py:SharedFacts": (18, "all that programs on a line must agree on"),
-    "screens/app_port.py:Panel": (26, "all that screens ask of the app, most of it abstract"),
+    "screens/app_port.py:Panel": (25, "all that screens ask of the app, most of it abstract"),
     "screens/connection/state.py:LineView": (
         19,
         "lists, form, search, named for the keys",

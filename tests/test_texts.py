@@ -1,151 +1,288 @@
-"""No text of a person, a drive, a file or a profile is ever markup: held for the whole code."""
+"""Wording: counts of phrases that a reader stumbles over may fall, never rise.
+
+`python -m tests.test_texts [NUMBER...]` lists every hit of a check with its file and line.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
-from .sources import PACKAGE, modules, nodes_of
+from .sources import ROOT, modules, tree_of
 
-TEXTS = PACKAGE / "widgets" / "plain.py"
-"""The one module that makes labels and entries of lists, with markup off."""
-FIELDS = PACKAGE / "widgets" / "fields.py"
-PRINTS = {PACKAGE / "cli" / "shared" / "say.py", PACKAGE / "cli" / "shared" / "output.py"}
-"""The modules that print for the commands, control characters as signs."""
-MADE_ELSEWHERE = {
-    "Label": "Plain",
-    "Static": "Plain",
-    "Option": "entry",
-    "Input": "Field or NumberInput",
-    "MaskedInput": "Field or NumberInput",
-    "TextArea": "Field",
-    "RichLog": "Lines",
-    "Log": "Lines",
-    "Markdown": "Plain",
-    "Button": "a key",
-    "DataTable": "Lines",
-    "Content": "Text",
-}
-"""What Textual would read as markup or send as it is, and what to take instead."""
-READ_AS_MARKUP = {"border_title", "border_subtitle", "tooltip"}
-PRINTING = {
-    "print", "echo", "secho", "click.echo", "click.secho",
-    "sys.stdout.write", "sys.stderr.write", "sys.stdout.writelines", "sys.stderr.writelines",
-}  # fmt: skip
-PRINTS_THEMSELVES = (
-    PACKAGE / "drive" / "profile" / "json_schema.py",
-    PACKAGE / "cli" / "documents" / "json_schema.py",
-    PACKAGE / "cli" / "man_page.py",
-)
-"""Print what they have made themselves, for a redirection."""
-READS_ITSELF = {
-    PACKAGE / "terminal" / "abilities.py",
-    PACKAGE / "session" / "starts" / "processes.py",
-}
-"""Read files of the system's own, in /proc."""
+TESTS = ROOT / "tests"
+FIRST_COMMIT = "2b17417"
+"""Subjects of later commits are checked."""
+
+BASE_VERBS = """
+accept add allow answer append apply arm back begin change check close coast collect
+compare complete copy create delete diagnose discard do ends exit explain export find
+follow force give go hide identify ignore import include keep learn leave limit list
+listen load log look make map mark monitor name open omit overwrite pause plot poll
+print probe publish put quit read record refuse reject remember remove repeat replace
+reply report require reset restore resume retry return run save scan search select send
+serve set share show sign simulate skip sleep sort start stop store take test try undo
+use verify wait watch write
+"""
 
 
-def faults(nodes: Iterable[ast.AST], path: Path) -> Iterator[str]:
-    """What in a module could take a text for markup, or print it as it is."""
-    for node in nodes:
-        if isinstance(node, ast.Call):
-            yield from _of_call(node, path)
-        elif isinstance(node, ast.Attribute | ast.Name):
-            name = node.attr if isinstance(node, ast.Attribute) else node.id
-            if name in ("from_markup", "render_markup"):
-                yield f"{name} reads markup"
-        elif isinstance(node, ast.Assign):
-            for target in node.targets:
-                if isinstance(target, ast.Attribute) and target.attr in READ_AS_MARKUP:
-                    yield f"{target.attr} is read as markup"
+class Text(NamedTuple):
+    """One text with its place."""
+
+    kind: str
+    """U literal, S docstring, N name, L click help, D Markdown, G commit subject, T test name."""
+    path: str
+    line: int
+    text: str
 
 
-def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
-    name = _name(call.func)
-    off = any(_is(k, "markup", value=False) for k in call.keywords)
-    if any(k.arg == "markup" and not _is(k, "markup", value=False) for k in call.keywords):
-        yield f"{name} with markup"
-    if name in MADE_ELSEWHERE and path not in (TEXTS, FIELDS):
-        yield f"{name}: take {MADE_ELSEWHERE[name]}"
-    if name == "Console" and not off:
-        yield "a console with markup"
-    if _dotted(call.func) in PRINTING and path not in (*PRINTS, *PRINTS_THEMSELVES):
-        yield f"{name}: take say"
-    if name in ("read_text", "read_bytes") and path not in READS_ITSELF:
-        yield f"{name} waits for a pipe, and takes files of any length: take read_small_text"
-    if name in ("writerow", "writerows") and _name(call.args[0]) != "plain_cells":
-        yield f"{name}: take plain_cells"
-    if name == "add_row" and PACKAGE / "cli" not in path.parents:
-        for cell in call.args:
-            if not (isinstance(cell, ast.Constant) or _name(cell) in ("Text", "assemble")):
-                yield "a cell that may be a str"
+class Check(NamedTuple):
+    """A phrase to avoid: texts of these kinds, and how many hits there may be."""
+
+    kinds: str
+    hits: Callable[[str], int]
+    most: int
+    bad: str
+    """An example that must be hit."""
 
 
-def _name(node: ast.expr) -> str:
-    """The last name of what is called, or of what calls it: `Text` of `Text.assemble(x)`."""
-    if isinstance(node, ast.Call):
-        node = node.func
-    if isinstance(node, ast.Attribute):
-        return node.attr
-    return node.id if isinstance(node, ast.Name) else ""
+def of(pattern: str, flags: int = re.IGNORECASE) -> Callable[[str], int]:
+    """Count the matches of a pattern."""
+    found = re.compile(pattern, flags)
+    return lambda text: sum(1 for _ in found.finditer(text))
 
 
-def _dotted(node: ast.expr) -> str:
-    """The name of what is called: `sys.stdout.write`; empty where it is more than a name."""
-    if isinstance(node, ast.Attribute):
-        return f"{before}.{node.attr}" if (before := _dotted(node.value)) else ""
-    return node.id if isinstance(node, ast.Name) else ""
-
-
-def _is(keyword: ast.keyword, name: str, *, value: bool) -> bool:
-    return (
-        keyword.arg == name
-        and isinstance(keyword.value, ast.Constant)
-        and keyword.value.value is value
+def _long(text: str) -> int:
+    """Count sentences over 25 words, or with two colons or semicolons."""
+    sentences = re.split(r"(?<=[.!?])\s+", text)
+    return sum(
+        len(one.split()) > 25 or len(re.findall(r"[:;](?=\s|$)", one)) > 1 for one in sentences
     )
 
 
-def parsed(source: str) -> Iterator[ast.AST]:
-    return ast.walk(ast.parse(source))
+def _no_imperative(text: str) -> int:
+    first = re.match(r"\w+", text)
+    verb = first is not None and first[0].lower() in BASE_VERBS.split()
+    return int(not verb or len(text.partition("\n")[0]) > 60)
 
 
-def test_no_text_is_markup() -> None:
-    found = {path: list(faults(nodes_of(path), path)) for path in modules()}
-    assert len(found) > 300
-    assert {path: what for path, what in found.items() if what} == {}
+CHECKS: dict[int, Check] = {
+    1: Check("UDS", of(r"\b(is|are|was|be) told\b"), 210, "it is told"),
+    2: Check("UDS", of(r"\btells?\b(?! apart)"), 404, "a drive tells it"),
+    3: Check("UDS", of(r"\bask(s|ed)? (\S+ ){0,2}on\b"), 61, "the drive is asked on"),
+    4: Check("UDS", of(r"asked? no more|nobody asks"), 37, "it is asked no more"),
+    5: Check("UDS", of(r"\bof now\b"), 30, "values of now"),
+    6: Check("UD", of(r"unless told"), 8, "unless told otherwise"),
+    7: Check("UDS", of(r"\bwhoever\b|\bfor who\b|who it is"), 108, "whoever starts"),
+    8: Check("UDS", of(r"(?<!there )\b(is|are) no (?!longer)\w+"), 129, "x is no line"),
+    9: Check("UDS", of(r"\banew\b|\bmend"), 100, "read anew"),
+    10: Check("UDS", of(r"\ball the same\b|(?<!restart )\bby itself\b"), 79, "ends by itself"),
+    11: Check("UD", of(r"from (here|elsewhere)\b|\bof others\b"), 58, "commanded from here"),
+    12: Check("UD", of(r"\bgo(es)? (out|by|with)\b|\bwent out\b"), 49, "the frame goes out"),
+    13: Check("U", of(r"there already|is there again"), 9, "x is there already"),
+    14: Check("UD", of(r"\b(no|some|any)body\b"), 76, "nobody answers"),
+    15: Check("UDS", of(r"\bstands?\b(?! for\b)"), 255, "it stands there"),
+    16: Check("UDS", of(r"\b(became|becomes?) of\b|\bc(a|o)mes? to\b"), 150, "what becomes of it"),
+    17: Check("UDS", of(r"\btime-outs?\b"), 179, "its time-out"),
+    18: Check(
+        "UDSNL",
+        of("colour|favourite|neighbour|behaviour|analogue|licence|recognis"),
+        176,
+        "one_colour",
+    ),
+    19: Check(
+        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), 1325, "told_by"
+    ),
+    20: Check("N", of(r"^_?of_", 0), 64, "of_drives"),
+    21: Check(
+        "U",
+        of(r"^(takes|keeps|leaves|writes|gives|does|closes|opens)( \w+)?$", 0),
+        42,
+        "takes it",
+    ),
+    22: Check("L", _no_imperative, 72, "What a drive does"),
+    23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), 1548, "What it does."),
+    24: Check("D", _long, 448, "It is: one; and then two: three."),
+    25: Check(
+        "G",
+        lambda text: int(bool(re.match(r"(A|An|The|What|Who|Where|No|One)\b", text))
+                         or len(text) > 72),
+        0,
+        "The line is open",
+    ),
+    26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), 305, "test_who_asks"),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        'Label(f"{name}", id="x")',
-        "widgets.Static(question)",
-        "Option(drive.name)",
-        "Input(value)",
-        'app.notify("[b]", markup=True)',
-        "Label('x', markup=flag)",
-        "Text.from_markup(name)",
-        "self.border_title = name",
-        "rich.console.Console()",
-        "Console(markup=True)",
-        "click.echo(name)",
-        "print(name)",
-        "table.add_row(name)",
-        "table.add_row(Text(code), f'{name}')",
-        "sys.stdout.write(name)",
-        "rows.writerow([name])",
-        "path.read_text()",
-    ],
-)
-def test_the_check_sees_what_it_is_for(line: str) -> None:
-    assert list(faults(parsed(line), PACKAGE / "screens" / "new.py"))
+def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
+    """Docstrings, those of attributes included: strings that are statements."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Expr(value=ast.Constant(value=str()) as text):
+                yield text
 
 
-def test_what_is_right_passes() -> None:
-    assert list(faults(parsed("console().print(table)"), PACKAGE / "cli" / "new.py")) == []
-    right = 'Plain(name); entry(Text(name)); table.add_row(Text(name), ""); app.notify(name)'
-    assert list(faults(parsed(right), PACKAGE / "screens" / "new.py")) == []
-    assert list(faults(parsed("rows.writerow(plain_cells(row))"), PACKAGE / "cli" / "new.py")) == []
+def texts_of(source: ast.Module, path: str, kinds: str = "USNL") -> Iterator[Text]:
+    """Every text of a module, by kind."""
+    documents = {id(node) for node in _docstrings(source)}
+    for node in ast.walk(source):
+        match node:
+            case ast.Constant(value=str(text)):
+                kind = "S" if id(node) in documents else "U"
+                if kind in kinds:
+                    yield Text(kind, path, node.lineno, text.strip() if kind == "S" else text)
+            case ast.Assign(targets=[ast.Name(id="COMMANDS")], value=ast.Dict(values=rows)):
+                texts = [one.elts[-1] for one in rows if isinstance(one, ast.Tuple)]
+                yield from (Text("L", path, t.lineno, text) for t in texts for text in _joined(t))
+            case ast.Call(keywords=keywords) if "L" in kinds:
+                for one in keywords:
+                    if one.arg in ("help", "short_help"):
+                        yield from (
+                            Text("L", path, node.lineno, text) for text in _joined(one.value)
+                        )
+        if "N" in kinds:
+            yield from (Text("N", path, line, name) for line, name in _names(node))
+        if "T" in kinds and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield Text("T", path, node.lineno, node.name)
+
+
+def _joined(value: ast.expr) -> Iterator[str]:
+    match value:
+        case ast.Constant(value=str(text)):
+            yield text
+        case ast.JoinedStr(values=parts):
+            yield "".join(str(p.value) if isinstance(p, ast.Constant) else "X" for p in parts)
+
+
+def _names(node: ast.AST) -> Iterator[tuple[int, str]]:
+    """Names that a node gives to something, each with its line."""
+    match node:
+        case ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():
+            yield node.lineno, node.name
+        case ast.arg():
+            yield node.lineno, node.arg
+        case ast.Name(ctx=ast.Store()):
+            yield node.lineno, node.id
+        case ast.Attribute(ctx=ast.Store()):
+            yield node.lineno, node.attr
+
+
+def _paragraphs(path: Path) -> Iterator[Text]:
+    """Prose of a Markdown file: paragraphs, list items, table cells; no code, no comments."""
+    text = path.read_text("utf-8")
+    text = re.sub(r"^```.*?^```", lambda m: "\n" * m[0].count("\n"), text, flags=re.M | re.S)
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.S)
+    name, begun, held = path.relative_to(ROOT).as_posix(), 1, ""
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        starts = re.match(r"\s*(?:[-*>#]+|\d+\.) ", line)
+        if held and (not line.strip() or starts or line.startswith("|")):
+            yield Text("D", name, begun, held)
+            held = ""
+        if line.startswith("|"):
+            yield from (Text("D", name, number, cell.strip()) for cell in line.split("|"))
+        elif line.strip():
+            begun = begun if held else number
+            held = f"{held} {line.strip()}".strip()
+
+
+def _subjects() -> Iterator[Text]:
+    """Subjects of new commits; none outside a repository, or if it starts later."""
+    git = ["git", "-C", str(ROOT), "log", "--format=%s", f"{FIRST_COMMIT}..HEAD"]
+    if (ROOT / ".git").exists():
+        found = subprocess.run(git, capture_output=True, text=True, check=False)
+        yield from (Text("G", "git log", 0, line) for line in found.stdout.splitlines())
+
+
+@cache
+def all_texts() -> tuple[Text, ...]:
+    """Every text that is checked."""
+    found: list[Text] = []
+    for path in modules():
+        name = path.relative_to(ROOT).as_posix()
+        found += texts_of(tree_of(path), name)
+        found.append(Text("N", name, 0, path.stem))
+    for path in modules(TESTS):
+        found += texts_of(tree_of(path), path.relative_to(ROOT).as_posix(), "NT")
+    for folder in (ROOT / "docs", ROOT / "profiles", ROOT / "benchmarks"):
+        for page in sorted(folder.rglob("*.md")):
+            found += _paragraphs(page)
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"):
+        found += _paragraphs(page)
+    return (*found, *_subjects())
+
+
+def hits(check: Check, texts: Iterable[Text]) -> Iterator[tuple[Text, int]]:
+    """The texts that a check finds fault with, and how often in each."""
+    for one in texts:
+        if one.kind in check.kinds and (count := check.hits(one.text)):
+            yield one, count
+
+
+def test_no_check_finds_more_than_before() -> None:
+    counts = Counter((one.kind, one.text) for one in all_texts())
+    found = {
+        number: sum(
+            times * check.hits(text)
+            for (kind, text), times in counts.items()
+            if kind in check.kinds
+        )
+        for number, check in CHECKS.items()
+    }
+    more = {n: f"{found[n]}, at most {CHECKS[n].most}" for n in CHECKS if found[n] > CHECKS[n].most}
+    assert more == {}, "`python -m tests.test_texts NUMBER` lists the hits of a check"
+
+
+@pytest.mark.parametrize("number", CHECKS)
+def test_check_finds_its_example(number: int) -> None:
+    check = CHECKS[number]
+    bad = Text(check.kinds[0], "x", 1, check.bad)
+    assert list(hits(check, [bad]))
+    assert not list(hits(check, [bad._replace(text="Stop the motor.")]))
+
+
+def test_texts_of_a_module_are_sorted_by_kind() -> None:
+    source = '''
+"""Module."""
+LIMIT = "on the screen"
+"""Attribute."""
+
+def run(motor: int) -> None:
+    """Function."""
+    click.option("--x", help=f"Show {motor}.")
+    raise ValueError(f"no {motor} here")
+'''
+    found = list(texts_of(ast.parse(source), "m.py"))
+    by_kind = {kind: {one.text for one in found if one.kind == kind} for kind in "USNL"}
+    assert by_kind["S"] == {"Module.", "Attribute.", "Function."}
+    assert {"on the screen", "--x", "no ", " here"} <= by_kind["U"]
+    assert by_kind["N"] == {"LIMIT", "run", "motor"}
+    assert by_kind["L"] == {"Show X."}
+
+
+def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# Head\n\nOne\ntwo.\n\n```sh\ncode\n```\n- item\n- more\n\n| a | b |\n", "utf-8"
+    )
+    assert [one.text for one in _paragraphs(page) if one.text] == [
+        "# Head", "One two.", "- item", "- more", "a", "b",
+    ]  # fmt: skip
+
+
+if __name__ == "__main__":
+    for wanted in [int(one) for one in sys.argv[1:]] or CHECKS:
+        listed = list(hits(CHECKS[wanted], all_texts()))
+        print(f"{wanted}: {sum(c for _, c in listed)} hits, at most {CHECKS[wanted].most}")
+        if sys.argv[1:]:
+            for text, _ in listed:
+                print(f"  {text.path}:{text.line}: {' '.join(text.text.split())[:120]}")

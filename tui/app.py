@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -12,7 +11,6 @@ from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.theme import Theme
 
-from tui.drive.plain import plain
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.keys.table import bindings
 from tui.session.clock import Clock
@@ -22,16 +20,20 @@ from tui.session.paths import state_folder
 from tui.terminal.abilities import EVERYTHING, Abilities
 from tui.terminal.driver import with_own_keys
 from tui.terminal.last_words import LastWords
+from tui.widgets.drawing import short
 from tui.widgets.palette import THEME
 
 from .screens.hands import Hands
+from .screens.last_stops import LastStops
 from .screens.leaving import Leaving
 from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
 from .screens.lookout import FRAME_LOOK, Lookout
+from .screens.open_lines import LineOpening
 from .screens.places import Places
 
-log = logging.getLogger(__name__)
+LONGEST_CAUSE = 120
+"""Characters that an error takes on the terminal; the log has all of it."""
 
 
 class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Leaving):
@@ -73,6 +75,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         """Whether a new fault rings."""
         self.period = 0.5
         self.events = EventLog()
+        self.opening = LineOpening(start or "")
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
@@ -129,20 +132,22 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
     async def on_unmount(self) -> None:
         """Leave no line open."""
         self._gone = True
-        if not self.settled:
-            # the panel ends without having been asked: an error of its own, or a signal
-            await asyncio.to_thread(self.stop_motors)
+        await asyncio.to_thread(self.follow_last_work)
         await self.disconnect_all()
         if self._journal is not None:
             await asyncio.to_thread(self._journal.close)
 
-    def last_words(self, error: Exception) -> str:
-        """An error of the panel itself: all of it to the log, one line to the person."""
-        log.error("the panel had to stop", exc_info=error)
+    def order_last_work(self) -> LastStops:
+        """Stop the motors that were started here, unless they are to run on."""
+        return LastStops(()) if self.settled else self.order_stops()
+
+    def last_words(self, error: BaseException) -> str:
+        """One sentence; the log has the rest."""
+        text = f"{type(error).__name__}: {error}".partition("\n")[0].rstrip(": ")
         place = state_folder() / "drivepanel.log"
         return (
-            f"The panel had to stop: an error of its own ({plain(str(error), lines=True)})."
-            f" More is in {place}."
+            f"The panel had to stop after an internal error ({short(text, LONGEST_CAUSE)});"
+            f" details are in {place}."
         )
 
     def action_help(self) -> None:

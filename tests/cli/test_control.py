@@ -41,13 +41,14 @@ def test_the_control_is_taken_and_given_back(line: str) -> None:
     assert held(line, IN_FORCE) == 0
 
 
-def test_5_a_stop_gives_nothing_back_unarmed_but_stops(line: str) -> None:
+def test_6_a_stop_gives_nothing_back_unarmed_but_stops(line: str) -> None:
     put(line, IN_FORCE, 1)
     put(line, COMMAND_WORD, 0x0003)
     done = invoked("stop", line, *DRIVE, "--give-back")
-    assert done.exit_code == 5
+    assert done.exit_code == 6
     assert "stopped." in done.stdout
     assert "Not given back" in done.stderr
+    assert "Sent by this command: " in done.stderr
     assert "waits at the terminals" in done.stderr
     assert held(line, COMMAND_WORD) & 0x002E == 0
     assert held(line, IN_FORCE) == 1
@@ -69,8 +70,8 @@ def test_5_a_family_without_a_control_to_take() -> None:
     assert "has no control to take" in said
 
 
-def test_5_a_family_without_a_control_to_give_back() -> None:
-    said = refused(5, "stop", "sim:atv71@1", "--give-back", "--arm")
+def test_6_a_family_without_a_control_to_give_back_is_stopped() -> None:
+    said = refused(6, "stop", "sim:atv71@1", "--give-back", "--arm")
     assert "has no control to give back" in said
 
 

@@ -63,6 +63,8 @@ async def test_a_fault_with_causes_checks_and_live_values() -> None:
         "confidence": "practice",
         "possible_now": True,
         "wait_s": None,
+        "follows": "Modbus commands this drive: a reset leads to Switch on disabled, and the motor"
+        " runs only on a new run command. No input is closed at the terminals now.",
     }
     text = text_of(status)
     for part in (
@@ -71,7 +73,7 @@ async def test_a_fault_with_causes_checks_and_live_values() -> None:
         "check: Lengthen DEC; ",
         "(general practice)",
         "look at: DEC 0.5 s, the ramp in force",
-        "reset: a fault reset works now, says the drive; a run command may start it",
+        "reset: a fault reset works now, says the drive. ",
     ):
         assert part in text
 
@@ -81,7 +83,7 @@ async def test_the_drive_tells_that_the_cause_is_there_still() -> None:
         provoke(opened, "ObF", persists=True)
         status = await status_of(opened, "atv312")
     assert status_json("demo", status)["fault"]["reset"]["possible_now"] is False
-    assert "reset: not yet, says the drive" in text_of(status)
+    assert "reset: Not yet, says the drive" in text_of(status)
 
 
 async def test_a_wait_before_the_reset() -> None:

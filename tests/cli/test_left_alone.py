@@ -110,7 +110,8 @@ def test_a_lost_line_that_goes_unnoticed_is_not_told_as_an_act() -> None:
         done = ended(0, "read", line, "ETA", "--json")
         assert done.stderr == ""
         told = json.loads(done.stdout)["timeout"]
-        assert (told["reaction"], told["fault"]) == ("Ignored", None)
+        assert (told["reaction"], told["fault"], told["begun"]) == ("Ignored", None, False)
+        assert json.loads(ended(0, "status", line, "--json").stdout)["timeout"]["begun"] is False
 
 
 def test_what_no_document_says_is_not_told_as_sure() -> None:

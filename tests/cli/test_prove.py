@@ -11,7 +11,9 @@ def test_on_the_run_without_a_terminal_takes_a_yes() -> None:
     said = refused(5, *ON_THE_RUN)
     assert "a hoist falls" in said
     assert "--yes says that this is meant" in said
-    assert "The motor is at rest" in refused(5, *ON_THE_RUN, "--yes")
+    error = refused(6, *ON_THE_RUN, "--yes")
+    assert "The motor is at rest" in error
+    assert "Sent by this command: CMD = 16#0007" in error, "its stop"
 
 
 def test_the_time_out_of_each_port_counts() -> None:

@@ -22,7 +22,7 @@ from tui.bus.errors import LineLost
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.session.settings.restore import plan_for
 
-from .commands import held, invoked, motor, refused, run, tcp_line
+from .commands import ended, held, invoked, motor, refused, run, tcp_line
 
 SP2 = 11410
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
@@ -294,7 +294,6 @@ WRITES_REFUSED_HERE = [
     (("ACC=soon", "--arm"), "'soon'"),
     (("RFR=5", "--arm"), "only be read"),
     (("CMD=6", "--arm"), "is a command"),
-    (("LSP=60", "HSP=40", "--arm"), "above HSP"),
     (("BIR=1", "--arm"), "unverified"),
     (("FRY=1", "--arm"), "not written from here"),
     (("ACC=5", "--arm", "--read-only"), "read-only"),
@@ -306,14 +305,20 @@ def test_5_refused_here(arguments: tuple[str, ...], text: str) -> None:
     assert text in refused(5, "write", "sim:atv71", *arguments)
 
 
+def test_a_setting_written_before_a_refused_one_gives_status_6() -> None:
+    error = ended(6, "write", "sim:atv71", "LSP=60", "HSP=40", "--arm").stderr
+    assert "would be above HSP" in error
+    assert error.endswith("drivepanel: Sent by this command: HSP = 40.0 Hz.\n")
+
+
 def test_5_nothing_is_restored_unarmed(tmp_path: Path) -> None:
     run(0, "backup", "sim:atv21", tmp_path / "x.toml")
     assert "Not armed" in refused(5, "restore", "sim:atv21", tmp_path / "x.toml")
 
 
-def test_5_a_motor_that_runs_is_not_set_up() -> None:
+def test_6_a_motor_that_runs_is_not_set_up_whole() -> None:
     with tcp_line("atv312", "--run", "30") as line:
-        said = refused(5, "write", line, "ACC=4", "FrS=60", "--arm")
+        said = refused(6, "write", line, "ACC=4", "FrS=60", "--arm")
         assert "motor stopped only" in said
         assert "1 to write" not in said
         assert re.search(r"ACC .* 4\.0 +s ", run(0, "read", line, "ACC"))

@@ -143,7 +143,9 @@ def test_a_reference_goes_to_the_taught_preset_once_it_is_confirmed(line: str) -
     confirmed = teach(line, "1.21", "--reference")
     assert "1.21 takes the reference, in rpm." in confirmed
     assert "bit 8 of 6.42" in confirmed
-    assert "write the reference like 900rpm" in refused(5, "reference", line, *DRIVE, "20", "--arm")
+    error = refused(2, "reference", line, *DRIVE, "20Hz", "--arm")
+    assert "1.21 takes its reference in rpm. Type it like 900rpm." in error
+    assert "Reference 20 rpm (1.21)" in run(0, "reference", line, *DRIVE, "20", "--arm")
     assert "Reference 700 rpm (1.21)" in run(0, "reference", line, *DRIVE, "700rpm", "--arm")
     assert held(line, PRESET) == 700
     teach(line, "--no-reference")

@@ -206,8 +206,8 @@ DEFECTS = (
     Defect(
         "pseudo-terminals-judged-by-their-baud",
         "tui/bus/schedule/connection.py",
-        "wire_time = not is_pseudo_terminal(link.path)",
-        "wire_time = True",
+        "wire_time = isinstance(link, SerialLink) and not is_pseudo_terminal(link.path)",
+        "wire_time = isinstance(link, SerialLink)",
         "On a busy computer a simulated drive falls silent now and then.",
         ("tests/bus/test_faults.py",),
     ),

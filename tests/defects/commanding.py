@@ -7,6 +7,11 @@ from .defect import Defect
 WRITING = "tests/session/test_writing.py"
 WORK = "tests/session/test_work.py"
 STOP = "tests/session/test_stop_words.py"
+WAVES = "tests/session/test_stop_waves.py"
+FAULTS = (
+    "tests/session/test_stop_faults.py"
+    "::test_an_error_anywhere_on_the_way_of_a_stop_keeps_no_frame_from_the_drive"
+)
 PROVER = "tests/session/test_prover.py"
 LINE_WATCH = "tests/session/test_line_watch.py"
 TIMEOUT = "tests/session/test_timeout.py"
@@ -152,10 +157,55 @@ DEFECTS = (
     Defect(
         "reference-clamped",
         "tui/session/command",
-        "_check_limits(profile, hertz, readings)\n    if",
-        "number = within_limits(profile, hertz, readings)\n    if",
-        "A reference that was mistyped runs the motor at its limit instead of being refused.",
+        "_check_limits(ReferenceUnits(profile, readings), found)\n    if",
+        "pass\n    if",
+        "A reference that was mistyped is written instead of being refused.",
         ("tests/session/test_command.py::test_references_that_are_refused",),
+    ),
+    Defect(
+        "reference-before-the-state-check",
+        "tui/session/command",
+        "        if refusal := state_refusal(self.session.profile, chart, id, access.raws):\n"
+        "            raise OrderRefused(refusal)\n        at_rest",
+        "        at_rest",
+        "A start in fault writes the reference, and only then finds out that nothing can run.",
+        ("tests/cli/test_nothing_written.py::test_a_fault_holds_the_reference_back_too",),
+    ),
+    Defect(
+        "status-5-after-writing",
+        "tui/cli/shared/errors.py",
+        "if error.exit_code not in NOTHING_SENT or",
+        "if error.exit_code in NOTHING_SENT or",
+        "Status 5 promises that nothing was written although the reference was.",
+        ("tests/cli/test_sets.py::test_a_setting_written_before_a_refused_one_gives_status_6",),
+    ),
+    Defect(
+        "reference-scale-fixed",
+        "tui/drive/shown.py",
+        "    scale = profile.scale(parameter, raws, absent)\n    found = encode",
+        "    scale = Decimal(parameter.scale)\n    found = encode",
+        "20 Hz are written as 200 Hz if the scale of the reference follows another word.",
+        (
+            "tests/session/test_reference.py::test_run_with_scale_by_turns_at_the_hertz_that_were_typed",
+        ),
+    ),
+    Defect(
+        "wrong-reference-started",
+        "tui/session/command",
+        "if same and abs(value.number - now.number) <=",
+        "if same or abs(value.number - now.number) <=",
+        "A motor starts at 200 Hz although 20 Hz were requested and the drive reads back 200.",
+        ("tests/session/test_reference.py::test_start_after_the_scale_changed_is_refused",),
+    ),
+    Defect(
+        "unit-of-reference-ignored",
+        "tui/session/command",
+        "    if not unit:\n        return places[0], typed\n",
+        "    if unit:\n        return places[0], typed\n",
+        "20Hz are written as 20 % to a drive whose reference is a percentage.",
+        (
+            "tests/session/test_reference.py::test_reference_in_a_unit_that_leads_nowhere_is_refused",
+        ),
     ),
     Defect(
         "stop-behind-the-queue",
@@ -188,6 +238,62 @@ DEFECTS = (
         "if not hertz:",
         "A motor that stands enabled at 0 Hz is told as stopped.",
         (f"{STOP}::test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped",),
+    ),
+    Defect(
+        "prepared-frames-not-sent",
+        "tui/session/command/last_stop.py",
+        "                self._line.send_prepared(session.prepared, ended)\n",
+        '                ended("")\n',
+        "An error of the panel keeps the stop from the drive, and it is shown as sent.",
+        (FAULTS,),
+    ),
+    Defect(
+        "internal-error-taken-for-the-lines",
+        "tui/session/command/stop.py",
+        "            except LineLost:\n                raise\n",
+        "",
+        "An error in the queue of the line keeps the stop from the drive.",
+        (FAULTS,),
+    ),
+    Defect(
+        "stops-not-watched",
+        "tui/session/command/stop.py",
+        "carried_on(partial(watch_first_frames, begun, self._line.timing, self._last.send))",
+        "carried_on(lambda: None)",
+        "A stop that an error in the line's loop has ended is never sent.",
+        (FAULTS,),
+    ),
+    Defect(
+        "first-word-by-a-chart-that-may-have-changed",
+        "tui/session/command/last_known.py",
+        "    if session.state(SEEN_RUNNING).motion in ENABLED:\n        raws",
+        "    if True:\n        raws",
+        "F9 starts a motor at rest whose profile was changed at the keypad.",
+        (f"{WAVES}::test_the_first_word_starts_no_motor_whatever_chart_is_in_force",),
+    ),
+    Defect(
+        "first-wave-waits-for-reads",
+        "tui/session/command/motor_stop.py",
+        "            await self.wave.over()\n",
+        "            await self._chosen()\n",
+        "The last of many drives is stopped seconds after the first.",
+        (f"{WAVES}::test_every_drive_is_sent_its_word_before_anything_is_read",),
+    ),
+    Defect(
+        "stopping-before-the-frame",
+        "tui/session/command/stop.py",
+        'self._say(session, Phase.SENDING, "stop waits for the line", ordered)',
+        'self._say(session, Phase.STOPPING, "stop waits for the line", ordered)',
+        "A row shows STOPPING though its drive was sent nothing.",
+        (f"{WAVES}::test_every_drive_is_sent_its_word_before_anything_is_read",),
+    ),
+    Defect(
+        "stop-in-vain-not-said-at-once",
+        "tui/session/command/last_known.py",
+        '    if state.motion not in ENABLED:\n        return ""\n',
+        '    return ""\n',
+        "A motor that its terminals run is shown as STOPPING for seconds.",
+        (f"{WAVES}::test_a_stop_of_a_motor_that_its_terminals_run_is_not_stopped_at_once",),
     ),
     Defect(
         "stop-tried-once",

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from .defect import Defect
 
+EDITOR = "tests/session/test_editor.py"
+
 DEFECTS = (
+    Defect(
+        "saved-value-of-another-source",
+        "tui/session/unsaved.py",
+        "elif self._held[code] != before:",
+        "elif False:",
+        "A setting that was changed at the keypad is lost at power-off, and nothing said so.",
+        (f"{EDITOR}::test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved",),
+    ),
     Defect(
         "field-clears-its-neighbours",
         "tui/session/settings/write.py",
@@ -72,8 +82,8 @@ DEFECTS = (
     Defect(
         "scale-divides",
         "tui/drive/values.py",
-        "return raw * scale",
-        "return raw / scale",
+        "number, decimals = raw * scale, decimals_of(scale)",
+        "number, decimals = raw / scale, decimals_of(scale)",
         "50.0 Hz is shown as 5000 Hz.",
         ("tests/drive/test_values.py",),
     ),
@@ -358,6 +368,22 @@ DEFECTS = (
         ("tests/drive/test_factory.py",),
     ),
     Defect(
+        "reset-sentence-of-another-channel",
+        "tui/drive",
+        "if row.by in (None, by) and all(when.holds(raws) for when in row.when):",
+        "if all(when.holds(raws) for when in row.when):",
+        "The question before a reset says that nothing starts, while the terminals command.",
+        ("tests/drive/test_fault_reset.py",),
+    ),
+    Defect(
+        "closed-inputs-of-earlier",
+        "tui/drive",
+        "closed_inputs(profile, inputs)) if part)",
+        "closed_inputs(profile, raws)) if part)",
+        "The question before a reset names inputs that were closed earlier as closed now.",
+        ("tests/drive/test_fault_reset.py",),
+    ),
+    Defect(
         "reset-bit-the-wrong-way-round",
         "tui/drive/hints.py",
         "return (raw >> told.bit & 1) == told.value",
@@ -396,5 +422,21 @@ DEFECTS = (
         "if model is not None]",
         "A drive of 400 V with another filter is taken for the first with its code.",
         ("tests/drive/test_family_page.py",),
+    ),
+    Defect(
+        "statement-at-0-dim",
+        "tui/screens/monitor/words.py",
+        "if (bit.on if on else bit.off).casefold() not in PLAIN_ANSWERS:",
+        "if on and bit.on.casefold() not in PLAIN_ANSWERS:",
+        "Quick stop active is dim while the quick stop is active.",
+        ("tests/ui/test_monitor_words.py",),
+    ),
+    Defect(
+        "stored-values-of-another-fault",
+        "tui/drive/hints.py",
+        "known = raws if latest else {",
+        "known = raws if latest or raws else {",
+        "The mains at the last fault rules out a cause of the fault before.",
+        ("tests/ui/test_fault_doctor.py",),
     ),
 )

@@ -6,6 +6,7 @@ from .defect import Defect
 
 KEYS = ("tests/ui/test_dialog_keys.py",)
 ARMING_KEY = "tests/ui/test_stop_keys.py"
+OPENING = "tests/ui/test_opening.py"
 
 DEFECTS = (
     Defect(
@@ -44,10 +45,36 @@ DEFECTS = (
     Defect(
         "stop-that-reaches-nobody-is-silent",
         "tui/screens/hands.py",
-        '            self.events.add("failed", told)\n            if strangers',
-        "            if False and strangers",
+        '            self.events.add("failed", text)\n            self.unreached = text,',
+        "            _ = text,",
         "F9 stops all but one drive, and says nothing of it.",
         ("tests/ui/test_stop_keys.py",),
+    ),
+    Defect(
+        "not-stopped-cut-off",
+        "tui/screens/frame.py",
+        "                *not_stopped_lines(view.not_stopped, width),\n",
+        "",
+        "Who runs a motor that a stop does not stop is cut off, or covered.",
+        ("tests/ui/test_stop_keys.py::test_nothing_covers_that_a_motor_is_not_stopped",),
+    ),
+    Defect(
+        "broken-key-reader-stops-nothing",
+        "tui/terminal/reader.py",
+        "                self._stops.last_stop(error)\n",
+        "                pass\n",
+        "An error in reading the keys takes the stop key away.",
+        ("tests/terminal/test_reader.py",),
+    ),
+    Defect(
+        "error-behind-a-stop-key-loses-it",
+        "tui/screens/hands.py",
+        "                fleet.last_stop(error, chosen)\n",
+        "                pass\n",
+        "An error in the panel takes the stop key away.",
+        (
+            "tests/ui/test_stop_keys.py::test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive",
+        ),
     ),
     Defect(
         "counters-reset-unarmed",
@@ -72,6 +99,33 @@ DEFECTS = (
         "if stroke is not None and stroke.stamp is None:",
         "A stop comes just before the key that arms has its effect, and the drive stays armed.",
         (ARMING_KEY,),
+    ),
+    Defect(
+        "keys-count-while-a-line-opens",
+        "tui/screens/hands.py",
+        "if name in STOP_KEYS or self.screen.is_modal:",
+        "if True:",
+        "Keys typed while the demo opens open a real line of another day instead.",
+        (
+            f"{OPENING}::test_keys_of_the_tour_typed_too_early_open_no_line_and_work_later",
+            f"{OPENING}::test_stops_work_while_a_second_line_opens",
+        ),
+    ),
+    Defect(
+        "key-read-while-a-line-opens-counts-later",
+        "tui/screens/hands.py",
+        "if stroke is None or stroke.read_at > self.opening.ended:",
+        "if True:",
+        "A key that a slow panel takes late opens a drive, or another line, of its own.",
+        (f"{OPENING}::test_a_key_read_while_a_line_opens_is_ignored_though_it_is_handled_later",),
+    ),
+    Defect(
+        "search-left-without-a-question",
+        "tui/screens/connection/line_keys.py",
+        "asks = here is not None or self.scanning",
+        "asks = here is not None",
+        "Enter on another line closes the one that is being searched, without a question.",
+        (f"{OPENING}::test_enter_on_another_line_asks_while_the_search_goes_on",),
     ),
     Defect(
         "named-like-a-key",

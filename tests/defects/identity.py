@@ -14,8 +14,8 @@ DEFECTS = (
     Defect(
         "contradicted-drive-armed",
         "tui/session/arming.py",
-        "        if self.barred:\n",
-        "        if False:\n",
+        "return self._line.held or self.barred",
+        "return self._line.held",
         "A drive is commanded by the words of another family.",
         (CONTRADICTION,),
     ),

@@ -64,8 +64,8 @@ DEFECTS = (
     Defect(
         "held-line-arms",
         "tui/session/arming.py",
-        "        if self._line.held:\n            raise OrderRefused(self._line.held)\n",
-        "",
+        "return self._line.held or self.barred",
+        "return self.barred",
         "The panel shows a drive as armed that takes no command.",
         (f"{KNOWN}::test_a_held_line_arms_nothing",),
     ),

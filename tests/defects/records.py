@@ -102,8 +102,8 @@ DEFECTS = (
     Defect(
         "log-of-a-full-disk-tells-tracebacks",
         "tui/cli/shared/logs.py",
-        "    def handleError(",
-        "    def handle_error(",
+        "[return-value]\n\n    def handleError(",
+        "[return-value]\n\n    def handle_error(",
         "A full disk answers a stop that worked with six tracebacks.",
         (
             "tests/cli/test_journal_trouble.py"
@@ -262,5 +262,45 @@ DEFECTS = (
         "c",
         "Who prints a backup of a drive with an odd profile has the screen blanked.",
         ("tests/cli/test_texts.py",),
+    ),
+    Defect(
+        "only-two-signals-stop-a-motor",
+        "tui/cli/shared/signals.py",
+        "for number in ending_signals() - kept}",
+        'for number in _numbers(("SIGHUP", "SIGTERM", *OF_KEYS[:1])) - kept}',
+        "Ctrl-\\ or SIGUSR1 ends the program, and the motor that it started runs on.",
+        ("tests/line/test_signals.py",),
+    ),
+    Defect(
+        "ctrl-z-suspends-a-program-with-a-motor",
+        "tui/cli/shared/signals.py",
+        "signal.pthread_sigmask(signal.SIG_BLOCK, held)",
+        "signal.pthread_sigmask(signal.SIG_BLOCK, ())",
+        "A program that commands a motor is frozen by one key, and stops nothing.",
+        ("tests/line/test_signals.py",),
+    ),
+    Defect(
+        "log-thread-takes-the-signals",
+        "tui/cli/shared/logs.py",
+        "        take_no_signals()\n",
+        "",
+        "The system suspends the program by the one thread that does not hold the signal back.",
+        ("tests/line/test_signals.py",),
+    ),
+    Defect(
+        "motor-left-behind-is-not-asked-about",
+        "tui/screens/leaving.py",
+        "here += self._left_behind(fleet)",
+        "here += []",
+        "The panel is left without a word of a motor that no program commands.",
+        ("tests/line/test_left_behind.py",),
+    ),
+    Defect(
+        "stopped-motor-stays-on-record",
+        "tui/cli/commands/stop.py",
+        "await asyncio.to_thread(forget_start, session)",
+        "pass",
+        "Lines shows a motor that may run, although it was stopped from the shell.",
+        ("tests/line/test_left_behind.py",),
     ),
 )

@@ -8,6 +8,7 @@ STOPS = "tests/bus/test_share_stops.py"
 GATEWAYS = "tests/bus/test_share_gateways.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
+BOUNDS = "tests/bus/test_share_bounds.py"
 MAPPING = "tests/session/test_mapping.py"
 APPLYING = "tests/session/test_applying.py"
 BLOCK = "tests/cli/test_block.py"
@@ -115,10 +116,34 @@ DEFECTS = (
     Defect(
         "stops-counted-together",
         "tui/bus/stop_counts.py",
-        "known[program] = max(known.get(program, 0), count)",
+        "known[program] = count",
         'known[""] = max(known.get("", 0), count)',
         "Of two stops given at once one voids nothing.",
         (f"{STOPS}::test_counts_only_go_up_and_one_telling_counts_once",),
+    ),
+    Defect(
+        "stop-counts-without-bounds",
+        "tui/bus/bounds.py",
+        "StopCount = Annotated[int, Meta(ge=0, lt=STOPS_WRAP)]",
+        "StopCount = int",
+        "One message on the socket of a line ends every later stop with an error.",
+        (f"{BOUNDS}::test_stop_counts_of_a_greeting_block_no_later_stop",),
+    ),
+    Defect(
+        "stop-count-raised-by-others",
+        "tui/bus/stop_counts.py",
+        "if program in counts and is_newer(known := counts[program], own):",
+        "if program in counts and is_newer(known := counts[program], own) and False:",
+        "A program's stop is no news where another program counted for it before.",
+        (f"{BOUNDS}::test_stop_count_that_others_raised_falls_back_to_its_own_program",),
+    ),
+    Defect(
+        "stop-in-another-programs-name",
+        "tui/bus/share/server.py",
+        "case StopGiven() if message.program.id == client.program.id:",
+        "case StopGiven():",
+        "The stop of a program is no news where another one sent its count before.",
+        (f"{BOUNDS}::test_stop_in_the_name_of_another_program_ends_the_connection_only",),
     ),
     Defect(
         "stop-not-told-to-the-others",

@@ -16,6 +16,17 @@ DEFECTS = (
         ("tests/terminal/test_dialects.py::test_reports_keep_no_sequence_waiting",),
     ),
     Defect(
+        "reply-without-backslash-takes-the-next-escape",
+        "tui/terminal/dialects.py",
+        "self._began, self._mark, self._state = began, mark, self._escape",
+        "self._began, self._mark, self._state = began, mark, self._ground",
+        "An F12 right after a terminal's reply that lost its last character does not stop.",
+        (
+            "tests/terminal/test_dialects.py::test_reply_that_loses_its_backslash_gives_no_alt_key",
+            "tests/terminal/test_dialects.py::test_stop_key_after_a_cut_or_incomplete_reply_stops",
+        ),
+    ),
+    Defect(
         "frames-not-waited-for",
         "tui/terminal/pacing.py",
         "        if on_its_way and sum(on_its_way) > ahead and",

@@ -6,6 +6,22 @@ from .defect import Defect
 
 DEFECTS = (
     Defect(
+        "found-in-fault-told-as-a-trip",
+        "tui/session/monitor/alarms.py",
+        "now = FaultOnset(wall, onset is not None or device in self._free, code)",
+        "now = FaultOnset(wall, True, code)",
+        "A panel that is opened on a fault of yesterday says that the drive has tripped just now.",
+        ("tests/session/test_alarms.py",),
+    ),
+    Defect(
+        "one-trip-listed-for-each-panel",
+        "tui/session/trips.py",
+        "if last is not None and ongoing and not tripped:",
+        "if False:",
+        "The report lists one trip as often as a panel was opened on it.",
+        ("tests/session/test_trips.py",),
+    ),
+    Defect(
         "values-of-the-monitor-not-noted",
         "tui/session/read/reader.py",
         "        image.take(found)\n",
@@ -172,5 +188,13 @@ DEFECTS = (
         "            _ = replace(self.latest, fault=snapshot.state.fault)\n",
         "The record of a trip does not say which fault it was.",
         ("tests/session/test_fault_record.py",),
+    ),
+    Defect(
+        "reaction-off-taken-for-a-watch-that-runs",
+        "tui/session/monitor/timeout.py",
+        "return Timeout(True, replace(watch, active=watch.acts and has_begun(session)))",
+        "return Timeout(True, replace(watch, active=has_begun(session)))",
+        "A drive whose reaction is off is shown as one that trips.",
+        ("tests/session/test_timeout.py",),
     ),
 )

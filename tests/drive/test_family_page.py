@@ -23,6 +23,7 @@ COMMON_SECTIONS = [
     "Line",
     "Addresses",
     "When the line falls silent",
+    "After a fault reset",
     "Command words",
     "Where the manuals are wrong",
 ]

@@ -15,6 +15,7 @@ from tui.drive.errors import ProfileError
 from tui.drive.hints import RESETS, reset_ready, reset_text
 from tui.drive.profile import json_schema, library
 from tui.drive.profile.schema import AlarmHelp, FaultHelp, HelpData, ResetWay
+from tui.drive.reset_text import MAY_START
 
 FAMILIES = sorted(item.id for item in library.listings())
 COUNTS = {"atv21": (38, 16), "atv31": (27, 5), "atv312": (31, 5), "atv71": (74, 30)}
@@ -152,14 +153,17 @@ def test_the_drive_is_believed_before_what_is_recalled() -> None:
     assert reset_ready(library.load("atv21"), {"FD01": 0xFFFF}) is None
     assert "x does nothing" in reset_text(help_, None, "x").text
     assert "works now" in reset_text(help_, True, "x").text
-    assert reset_text(help_, False, "x").text.startswith("not yet")
+    assert reset_text(help_, False, "x").text.startswith("Not yet")
 
 
 def test_no_way_of_reset_hides_a_motor_that_may_start() -> None:
-    starts = {way: text for way, text in RESETS.items() if "start" in text}
-    assert set(RESETS) - set(starts) == {"power-cycle"}
+    for way in RESETS:
+        help_ = FaultHelp(raw=1, probable=["x"], reset=way)
+        for ready in (None, True, False):
+            assert reset_text(help_, ready, "x").text.endswith(MAY_START)
+            assert reset_text(help_, ready, "x", "It may.").text.endswith("It may.")
     by_itself = FaultHelp(raw=1, probable=["x"], reset="by-itself")
-    assert reset_text(by_itself, None, "x").text.startswith("alone")
+    assert "may start it." in reset_text(by_itself, None, "x").text
 
 
 def test_the_ways_of_reset_are_those_of_the_facts() -> None:

@@ -7,7 +7,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from tui.drive.first_stop import FirstWord, first_word, followers, stop_places
+from tui.drive.first_stop import (
+    FirstWord,
+    families_beside,
+    first_word,
+    followers,
+    stop_places,
+)
 from tui.drive.orders import GENTLE_FIRST
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
@@ -136,3 +142,8 @@ def test_an_unsaid_drive_is_followed_by_a_family_that_sends_the_same_word() -> N
     assert following({CHCF: 3}, "atv312") == ("atv71",)
     assert following({}, "atv312") == ("atv71",)
     assert set(following({CHCF: 1}, "atv312")) == {"atv31", "atv312", "atv71"}
+
+
+def test_families_beside_a_named_one_share_its_register() -> None:
+    assert {one.id for one in families_beside(FACTS, "atv312")} == {"atv31", "atv312", "atv71"}
+    assert {one.id for one in families_beside(FACTS, "atv21")} == {"atv21"}

@@ -56,6 +56,21 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         "no state of the kind running",
         "states = [\n",
     ),
+    "a command word of 32 bits": (
+        [("address = 300\n", 'address = 300\ntype = "uint32"\n')],
+        "CTRL has 32 bits. A command word or a status word has 16 bits",
+        'command = "CTRL"',
+    ),
+    "a status word of 32 bits": (
+        [("address = 100\n", 'address = 100\ntype = "uint32"\n')],
+        "STAT has 32 bits",
+        'status = "STAT"',
+    ),
+    "a command that is a part of a register": (
+        [("address = 300\n", "address = 300\nmask = 0x00FF\n")],
+        "CTRL is a part of a register",
+        'command = "CTRL"',
+    ),
     "no way to the running state": (
         [('status = "STAT"\n', 'status = "STAT"\nruns_in = "running"\n')],
         "no command leads from ready to running",

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+
 import pytest
 
+from tests.session.fakes import parameter, profile_of
+from tests.sources import ROOT, modules, tree_of
+from tui.drive.errors import ValueRefused
 from tui.drive.profile import library
-from tui.drive.shown import depends_on, shown, shown_text, typed_text
+from tui.drive.shown import depends_on, raw_of_text, shown, shown_text, typed_text
 
 ATV31 = library.load("atv31")
 ATV71 = library.load("atv71")
@@ -53,3 +58,33 @@ def test_what_a_value_depends_on() -> None:
     assert depends_on(ATV31["ACC"]) == ("Inr",)
     assert depends_on(ATV71["RTH"]) == ("UNT",)
     assert depends_on(ATV71["CMD"]) == ()
+
+
+def test_one_module_converts_text_to_raw_values() -> None:
+    """A second conversion would forget the scale or the unit that follows another word."""
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in modules()
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.ImportFrom)
+        and (node.module or "").endswith("values")
+        and any(name.name == "encode" for name in node.names)
+    }
+    assert found == {"tui/drive/shown.py"}
+
+
+def test_raw_of_text_follows_scale_and_unit_of_other_words() -> None:
+    scaled = parameter(
+        "P", 1, unit="Hz", scale_by={"parameter": "M", "scales": {"0": "0.1", "1": "1"}}
+    )
+    counted = parameter(
+        "C", 2, unit_by={"parameter": "M", "shift": 0, "mask": 1, "units": {"0": "s", "1": "V"}}
+    )
+    profile = profile_of(scaled, counted, parameter("M", 3))
+    assert [raw_of_text(profile, profile["P"], "20 Hz", {"M": m}).raw for m in (0, 1)] == [200, 20]
+    assert raw_of_text(profile, profile["C"], "5000ms", {"M": 0}).raw == 5
+    for code, text in (("P", "its scale follows M"), ("C", "its unit follows M")):
+        with pytest.raises(ValueRefused, match=text):
+            raw_of_text(profile, profile[code], "20", {})
+    with pytest.raises(ValueRefused, match="is not a number in V"):
+        raw_of_text(profile, profile["C"], "5 s", {"M": 1})

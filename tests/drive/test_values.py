@@ -14,6 +14,7 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import (
+    decimals_of,
     decode,
     encode,
     from_words,
@@ -70,6 +71,68 @@ def test_raw_to_text_to_raw(which: int, share: float) -> None:
     assert (back.raw, back.rounded) == (raw, False)
     if value.number is not None:
         assert encode(p, value.display, names, scale).raw == raw
+
+
+SCALES = st.one_of(
+    st.decimals(Decimal("0.0000001"), 1000, allow_nan=False, allow_infinity=False, places=10),
+    st.integers(1, 100_000).map(lambda counts: round(Decimal(60) / counts, 13)),
+    st.sampled_from(["0.1", "0.01", "0.25", "1.5", "10", "1", "0.125", "0.0012207031250"]).map(
+        Decimal
+    ),
+).filter(lambda scale: scale > 0)
+
+
+@settings(max_examples=500)
+@given(scale=SCALES, raw=st.integers(-0x8000, 0x7FFF))
+def test_shown_digits_lead_back_to_the_raw_value_and_no_further(scale: Decimal, raw: int) -> None:
+    p = parameter(unit="Hz", scale=f"{scale:f}", type="int16")
+    value = decode(p, raw, {}, scale)
+    for typed in (value.text, value.display, f"{value.text}hz", value.text.replace(".", ",")):
+        back = encode(p, typed, {}, scale)
+        assert (back.raw, back.rounded, back.lossy) == (raw, False, False)
+    assert value.number is not None
+    assert abs(value.number - raw * scale) < scale / 2
+    assert value.text != decode(p, raw + 1, {}, scale).text
+    decimals = len(value.text.partition(".")[2])
+    assert decimals == decimals_of(scale)
+    assert decimals == 0 or scale < Decimal(100).scaleb(-decimals), "two digits a count at most"
+
+
+@pytest.mark.parametrize(
+    ("scale", "raw", "text"),
+    [
+        ("0.1", 200, "20.0"),
+        ("0.01", 2000, "20.00"),
+        ("0.25", 81, "20.25"),
+        ("1.5", 3, "4.5"),
+        ("10", 2, "20"),
+        ("0.0012207031250", 16385, "20.001"),
+        ("0.0018311105685", -10923, "-20.001"),
+        ("0.0030518509476", 3, "0.009"),
+    ],
+)
+def test_a_number_is_shown_with_the_digits_of_its_scale(scale: str, raw: int, text: str) -> None:
+    p = parameter(unit="Hz", scale=scale, type="int16")
+    value = decode(p, raw, {}, Decimal(scale))
+    assert (value.text, f"{value.number:f}") == (text, text)
+
+
+@pytest.mark.parametrize(
+    ("typed", "rounded", "lossy"),
+    [
+        ("20", False, False),
+        ("20.001", False, False),
+        ("20.0012207031250", False, False),
+        ("20.0005", True, False),
+        ("0.0003", True, True),
+    ],
+)
+def test_a_long_scale_rounds_only_numbers_between_its_counts(
+    typed: str, rounded: bool, lossy: bool
+) -> None:
+    p = parameter(unit="Hz", scale="0.0012207031250")
+    found = encode(p, typed, {}, Decimal("0.0012207031250"))
+    assert (found.rounded, found.lossy) == (rounded, lossy)
 
 
 @given(raw=st.integers(-0x8000, 0x7FFF))

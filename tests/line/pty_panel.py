@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from tests.answering import read_answering
 from tests.bus.peer import tcp_request_length
@@ -65,6 +66,10 @@ class WriteLog:
         self._ends: list[socket.socket] = []
         self.port: int = self._listener.getsockname()[1]
         self.writes: list[Write] = []
+        self.times: list[float] = []
+        """When each write passed, in seconds of the monotonic clock."""
+        self.connections = 0
+        """Connections so far."""
 
     @contextmanager
     def at_work(self) -> Iterator[WriteLog]:
@@ -81,6 +86,7 @@ class WriteLog:
         with suppress(OSError):
             while True:
                 client, _ = self._listener.accept()
+                self.connections += 1
                 server = socket.create_connection(self._target)
                 self._ends += [client, server]
                 for source, sink, seen in ((client, server, True), (server, client, False)):
@@ -101,6 +107,7 @@ class WriteLog:
         while (length := tcp_request_length(data)) and len(data) >= length:
             request, data = data[:length], data[length:]
             if request[7] in WRITES:
+                self.times.append(time.monotonic())
                 self.writes.append(_write_of(request))
         return data
 
@@ -264,15 +271,17 @@ def panel_on_a_pty(
     size: tuple[int, int] = (COLUMNS, ROWS),
     environment: Mapping[str, str] | None = None,
     named: Callable[[str], Sequence[str]] = lambda line: (line, "-d", "1"),
+    program: Sequence[str] = ("tui",),
 ) -> Iterator[PtyPanel]:
     """The panel on simulated drives over TCP, the first on Monitor.
 
-    `named` gives the words by which a LINE and its first drive are called on the command line.
+    `named` gives the words by which a LINE and its first drive are called on the command line,
+    `program` the module that opens the panel, with its first arguments.
     """
     specs = [DriveSpec("atv71", address) for address in range(1, drives + 1)]
     with Simulation(specs) as simulation, WriteLog(simulation.serve_tcp()).at_work() as log:
         line = named(f"tcp:127.0.0.1:{log.port}")
-        started = _started([*line, *options], size, environment or {})
+        started = start_panel([*line, *options], size, environment or {}, program)
         panel = PtyPanel(*started, simulation, log)
         with _until_the_end(panel):
             yield panel
@@ -282,7 +291,7 @@ def panel_on_a_pty(
 def panel_beside(panel: PtyPanel) -> Iterator[PtyPanel]:
     """Another panel on the line of that one, with its first drive on Monitor."""
     line = (f"tcp:127.0.0.1:{panel.log.port}", "-d", "1")
-    started = _started([*line], (COLUMNS, ROWS), {})
+    started = start_panel([*line])
     with _until_the_end(PtyPanel(*started, panel.simulation, panel.log)) as other:
         yield other
 
@@ -296,20 +305,25 @@ def _until_the_end(panel: PtyPanel) -> Iterator[PtyPanel]:
     finally:
         with suppress(ProcessLookupError):
             os.kill(panel.pid, signal.SIGKILL)
-        os.waitpid(panel.pid, 0)
+        with suppress(ChildProcessError):  # its end may have been waited for already
+            os.waitpid(panel.pid, 0)
         os.close(panel.terminal)
 
 
-def _started(
-    arguments: list[str], size: tuple[int, int], more: Mapping[str, str]
+def start_panel(
+    arguments: list[str],
+    size: tuple[int, int] = (COLUMNS, ROWS),
+    more: Mapping[str, str] = MappingProxyType({}),
+    program: Sequence[str] = ("tui",),
 ) -> tuple[int, int]:
+    """Start the panel on a new pseudo-terminal: its process and the terminal's other end."""
     pid, terminal = pty.fork()
     if pid == 0:
         try:
             fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", *size[::-1], 0, 0))
             environment = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "LINES")}
             environment |= {"TERM": "xterm-256color", "LC_ALL": "C.UTF-8", **more}
-            command = [sys.executable, "-m", "tui", *arguments]
+            command = [sys.executable, "-m", *program, *arguments]
             os.execvpe(command[0], command, environment)
         finally:
             os._exit(127)  # never back into the test

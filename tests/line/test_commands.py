@@ -31,6 +31,7 @@ from tests.programs import (
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineLost
 from tui.cli.main import main
+from tui.drive.profile import library
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.spec import FaultRates
 
@@ -184,7 +185,7 @@ def test_leave_running_leaves_it_running_and_says_what_the_drive_does() -> None:
         run = ("run", line, "--reference", "20Hz", "--arm", "--for", "2", "--leave-running")
         done = drivepanel(*run)
         assert (done.returncode, besides(done.stderr)) == (0, "")
-        assert "on loss of communication it acts 10 s after the last request" in done.stdout
+        assert "without communication it goes on: its reaction is Ignored" in done.stdout
         assert "stopp" not in done.stdout
         assert turns(simulation)
         done = drivepanel("stop", line)
@@ -211,7 +212,7 @@ def test_a_motor_that_others_stop_ends_it() -> None:
         wait_until(lambda: turns(simulation), "the motor turns")
         simulation.drive(1).power_cycle()
         _, error = program.process.communicate(timeout=PATIENCE)
-        assert program.process.returncode == 5
+        assert program.process.returncode == 6
         assert "Device 1 no longer runs" in error
         assert "It was stopped by another program or master on the line" in error
         assert "CMD 16#000F is now 16#0000" in error
@@ -227,7 +228,7 @@ def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None
             wait_until(lambda: turns(simulation), "the motor turns")
             assert drivepanel("stop", line, *order).returncode == 0
             said, error = program.process.communicate(timeout=PATIENCE)
-            assert program.process.returncode == 5, error
+            assert program.process.returncode == 6, error
             assert "It was stopped by drivepanel stop, stop" in error
             assert "It was stopped by drivepanel stop, stop" in said
             assert stands(simulation)
@@ -547,10 +548,32 @@ def test_a_drive_of_no_known_kind_is_stopped_by_the_word_that_it_takes() -> None
     with bench(spec) as (simulation, line):
         wait_until(lambda: turns(simulation), "the motor turns")
         done = drivepanel("stop", line)
-        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.returncode == 4, done.stdout + done.stderr
         assert "it says it is UNHEARD OF" in done.stdout
-        assert "Device 1, Altivar 21: stopped." in done.stdout
+        assert ": stopped" not in done.stdout
+        assert "it is not known if the motor stopped" in done.stderr
+        assert "Read as Altivar 21, it is at standstill" in done.stderr
         assert stands(simulation)
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["packaged", "own profile"])
+def test_stop_with_named_profile_uses_no_other(own: bool) -> None:
+    """No other profile has a say, though the drive has another's status word."""
+    name = "varmeca"
+    if own:
+        folder = library.user_folder()
+        folder.mkdir(parents=True)
+        text = (library.packaged_folder() / "varmeca.toml").read_text("utf-8")
+        name = "fan"
+        (folder / "fan.toml").write_text(text.replace('id = "varmeca"', 'id = "fan"', 1), "utf-8")
+    spec = DriveSpec("atv21", 1, identity={1: "UNHEARD OF"}, run_hz=20.0)
+    with bench(spec) as (simulation, line):
+        wait_until(lambda: turns(simulation), "the motor turns")
+        done = drivepanel("stop", line, "-p", name)
+        assert done.returncode == 4, done.stdout + done.stderr
+        assert ": stopped" not in done.stdout
+        assert "NOT STOPPED" in done.stderr
+        assert "Altivar 21" not in done.stdout + done.stderr
 
 
 def test_3_a_drive_that_answers_nothing_is_not_told_as_stopped() -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
-from tests.programs import wait_until
+import pytest
+
+from tests.programs import DRIVEPANEL, drivepanel, served, wait_until
 from tui.simulator import DriveSpec, Simulation
 
 from .terminal import Terminal, runs
@@ -36,7 +40,7 @@ def test_the_next_panel_knows_the_motor_and_takes_it_over(
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         assert made.speed > 2
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("FORWARD", "Runs since", "that program ended", "T takes over")
+        terminal.wait_for("FORWARD", "Runs since", "has exited", "T takes it over")
         # not armed: nothing is taken over
         terminal.press("T")
         terminal.wait_for("Not armed")
@@ -126,3 +130,103 @@ def test_where_a_start_cannot_be_recorded_the_panel_asks(
         assert simulation.drive(1).raw("CMD") == 0
     finally:
         simulation.stop()
+
+
+class Killed(NamedTuple):
+    """The line to a drive whose motor turns although its `run` was killed."""
+
+    simulation: Simulation
+    line: str
+    pid: int
+
+    @property
+    def clause(self) -> str:
+        return f"started by run, process {self.pid}, which has exited; no program commands it"
+
+
+@pytest.fixture
+def killed() -> Iterator[Killed]:
+    """A `run` that was killed; the drive itself acts after 30 s without a request."""
+    with Simulation(
+        [DriveSpec("atv71", 1, sets={"TTO": 300}), DriveSpec("atv71", 2)]
+    ) as simulation:
+        host, port = simulation.serve_tcp()
+        line = f"tcp:{host}:{port}"
+        command = [*DRIVEPANEL, "run", line, "-d", "1", "--reference", "20Hz", "--arm"]
+        with served(command, ready="Run forward") as program:
+            wait_until(lambda: simulation.drive(1).motor.frequency > 2, "the motor runs")
+            program.process.kill()
+            program.process.wait()
+        yield Killed(simulation, line, program.process.pid)
+
+
+def documents(*words: str) -> Any:
+    return json.loads(drivepanel(*words, "--json").stdout)
+
+
+def test_commands_show_a_motor_that_no_program_commands(killed: Killed) -> None:
+    line = killed.line
+    ways = f"Stop it: drivepanel stop {line} -d 1. Take it over: drivepanel {line} -d 1,"
+    assert f", {killed.clause}. {ways}" in drivepanel("status", line, "-d", "1").stdout
+    assert f", {killed.clause}. {ways}" in drivepanel("status", line, "--all").stdout
+    left = documents("status", line, "-d", "1")["left_behind"]
+    facts = (left["program"], left["pid"], left["exited"], left["left_running"])
+    assert facts == ("run", killed.pid, True, False)
+    assert killed.clause in left["text"]
+    assert documents("status", line, "-d", "2")["left_behind"] is None
+    printed = drivepanel("lines").stdout
+    assert f"{line} device 1: may run since" in printed
+    assert f", {killed.clause}.\n  {ways}" in printed
+    (known,) = documents("lines")["left_behind"]
+    assert (known["line"], known["device"], known["pid"]) == (line, 1, killed.pid)
+    # stopped from the shell, it is a motor like any other again
+    assert drivepanel("stop", line, "-d", "1").returncode == 0
+    assert killed.simulation.drive(1).motor.frequency == 0
+    assert documents("lines")["left_behind"] == []
+    killed.simulation.drive(1).run(30.0)
+    assert documents("status", line, "-d", "1")["left_behind"] is None
+
+
+def test_commands_forget_a_motor_that_the_drive_itself_has_stopped(killed: Killed) -> None:
+    assert documents("lines")["left_behind"] != []
+    killed.simulation.drive(1).set("TTO", 10)
+    wait_until(lambda: killed.simulation.drive(1).fault is not None, "the drive's own timeout")
+    assert documents("status", killed.line, "-d", "1")["left_behind"] is None
+    assert documents("lines")["left_behind"] == []
+
+
+def test_each_screen_shows_a_motor_that_no_program_commands(
+    killed: Killed, terminal_with: Start
+) -> None:
+    terminal = terminal_with([*PANEL, killed.line, "-d", "1"])
+
+    def shows(*words: str) -> None:
+        """The words, however the terminal breaks them at its edge or a dialog's."""
+        wanted = [" ".join(one.split()) for one in (killed.clause, *words)]
+
+        def there() -> bool:
+            lines = terminal.text().replace("│", " ").splitlines()
+            return all(one in " ".join(" ".join(lines).split()) for one in wanted)
+
+        wait_until(there, f"{wanted} in\n{terminal.text()}")
+
+    def goes_away(text: str) -> None:
+        """The newest message takes more lines for a while; then only the screen says it."""
+        wait_until(lambda: text not in terminal.text(), f"{text} goes away")
+
+    shows("Space stops it, T takes it over.", "Open it: Space stops it")
+    terminal.press("6")
+    terminal.wait_for("So it works")
+    shows("Space stops it; T on Monitor takes it over.")
+    terminal.press("m")
+    shows("1: Runs since", "Open it: Space stops it, T takes it over.")
+    terminal.press("1")
+    terminal.wait_for("no comma")
+    goes_away("Open it:")
+    shows("Press Enter: then Space stops it, T takes it over.")
+    terminal.press("q")
+    terminal.wait_for("Leave the panel?")
+    shows("Device 1, Altivar 71: runs since", "Space stops it. To take it over: Esc, then T")
+    terminal.press("Space")
+    wait_until(lambda: killed.simulation.drive(1).motor.frequency == 0, "Space stops it there")
+    goes_away(killed.clause)

@@ -122,7 +122,7 @@ def test_mbpoll_reads_and_stops_while_a_program_commands(programs: ExitStack, pe
         assert poll(COMMAND, "7").returncode == 0
         wait_until(lambda: stands(made.simulation), "the motor stops")
         said, _ = runner.process.communicate(timeout=PATIENCE)
-        assert runner.process.returncode == 5
+        assert runner.process.returncode == 6
         assert "was stopped by Modbus TCP client 127.0.0.1:" in said
         assert made.simulation.drive(1).fault is None
 
@@ -268,11 +268,19 @@ def started_by_a_client(made: Gateway) -> None:
 ENABLED = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600})
 
 
-def test_its_end_stops_a_motor_that_a_client_started() -> None:
+ENDS = {
+    signal.SIGTERM: 0, signal.SIGQUIT: 131, signal.SIGUSR1: 138, signal.SIGALRM: 142,
+    signal.SIGSEGV: 0,
+}  # fmt: skip
+"""Signals that end it, the last one as SIGTERM does, and its exit status."""
+
+
+@pytest.mark.parametrize("number", ENDS)
+def test_its_end_stops_a_motor_that_a_client_started(number: signal.Signals) -> None:
     with gateway("--allow-commands", specs=(ENABLED,)) as made:
         started_by_a_client(made)
-        status, said = made.program.end()
-        assert status == 0
+        status, said = made.program.end(number)
+        assert status == ENDS[number]
         assert "Stopped: 1: stopped" in said
         assert stands(made.simulation)
         assert made.simulation.drive(1).fault is None

@@ -17,6 +17,9 @@ from pathlib import Path
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, served, wait_until
+from tui.bus.program import Program
+from tui.bus.share.messages import VERSION, Hello, packed
+from tui.bus.share.place import short_path
 from tui.simulator import DriveSpec, Simulation
 
 from .terminal import Terminal, runs
@@ -112,9 +115,26 @@ def test_a_stop_goes_past_a_frozen_owner_and_lasts(
         runner.process.send_signal(signal.SIGCONT)
         said, _ = runner.process.communicate(timeout=PATIENCE)
         assert "was stopped by drivepanel stop, stop" in said
-        assert runner.process.returncode == 5
+        assert runner.process.returncode == 6
         assert stopped_by_commands(simulation)
         assert simulation.drive(1).raw("CMD") == before
+
+
+@pytest.mark.parametrize("count", [2**32 - 1, 2**63 - 1, 2**64 - 1])
+def test_stop_after_a_malformed_greeting_stops_the_motor(programs: ExitStack, count: int) -> None:
+    with motor_run(programs, "run") as (simulation, line, runner, recorder):
+        (path,) = Path(os.environ["DRIVEPANEL_STATE"]).rglob("*.sock")
+        stops = {1: {"stranger": count, "": count}}
+        hello = packed(Hello(VERSION, Program("stranger", "stranger", 1), line, stops))
+        with socket.socket(socket.AF_UNIX) as connection, short_path(path) as address:
+            connection.connect(address)
+            connection.sendall(hello)
+            connection.recv(4096)
+        done = drivepanel("stop", line, "-d", "1", "-p", "atv71")
+        assert done.returncode == 0, done.stderr
+        assert stopped_by_commands(simulation)
+        assert "was stopped by drivepanel stop, stop" in runner.process.communicate(timeout=60)[0]
+        assert recorder.process.poll() is None
 
 
 def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
@@ -127,7 +147,7 @@ def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
         before = simulation.drive(1).raw("CMD")
         runner.process.send_signal(signal.SIGCONT)
         said, _ = runner.process.communicate(timeout=PATIENCE)
-        assert runner.process.returncode == 5
+        assert runner.process.returncode == 6
         assert "It was stopped by a stop while this program stood still, watch (pid" in said
         assert simulation.drive(1).raw("CMD") == before
         assert recorder.process.stdout is not None
@@ -146,7 +166,7 @@ def test_the_motor_of_a_frozen_program_is_taken_over_by_a_key(
         panel = terminal_with([sys.executable, "-m", "tui", line, "-d", "1"])
         panel.wait_for("FORWARD")
         runner.process.send_signal(signal.SIGSTOP)
-        panel.wait_for("T takes over")
+        panel.wait_for("T takes it over")
         panel.press("a")
         wait_until(lambda: "ARMED" in panel.text().replace("NOT ARMED", ""), "it is armed")
         panel.press("T")
@@ -241,7 +261,7 @@ def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None
         assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
         assert stopped_by_commands(simulation)
         said, _ = runner.process.communicate(timeout=PATIENCE)
-        assert runner.process.returncode == 5
+        assert runner.process.returncode == 6
         assert "was stopped by drivepanel stop, stop" in said
         # the owner went, the recorder records on
         assert recorder.process.stdout is not None

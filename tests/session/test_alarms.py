@@ -10,7 +10,7 @@ from tui.drive.profile import library
 from tui.drive.profile.schema import FaultCode
 from tui.session.drive_state import DriveState, drive_state
 from tui.session.events import EventLog
-from tui.session.monitor.alarms import LineAlarms, PresentFault
+from tui.session.monitor.alarms import FaultOnsets, LineAlarms, PresentFault
 
 RUNS = replace(drive_state(library.load("atv71"), {}), kind="running")
 OBF = FaultCode(raw=18, code="ObF", name="Overbraking")
@@ -26,7 +26,14 @@ class Bench:
         self.now = 0.0
         self.log = EventLog(lambda: self.now)
         self.kept: list[tuple[int, str, str]] = []
-        self.alarms = LineAlarms(self.log, self.keep, lambda: self.now)
+        self.alarms = LineAlarms(self.log, self.keep)
+        self.onsets = FaultOnsets()
+
+    def take(self, states: dict[int, DriveState]) -> bool:
+        """The states as the line's loop notes them, then a look."""
+        for device, state in states.items():
+            self.onsets.note(device, state, self.now)
+        return self.alarms.take(states, self.onsets.by_device)
 
     def keep(self, fault: PresentFault, what: str) -> None:
         self.kept.append((fault.device, fault.code, what))
@@ -42,11 +49,11 @@ def bench() -> Bench:
 
 
 def test_the_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
-    assert not bench.alarms.take({1: RUNS, 3: RUNS, 17: RUNS})
-    assert bench.alarms.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
-    assert not bench.alarms.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
+    assert not bench.take({1: RUNS, 3: RUNS, 17: RUNS})
+    assert bench.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
+    assert not bench.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
     bench.now = 60.0
-    assert bench.alarms.take({1: RUNS, 3: tripped(OBF), 17: tripped(OLF)})
+    assert bench.take({1: RUNS, 3: tripped(OBF), 17: tripped(OLF)})
     assert [fault.device for fault in bench.alarms.active] == [17, 3]
     assert bench.said[0] == "17 fault: tripped: OLF Motor overload."
     assert bench.said[1].startswith("3 fault: tripped: ObF Overbraking; drive 17 tripped first, ")
@@ -54,7 +61,7 @@ def test_the_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
 
 
 def test_looking_at_it_acknowledges_one_drive(bench: Bench) -> None:
-    bench.alarms.take({3: tripped(OBF), 17: tripped(OLF)})
+    bench.take({3: tripped(OBF), 17: tripped(OLF)})
     bench.alarms.acknowledge(3)
     assert bench.alarms.unseen
     bench.alarms.acknowledge(17)
@@ -63,30 +70,76 @@ def test_looking_at_it_acknowledges_one_drive(bench: Bench) -> None:
 
 
 def test_a_reset_ends_it_and_the_same_fault_again_is_new(bench: Bench) -> None:
-    bench.alarms.take({3: tripped(OBF)})
+    bench.take({3: tripped(OBF)})
     bench.alarms.acknowledge(3)
-    assert not bench.alarms.take({3: RUNS})
+    assert not bench.take({3: RUNS})
     assert bench.alarms.active == ()
     assert bench.said[-1] == "3 done: ObF Overbraking is reset."
-    assert bench.alarms.take({3: tripped(OBF)})
+    assert bench.take({3: tripped(OBF)})
     assert bench.alarms.unseen
 
 
 def test_a_drive_that_is_not_known_now_keeps_its_fault(bench: Bench) -> None:
-    bench.alarms.take({3: tripped(OBF)})
-    assert not bench.alarms.take({3: replace(RUNS, kind="unknown")})
+    bench.take({3: tripped(OBF)})
+    assert not bench.take({3: replace(RUNS, kind="unknown")})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]
-    bench.alarms.take({})
+    bench.take({})
     assert bench.alarms.active == ()
 
 
 def test_a_code_that_comes_later_is_told_and_rings_no_second_time(bench: Bench) -> None:
-    assert bench.alarms.take({3: tripped(None)})
-    assert not bench.alarms.take({3: tripped(OBF)})
+    assert bench.take({3: tripped(None)})
+    assert not bench.take({3: tripped(OBF)})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]
     assert bench.said[-1] == "3 fault: the fault is ObF Overbraking."
 
 
 def test_another_fault_of_the_same_drive_is_new(bench: Bench) -> None:
-    bench.alarms.take({3: tripped(OBF)})
-    assert bench.alarms.take({3: tripped(OLF)})
+    bench.take({3: tripped(OBF)})
+    assert bench.take({3: tripped(OLF)})
+
+
+def test_fault_present_at_the_first_look_is_seen_not_tripped(bench: Bench) -> None:
+    bench.now = 30.0
+    assert bench.take({3: tripped(OBF)})
+    assert bench.kept == [(3, "ObF", "seen")]
+    assert bench.said == ["3 fault: in fault when first seen: ObF Overbraking."]
+    (fault,) = bench.alarms.active
+    assert not fault.tripped
+    assert fault.when.startswith("seen since ")
+    bench.take({3: RUNS})
+    bench.now = 60.0
+    bench.take({3: tripped(OBF)})
+    (fault,) = bench.alarms.active
+    assert (fault.tripped, fault.wall) == (True, 60.0)
+    assert fault.when.startswith("tripped ")
+
+
+def test_trip_noted_before_the_look_keeps_its_own_time(bench: Bench) -> None:
+    bench.take({3: RUNS})
+    bench.now = 60.0
+    bench.onsets.note(3, tripped(None), bench.now)
+    bench.now = 60.4
+    bench.onsets.note(3, tripped(OBF), bench.now)
+    bench.now = 61.0
+    bench.take({3: tripped(OBF)})
+    assert bench.alarms.active[0].wall == 60.0
+    assert bench.log.events[-1].wall == 60.0
+
+
+def test_fault_not_noted_yet_waits_for_the_next_look(bench: Bench) -> None:
+    bench.take({3: RUNS})
+    assert not bench.alarms.take({3: tripped(OBF)}, bench.onsets.by_device)
+    assert not bench.alarms.active
+    assert bench.take({3: tripped(OBF)})
+    assert bench.alarms.active[0].tripped
+
+
+def test_same_trip_of_a_drive_that_comes_back_is_recorded_once(bench: Bench) -> None:
+    bench.take({3: RUNS})
+    bench.take({3: tripped(OBF)})
+    bench.take({})
+    bench.now = 90.0
+    assert not bench.take({3: tripped(OBF)})
+    assert [fault.wall for fault in bench.alarms.active] == [0.0]
+    assert bench.kept == [(3, "ObF", "tripped")]

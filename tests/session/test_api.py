@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import threading
 from collections.abc import Iterator
@@ -74,6 +75,12 @@ def test_values_go_by_what_was_asked_for(drive: Drive) -> None:
 def test_an_unknown_code_is_a_drive_error(drive: Drive) -> None:
     with pytest.raises(DriveError, match="NONE"):
         drive.read("NONE")
+
+
+@pytest.mark.parametrize("every", [math.nan, math.inf, 0.0, -1.0, 1e9])
+def test_watch_refuses_an_impossible_cycle_time(drive: Drive, every: float) -> None:
+    with pytest.raises(DriveError, match="not a cycle time"):
+        next(drive.watch("ETA", every=every))
 
 
 def test_nobody_at_an_address_is_a_line_error(line: DriveLine) -> None:

@@ -23,8 +23,15 @@ from tui.session.drive import DriveSession
 
 from .fake_clock import FakeClock
 
-OWN_TIME = {"clock.py", "journal.py", "journal_file.py", "events.py", "command/stop.py"}
-"""Modules that look at the real clock: the journal's own thread, a thread that waits for a stop."""
+OWN_TIME = {
+    "clock.py",
+    "journal.py",
+    "journal_file.py",
+    "events.py",
+    "command/stop.py",
+    "command/under_way.py",
+}
+"""Modules that look at the real clock: the journal's own thread, threads that wait for a stop."""
 SESSION = Path(tui.session.__file__).parent
 
 

@@ -253,3 +253,57 @@ async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
         assert editor.waits_for_reset == {"F875"}
         made.drive.power_on()
         await made.let_go_until(lambda: editor.waits_for_reset == set())
+
+
+async def write(made: Bench, editor: Editor, code: str, text: str) -> None:
+    """Stage one value, write it, and wait for it."""
+    await read(made, editor, code)
+    editor.staging.stage(code, text)
+    made.session.work.outcome = None
+    editor.apply()
+    assert "1 written" in await written(made, editor)
+
+
+async def test_a_setting_written_back_to_its_saved_value_is_saved() -> None:
+    async with editing("atv71") as (made, editor):
+        await write(made, editor, "ACC", "7.5 s")
+        await write(made, editor, "DEC", "8 s")
+        assert editor.unsaved == {"ACC", "DEC"}
+        await write(made, editor, "ACC", "3 s")
+        assert editor.unsaved == {"DEC"}
+        # what is saved from now on is the value at the saving
+        made.session.work.outcome = None
+        editor.save()
+        assert "saved" in await written(made, editor)
+        await write(made, editor, "DEC", "3 s")
+        assert editor.unsaved == {"DEC"}
+        await write(made, editor, "DEC", "8 s")
+        assert editor.unsaved == set()
+
+
+async def test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved() -> None:
+    async with editing("atv71") as (made, editor):
+        await write(made, editor, "ACC", "7.5 s")
+        made.drive.set("ACC", 55)  # at the keypad, which may have saved it
+        await made.until(lambda: made.session.image.raws["ACC"] == 55)
+        await write(made, editor, "ACC", "3 s")
+        assert editor.unsaved == {"ACC"}
+
+
+async def test_after_the_factory_settings_no_value_is_known_to_be_saved() -> None:
+    async with editing("atv71") as (made, editor):
+        await write(made, editor, "DEC", "8 s")
+        await write(made, editor, "DEC", "3 s")
+        assert editor.unsaved == set()
+        made.session.work.outcome = None
+        editor.factory()
+        await written(made, editor)
+        await write(made, editor, "ACC", "7.5 s")
+        await write(made, editor, "ACC", "3 s")
+        assert "ACC" in editor.unsaved
+
+
+async def test_a_family_that_saves_each_write_has_nothing_unsaved() -> None:
+    async with editing("atv21") as (made, editor):
+        await write(made, editor, "ACC", "7.5 s")
+        assert editor.unsaved == set()

@@ -10,6 +10,7 @@ import pytest
 from tests.programs import wait_until
 from tests.session.sets_bench import FAMILIES, bench
 from tui.session.connect.identify import identify_drive
+from tui.session.journal import Entry
 from tui.session.journal_reading import entries_of
 from tui.session.read.upload import Upload
 from tui.session.report import report_text
@@ -138,3 +139,19 @@ async def test_all_times_are_in_the_zone_in_which_the_drive_was_read() -> None:
     assert "- Read: 2026-11-22 08:00:00; times here are UTC+01:00" in text
     written = text.partition("## Written from here")[2]
     assert written.index("2026-10-25 01:30:00") < written.index("2026-10-25 02:30:00")
+
+
+async def test_report_lists_a_trip_once_however_often_it_was_seen() -> None:
+    with bench("atv71") as made:
+        made.drive.provoke("OCF")
+        upload = Upload(made.session)
+        await upload.run()
+        known = (made.session.line_text, 1, "atv71", "OCF", 0, None, "", 9, "Overcurrent")
+        entries = [
+            Entry(f"2026-03-01T10:00:0{n}.000+01:00", *known, "seen", None, "x", kind="fault")
+            for n in range(5)
+        ]
+        text = report_text(made.profile, upload.parameter_set(), entries)
+    rows = text.partition("## Trips seen from here")[2].partition("## ")[0].splitlines()
+    (row,) = [row for row in rows if "OCF" in row]
+    assert row.startswith("| not seen | 2026-03-01 ")

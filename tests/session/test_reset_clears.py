@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from tui.drive.orders import chart_in_force, follows_from
+from tui.drive.fault_reset import reset_follows
 from tui.drive.profile import library
 from tui.session.command.access import CommandAccess
 from tui.session.command.carry_out import give_order, give_reference, run_at_reference
@@ -48,15 +48,11 @@ def access(line: TrippedDrive) -> CommandAccess:
     return CommandAccess(session, Journal(), GivenCommands(session), session.work.permit())
 
 
-def test_what_follows_is_told_before() -> None:
-    chart = chart_in_force(ATV21, {})
-    assert chart is not None
-    told = follows_from(chart, "reset")
-    assert "with CMOD = 0 and F closed the terminals command until 16#C000 arrives" in told
-    assert "The reference is 0 afterwards." in told
-    other = chart_in_force(library.load("atv312"), {})
-    assert other is not None
-    assert follows_from(other, "reset") == ""
+def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:
+    told = reset_follows(ATV21, {"FD01": 0, "CMOD": 0}, {"FD06": 1})
+    assert "starts the motor until Drive Panel sends 16#C000" in told
+    assert "clears FA00 and the reference" in told
+    assert told.endswith("Closed at the terminals now: F.")
 
 
 async def test_the_reference_is_told_and_not_brought_back() -> None:

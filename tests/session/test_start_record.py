@@ -32,7 +32,8 @@ RECORD = StartRecord(
 IDENTITY = DriveIdentity(
     2, "TELEMECANIQUE", "ATV71HU22N4", "0201", "MACHINE 4", "atv71", ("atv71", "atv61")
 )
-TODAY = "runs since 17:34 by a command from here, that program ended"
+EXITED = "process 7, which has exited; no program commands it"
+TODAY = f"runs since 17:34, started by panel, {EXITED}"
 
 
 def test_a_motor_that_runs_is_told() -> None:
@@ -43,31 +44,35 @@ def test_one_that_does_not_run_is_not() -> None:
     assert offer(RECORD, IDENTITY, False, NOW) == ""
 
 
+def test_a_motor_that_is_not_seen_may_run() -> None:
+    assert offer(RECORD, IDENTITY, None, NOW) == f"may {TODAY.replace('runs', 'run')}"
+
+
 def test_the_date_is_told_where_it_is_not_today() -> None:
     tomorrow = NOW + timedelta(days=1)
-    assert "since 2026-03-05 17:34 by" in offer(RECORD, IDENTITY, True, tomorrow)
+    assert "since 2026-03-05 17:34, started by" in offer(RECORD, IDENTITY, True, tomorrow)
 
 
 def test_the_time_is_told_in_the_zone_of_now() -> None:
-    assert "since 15:34 by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
+    assert "since 15:34, started by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
 
 
 def test_a_motor_that_was_left_running_is_told_so() -> None:
     text = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW)
-    assert text == ("runs since 17:34, left running on purpose by a program that ended")
+    assert text == f"runs since 17:34, left running on purpose by panel, {EXITED}"
 
 
 def test_a_program_that_lives_has_not_ended() -> None:
-    silent = "a program that does not answer on this line (pid 7)"
+    frozen = EXITED.replace("has exited", "does not answer on this line")
     text = offer(RECORD, IDENTITY, True, NOW, lives=True)
-    assert text == TODAY.replace("ended", "does not answer on this line (pid 7)")
+    assert text == f"runs since 17:34, started by panel, {frozen}"
     left = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW, lives=True)
-    assert left == f"runs since 17:34, left running on purpose by {silent}"
+    assert left == f"runs since 17:34, left running on purpose by panel, {frozen}"
 
 
 def test_a_time_that_is_none_is_left_out() -> None:
     text = offer(replace(RECORD, wall="soon"), IDENTITY, True, NOW)
-    assert text == "runs by a command from here, that program ended"
+    assert text == f"runs, started by panel, {EXITED}"
 
 
 @pytest.mark.parametrize(

@@ -318,7 +318,9 @@ def test_the_motor_of_a_program_that_lives_is_offered_until_it_is_back(starts: S
         line_text=LINE, line=line, device=2, identity=None, commanded=False
     )
     keeper.look(session)
-    assert f"does not answer on this line (pid {LIVING})" in keeper.offered(session, runs=True)
+    assert f"process {LIVING}, which does not answer on this line" in keeper.offered(
+        session, runs=True
+    )
     line.facts.set_programs((line.facts.me, frozen))
     assert keeper.offered(session, runs=True) == ""
     with pytest.raises(NothingToTakeOver):

@@ -252,7 +252,7 @@ async def test_a_reference_in_the_taught_unit() -> None:
     teacher.confirm_reference("PRESET")
     found = await parsed(teacher, "25.5")
     assert (found.parameter.code, found.raw, found.text) == ("PRESET", 255, "25.5 Hz")
-    with pytest.raises(ValueRefused, match="taught in Hz"):
+    with pytest.raises(ValueRefused, match="takes its reference in Hz"):
         await parsed(teacher, "700rpm")
 
 

@@ -11,7 +11,7 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.drive.profile import library
 from tui.session.clock import REAL_CLOCK, Clock
 from tui.session.drive import DriveSession
-from tui.session.monitor.timeout import has_begun, read_timeout
+from tui.session.monitor.timeout import has_begun, left_alone_text, read_timeout, timeout_now
 from tui.session.read.presence import presence_read
 from tui.session.read.reader import ASK_AGAIN, Reader
 from tui.session.timeout_told import Timeout
@@ -90,6 +90,17 @@ async def test_a_reaction_without_a_trip_names_no_fault() -> None:
     watch = (await told(session_of(Ports({TTO: 30, SLL: 2})))).watch
     assert watch is not None
     assert watch.fault == ""
+
+
+async def test_a_watch_whose_reaction_is_off_has_not_begun() -> None:
+    session = session_of(Ports({TTO: 30, SLL: 0}))
+    session.timeout = await told(session)
+    for found in (session.timeout, timeout_now(session)):
+        assert found.watch is not None
+        assert (found.watch.active, found.watch.acts) == (False, False)
+    text = left_alone_text(session, watch=session.timeout.watch)
+    assert "goes on: its reaction is Ignored" in text
+    assert "acts" not in text
 
 
 async def test_off_and_refused_are_two_things() -> None:

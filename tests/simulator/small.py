@@ -237,10 +237,12 @@ def atv71() -> Profile:
 
 def atv312() -> Profile:
     """A small Altivar 312: access levels, no words for gaps."""
+    data = altivar_data()
+    data["faults"]["history"].insert(0, "LFT")
     return profile(
         {
             "profile": head("atv312"),
-            **altivar_data(),
+            **data,
             "functions": _functions((3, 29, None, False), (6, None, 1, True), (16, None, 27, True)),
             "parameters": [
                 *altivar_parameters(),

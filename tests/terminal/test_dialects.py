@@ -69,7 +69,7 @@ def test_a_function_key_in_several_reads_is_that_key_or_none(gap: float) -> None
 
 
 @pytest.mark.parametrize("gap", GAPS)
-@pytest.mark.parametrize("report", ["\x1b[12;40R", "\x1b[?2026;2$y", "\x1b[?62;22c"])
+@pytest.mark.parametrize("report", ["\x1b[12;40R", "\x1b[?2026;2$y", *REPLIES.values()])
 def test_a_report_between_the_halves_of_a_key_is_no_part_of_it(report: str, gap: float) -> None:
     """A multiplexer reports where the cursor is while the other half is still on its way to it."""
     for sequence, key in FUNCTION_KEYS:
@@ -157,6 +157,55 @@ def test_no_stop_key_is_lost_where_an_end_was_lost(begin: str) -> None:
         assert next(t.name for t in found if isinstance(t, KeyToken)) in STOPS | {"space"}, key
     held_down = tokens([begin, *[" "] * 5], APART + 0.01)
     assert sum(isinstance(token, KeyToken) for token in held_down) == 5
+
+
+STOP_SEQUENCES = {
+    " ": "space",
+    **{keys[number - 1]: f"f{number}" for keys in DIALECTS.values() for number in (9, 12)},
+}
+SENT_BEFORE = [*REPLIES.values(), *REPORTS.values(), "\x9d11;rgb:0/1\x9c", "\x901$r2 q\x9c"]
+
+
+@pytest.mark.parametrize("reply", SENT_BEFORE)
+def test_stop_key_after_a_cut_or_incomplete_reply_stops(reply: str) -> None:
+    """The backslash of ESC \\ is lost or late: ESC and the ESC of F12 are no Alt, and no key."""
+    for kept in sorted({len(reply) - lost for lost in range(4)} | {1, 2, 3}):
+        for stop, key in STOP_SEQUENCES.items():
+            whole = reply[:kept] + stop
+            for reads in cuts(whole, 1):
+                for gap in GAPS:
+                    found = [t.name for t in tokens(reads, gap) if isinstance(t, KeyToken)]
+                    assert key in found, (reads, gap, found)
+
+
+@given(
+    st.sampled_from([*SENT_BEFORE, "\x1b[M"]),
+    st.sampled_from(sorted(STOP_SEQUENCES)),
+    st.sampled_from([gap for gap in GAPS if gap < SEQUENCE_WITHIN / 2]),
+    st.booleans(),
+    st.data(),
+)
+def test_stop_key_after_any_part_of_a_reply_stops(
+    reply: str, stop: str, gap: float, mouse: bool, data: st.DataObject
+) -> None:
+    if mouse and stop == " ":
+        return  # in the report of a mouse a space is a button
+    whole = reply[: data.draw(st.integers(0, len(reply)))] + stop
+    places = sorted(data.draw(st.sets(st.integers(1, len(whole)), max_size=4)) | {len(whole)})
+    reads = [whole[a:b] for a, b in pairwise([0, *places])]
+    found = [t.name for t in tokens(reads, gap, mouse=mouse) if isinstance(t, KeyToken)]
+    assert STOP_SEQUENCES[stop] in found, reads
+
+
+def test_stop_key_in_eight_bits_after_the_beginning_of_a_mouse_report_stops() -> None:
+    assert names(tokens(["\x1b[M\x9b20~"], mouse=True)) == ["f9"]
+    assert names(tokens(["\x1b[M !\x9b20~"], mouse=True)) == ["f9"]
+
+
+def test_reply_that_loses_its_backslash_gives_no_alt_key() -> None:
+    assert names(tokens(["\x1b]11;rgb:0/1\x1b\x1b[24~"])) == ["f12"]
+    assert names(tokens(["\x1b]11;rgb:0/1\x1b", "\\", "\x1b[24~"], 0.06)) == ["f12"]
+    assert names(tokens(["\x1b]11;rgb:0/1\x1b\x1b[A"])) == ["alt+up"]  # nothing moves by it
 
 
 def test_a_reply_without_end_gives_its_space_late() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import signal
 from threading import Event
@@ -30,6 +31,9 @@ class Stops:
             return False
         self.taken.append(key)
         return True
+
+    def last_stop(self, error: Exception) -> None:
+        self.failed = error
 
     def sequence_swallowed(self, data: bytes) -> None:
         """No test of these looks at it."""
@@ -172,3 +176,25 @@ def test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does(
     finally:
         os.close(slave)
     assert sent == [(os.getpid(), signal.SIGHUP)]
+
+
+def test_a_terminal_that_a_shell_has_taken_back_is_not_gone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In the background of a shell every read fails; the panel ended."""
+    master, slave = os.openpty()
+    driver: Any = type("Fake", (), {"fileno": slave, "exit_event": Event()})()
+
+    def read(_file: int, _count: int) -> bytes:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("tui.terminal.driver.os.read", read)
+    monkeypatch.setattr("tui.terminal.driver.os.tcgetpgrp", lambda _: os.getpgrp() + 1)
+    try:
+        assert module._typed(driver) == b""
+        monkeypatch.setattr("tui.terminal.driver.os.tcgetpgrp", lambda _: os.getpgrp())
+        with pytest.raises(module.TerminalGone):
+            module._typed(driver)
+    finally:
+        os.close(master)
+        os.close(slave)

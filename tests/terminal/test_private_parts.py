@@ -106,6 +106,17 @@ def _driver_asks_in_writes_of_their_own() -> bool:
     )
 
 
+def _driver_continues_by_opening_again() -> bool:
+    from textual.drivers.linux_driver import LinuxDriver
+
+    flags = [inspect.signature(getattr(LinuxDriver, f"_patch_{one}flag")) for one in "li"]
+    return (
+        "signal.signal(signal.SIGCONT, self._sigcont_application)" in _source("__init__")
+        and all(list(one.parameters) == ["attrs"] for one in flags)
+        and "2004h" in _source("_enable_bracketed_paste")
+    )
+
+
 def _driver_heeds_mouse() -> bool:
     from textual.drivers.linux_driver import LinuxDriver
 
@@ -220,12 +231,54 @@ def _errors_are_handled_in_one_place() -> bool:
     )
 
 
-def _an_error_is_shown_from_a_list() -> bool:
+def _tracebacks_are_made_in_one_place() -> bool:
     from textual.app import App
 
-    shown = inspect.getsource(App._print_error_renderables)
-    first: Any = App[None]()._exit_renderables
-    return first == [] and "self.error_console.print(self._exit_renderables[0])" in shown
+    made = "Traceback("
+    others = inspect.getsource(App).replace(inspect.getsource(App._fatal_error), "")
+    handles = inspect.getsource(App._handle_exception)
+    return (
+        made in inspect.getsource(App._fatal_error)
+        and made not in others
+        and "self.panic(error)" in handles
+        and "self._fatal_error()" in handles
+    )
+
+
+def _an_error_closes_the_loop() -> bool:
+    from textual.app import App
+
+    close = "self._close_messages_no_wait()"
+    return all(close in inspect.getsource(one) for one in (App._fatal_error, App.panic))
+
+
+def _workers_are_made_in_one_place() -> bool:
+    from textual.app import App
+    from textual.worker_manager import WorkerManager
+
+    made = inspect.getsource(WorkerManager._new_worker)
+    return "self._workers = WorkerManager(self)" in inspect.getsource(App.__init__) and (
+        "exit_on_error=exit_on_error" in made and "work,\n" in made
+    )
+
+
+def _one_loop_runs_the_app() -> bool:
+    from textual.app import App
+    from textual.message_pump import MessagePump
+
+    runs = inspect.getsource(App._process_messages)
+    loop = inspect.getsource(MessagePump._process_messages_loop)
+    ended = runs.index("driver.stop_application_mode()")
+    return runs.index("await self._process_messages_loop()") < ended and (
+        "except CancelledError:\n                raise" in loop
+    )
+
+
+def _last_words_are_printed_at_the_end() -> bool:
+    from textual.app import App
+
+    ends = inspect.getsource(App._shutdown)
+    return ends.index("events.Unmount()") < ends.index("self._print_error_renderables()")
 
 
 PARTS = [
@@ -270,6 +323,12 @@ PARTS = [
         "driver.py",
         "QuietDriver.write: how Textual asks a terminal for reports at its start and end",
         _driver_asks_in_writes_of_their_own,
+    ),
+    Part(
+        "LinuxDriver._sigcont_application._patch_lflag._patch_iflag._enable_bracketed_paste",
+        "driver.py",
+        "ReadingDriver._take_back: what Textual does with the terminal after a suspension",
+        _driver_continues_by_opening_again,
     ),
     Part(
         "LinuxDriver(mouse=)",
@@ -338,10 +397,52 @@ PARTS = [
         _errors_are_handled_in_one_place,
     ),
     Part(
-        "App._exit_renderables",
+        "App._fatal_error",
+        "last_words.py",
+        "LastWords: where Textual renders the traceback of an error",
+        _tracebacks_are_made_in_one_place,
+    ),
+    Part(
+        "App._close_messages_no_wait",
+        "last_words.py",
+        "LastWords: how an error ends the loop of App",
+        _an_error_closes_the_loop,
+    ),
+    Part(
+        "App._workers",
+        "last_words.py",
+        "LastWords: which manager makes the workers of App",
+        _workers_are_made_in_one_place,
+    ),
+    Part(
+        "WorkerManager._new_worker",
+        "last_words.py",
+        "_Workers: the one place that makes a worker",
+        _workers_are_made_in_one_place,
+    ),
+    Part(
+        "App._return_code",
+        "last_words.py",
+        "LastWords: where App keeps its exit status",
+        _errors_are_handled_in_one_place,
+    ),
+    Part(
+        "App._process_messages_loop",
+        "last_words.py",
+        "LastWords: what App does between the end of its loop and the terminal",
+        _one_loop_runs_the_app,
+    ),
+    Part(
+        "App._driver",
+        "last_words.py",
+        "LastWords: where App keeps the driver, which gives the terminal back",
+        _drawing_asks_whether_there_is_a_terminal,
+    ),
+    Part(
+        "App._print_error_renderables",
         "last_words.py",
         "LastWords: what App prints once the screen is left",
-        _an_error_is_shown_from_a_list,
+        _last_words_are_printed_at_the_end,
     ),
 ]
 

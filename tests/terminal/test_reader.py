@@ -30,6 +30,9 @@ class Stops:
         self.taken.append(key)
         return True
 
+    def last_stop(self, error: Exception) -> None:
+        self.failed = error
+
     def sequence_swallowed(self, data: bytes) -> None:
         """No test of these looks at it."""
 
@@ -172,3 +175,22 @@ def test_space_behind_what_edits_a_text_is_text(keys: bytes) -> None:
     stops, pressed, _ = read((1.0, keys), typing=True)
     assert stops == []
     assert pressed[-1].name == "space"
+
+
+@pytest.mark.parametrize("data", [b" ", b"\x1b[24~", b"\x1b[20~"])
+@pytest.mark.parametrize("broken", ["Tokenizer.feed", "Bursts.stop", "KeyReader._sorted"])
+def test_keys_that_cannot_be_read_stop_every_drive_if_one_may_be_a_stop(
+    monkeypatch: pytest.MonkeyPatch, data: bytes, broken: str
+) -> None:
+    def failing(*_: object) -> None:
+        raise RuntimeError("planted")
+
+    monkeypatch.setattr(f"tui.terminal.reader.{broken}", failing)
+    stops = Stops()
+    keys = KeyReader(stops)
+    assert keys.read(data, 1.0) == []
+    assert isinstance(stops.failed, RuntimeError)
+    monkeypatch.undo()
+    before = len(stops.taken)
+    assert keys.read(b"\x1b[24~", 2.0) == []
+    assert len(stops.taken) == before + 1, "the keys behind it are read again"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,6 +35,7 @@ from tui.session.drive import DriveSession
 from tui.session.drive_state import DriveState, drive_state
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
+from tui.session.monitor.alarms import FaultOnsets
 from tui.session.monitor.line_watch import LineWatch, Look
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
@@ -92,8 +93,6 @@ def readings_of(profile: Profile, raws: Mapping[str, int], time: float) -> dict[
         parameter = profile[code]
         value = decode(parameter, raw, profile.names(parameter), profile.scale(parameter, raws))
         if value.number is not None and parameter.unit_by:
-            from dataclasses import replace
-
             value = replace(value, unit=profile.unit(parameter, raws))
         found[code] = Reading(parameter, raw, value, Quality.GOOD, time)
     return found
@@ -208,6 +207,16 @@ class FakeLineWatch:
     looks: dict[int, Look] = field(default_factory=dict)
     seen: dict[int, DriveState] = field(default_factory=dict)
     glance_period: float = 3.0
+    tripped_at: float = 1_795_259_250.4
+
+    @property
+    def onsets(self) -> FaultOnsets:
+        """Each fault was seen to come, a long time ago."""
+        found = FaultOnsets()
+        for device, state in self.states.items():
+            found.note(device, replace(state, kind="ready"), self.tripped_at)
+            found.note(device, state, self.tripped_at)
+        return found
 
     @property
     def states(self) -> dict[int, DriveState]:

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
+from tui.drive.blocks.wire_cost import Cost, Saving
+from tui.drive.settings.writable import AT_REST
 from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.connection.screen import ConnectionScreen
@@ -18,6 +20,7 @@ from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.blocks.editor import BlockEditor
+from tui.session.blocks.proposals import Proposals
 
 from .fakes import press
 from .test_command_flows import Bench, bench
@@ -265,3 +268,39 @@ async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> Non
             assert (made.app.screen is screen) is (key == here), (here, key)
             here = key
             assert len(made.app.screen_stack) <= 4
+
+
+async def test_p_names_the_keys_that_write_the_proposal_in_this_state(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def best(proposals: Proposals) -> Saving:
+        proposals.pick(proposals.blocks[0], 2, "LCR")
+        return Saving(Cost(50_000, 3), Cost(30_000, 2))
+
+    monkeypatch.setattr(Proposals, "best", best)
+    # on a busy machine a message is older than that before the test looks
+    monkeypatch.setattr("tui.screens.frame.WHOLE_FOR", 1e9)
+    async with bench("atv71") as made:
+        await made.running()
+        await to_blocks(made)
+        await made.pilot.press("p")
+        await message(
+            made, "Proposed: Monitor's cycle", "motor stopped only", "Press u to drop it."
+        )
+        assert "w to write" not in shown(made.app, "said")
+        await until(made.pilot, lambda: "w once the motor is stopped" in shown(made.app, "detail"))
+        await made.pilot.press("space", "u")
+        await until(made.pilot, lambda: made.speed() == 0)
+        watched = block_editor(made).monitor
+        await until(made.pilot, lambda: watched.latest.state.motion in AT_REST)  # type: ignore[union-attr]
+        await made.pilot.press("p")
+        await message(made, "Press a to arm, then w to write it.")
+        await until(made.pilot, lambda: "a arms, w writes" in shown(made.app, "detail"))
+        await arm(made.pilot)
+        await made.pilot.press("u", "p")
+        await message(made, "Press w to write it.")
+        await until(made.pilot, lambda: ": w writes, u drops" in shown(made.app, "detail"))
+        # on another screen u and w are other keys
+        await made.pilot.press("3")
+        await until(made.pilot, lambda: "Proposed" in shown(made.app, "said"))
+        assert "Press" not in shown(made.app, "said")

@@ -255,7 +255,7 @@ async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
 
 async def test_nothing_is_commanded_before_arming() -> None:
     async with bench("atv71") as made:
-        for key in ("r", "v", "f", "x", "up", "pagedown", "o", "t", "g"):
+        for key in ("r", "v", "f", "up", "pagedown", "o", "t", "g"):
             made.app.events.add("told", f"{key} is next")
             await until(made.pilot, lambda: "is next" in said(made.app))
             await made.pilot.press(key)
@@ -263,6 +263,61 @@ async def test_nothing_is_commanded_before_arming() -> None:
         assert made.drive().raw("CMD") == 0
         assert made.drive().raw("LFR") == 0
         assert writes(made.app) == []
+
+
+async def test_trip_has_one_time_on_every_screen() -> None:
+    async with bench("atv71") as made:
+        made.drive().provoke("ObF")
+        await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+        await until(made.pilot, lambda: "tripped " in shown(made.app, "state"))
+        fleet = made.app.fleet
+        assert fleet is not None
+        (fault,) = fleet.alarms.active
+        record = fleet.consoles[0].recorder.latest
+        assert record is not None
+        assert fault.wall == record.wall
+        (event,) = [one for one in made.app.events.events if one.text.startswith("tripped:")]
+        assert event.wall == fault.wall
+        await made.pilot.press("5")
+        await until(made.pilot, lambda: f"{fault.when}, last read " in shown(made.app, "doctor"))
+
+
+async def test_reset_without_a_fault_says_so() -> None:
+    async with bench("atv71") as made:
+        await made.pilot.press("x")
+        await made.message("No fault to reset: the drive is in the state ")
+        await made.armed()
+        await made.pilot.press("x")
+        await made.message("No fault to reset: the drive is in the state ")
+        assert writes(made.app) == []
+
+
+def follows(app: DrivePanelApp) -> str:
+    found = app.screen.query("#follows")
+    return " ".join(str(found.first().render()).split()) if found else ""
+
+
+@pytest.mark.parametrize(
+    ("family", "closed", "said"),
+    [
+        ("atv71", "LI3", ("on a new run command", "Closed at the terminals now: LI3.")),
+        ("atv21", "F", ("a run input that is closed", "Closed at the terminals now: F.")),
+        ("powerdrive", "RUN", ("6.42 commands this drive", "cannot be read over Modbus")),
+    ],
+)
+async def test_reset_question_names_channel_and_closed_inputs(
+    family: str, closed: str, said: tuple[str, str]
+) -> None:
+    async with bench(family) as made:
+        made.drive().terminals.close(closed)
+        made.drive().provoke(1)
+        await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+        await made.armed()
+        await made.pilot.press("x")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await until(made.pilot, lambda: all(part in follows(made.app) for part in said))
+        assert "Nothing runs" not in follows(made.app)
+        await made.pilot.press("escape")
 
 
 async def test_a_read_only_line_is_not_armed() -> None:

@@ -7,6 +7,7 @@ import importlib
 import pkgutil
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -302,3 +303,49 @@ def test_what_is_typed_or_pasted_is_refused_and_ends_nothing(name: str) -> None:
     for text in texts:
         told = check(text)
         assert told or text == "f", text[:20]
+
+
+async def test_a_key_that_means_nothing_to_a_dialog_reports_where_it_works(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=(80, 24)) as pilot:
+        console, _ = await on_monitor(app, pilot, monkeypatch)
+        for name, make in DIALOGS.items():
+            app.push_screen(make(app, console))
+            await until(pilot, lambda: app.screen.is_modal and app.focused is not None)
+            dialog = app.screen
+            app.screen.set_focus(None)
+            # in the results of a write it saves
+            save = ("S", "S works once this is closed (Esc): Save the settings")
+            for key, text in (
+                *([] if name == "Results" else [save]),
+                ("ctrl+o", "^o works once this is closed (Esc): Open a file"),
+                ("w", "w has a meaning on Parameters (3) and Scanner (4)."),
+            ):
+                await pilot.press(key)
+                newest = app.events.newest
+                assert newest is not None
+                assert newest.text.startswith(text), (name, key, newest.text)
+                assert app.screen is dialog, name
+            app.pop_screen()
+            await pilot.pause()
+        # what is typed into a field is text
+        app.push_screen(DIALOGS["Ask"](app, console))
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        newest = app.events.newest
+        await pilot.press("S", "left", "backspace")
+        assert app.events.newest == newest
+
+
+async def test_s_in_the_results_of_a_write_goes_on_to_saving(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await on_monitor(app, pilot, monkeypatch)
+        answers: list[object] = []
+        app.push_screen(Results(replace(APPLIED, unsaved=("ACC",))), answers.append)
+        await until(pilot, lambda: "S saves to EEPROM, asks" in picture(app))
+        await pilot.press("S")
+        await until(pilot, lambda: answers == [True])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tests.ui.fakes import NOW, readings_of
-from tui.drive.hints import reset_text
+from tui.drive.hints import codes_to_read, reset_text
 from tui.drive.profile import library
 from tui.screens.faults.doctor import doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
@@ -52,7 +52,7 @@ def test_general_practice_is_said_to_be_so() -> None:
 
 
 def test_the_drive_says_whether_a_reset_works() -> None:
-    for raw, said in ((0x0004, "x works now"), (0, "not yet, says the drive")):
+    for raw, said in ((0x0004, "x works now"), (0, "Not yet, says the drive")):
         text = told(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW)))
         assert said in text
         assert "practice" not in text.partition("Reset")[2].splitlines()[0]
@@ -60,17 +60,18 @@ def test_the_drive_says_whether_a_reset_works() -> None:
         code: reading.aged(NOW + 60, 6.0)
         for code, reading in readings_of(ATV71, {"ETI": 4}, NOW).items()
     }
-    assert "x does nothing" in told(view(9, readings=old))
+    text = told(view(9, readings=old)).replace(" practice", "")
+    assert "x does nothing" in " ".join(text.split())
 
 
-@pytest.mark.parametrize(("width", "height"), [(60, 16), (40, 12), (80, 20), (60, 8)])
+@pytest.mark.parametrize(("width", "height"), [(60, 16), (60, 12), (80, 20), (80, 12)])
 @pytest.mark.parametrize("raw", [9, 18, 22])
 def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None:
     for eti in (None, 0, 4):
         readings = {} if eti is None else readings_of(ATV71, {"ETI": eti}, NOW)
         shown = view(raw, readings=readings)
         text = told(shown, width, height)
-        whole = reset_text(shown.help, shown.ready, "x").text
+        whole = reset_text(shown.help, shown.ready, "x", shown.follows).text
         ends = " ".join(text.partition("Reset")[2].partition("History")[0].split())
         assert whole in ends.replace(" practice", ""), text
         assert len(text.splitlines()) <= height
@@ -132,3 +133,57 @@ def test_no_history_is_read_where_a_family_has_none() -> None:
     text = told(view(None, profile=profile, present=False, unread=True))
     assert "not known on this drive" in text
     assert "reading the history" not in text
+
+
+@pytest.mark.parametrize("family", ["atv31", "atv312"])
+def test_the_fault_before_the_last_is_not_shown_as_the_last(family: str) -> None:
+    profile = library.load(family)
+    raws = {"LFt": 18, "DP1": 9, "DP2": 5}
+    shown = view(None, profile=profile, present=False, readings=readings_of(profile, raws, NOW))
+    rows = told(shown).partition("History")[2].splitlines()
+    last, second, third = (profile.fault(raw) for raw in raws.values())
+    for row, number, fault in zip(rows, ("last", "2", "3"), (last, second, third), strict=False):
+        assert fault is not None
+        assert row.split()[:2] == [number, fault.code]
+    assert profile.data.faults.stored[0] == [], "EP1 belongs to fault n-1"
+
+
+BRAKING = {"BRA": 1, "VCAL": 4, "ULP0": 2280, "DEC": 30}
+
+
+def test_advice_that_a_value_rules_out_is_not_given() -> None:
+    fault = readings_of(ATV71, BRAKING, NOW)
+    text = told(view(18, readings=fault), 100, 30)
+    assert "(ruled out, BRA Yes) No resistor fitted" in text
+    assert "(ruled out, ULP0 228.0 V) Mains voltage already high" in text
+    assert text.index("The load drives the motor") < text.index("Mains voltage already high")
+    open_ = told(view(18, readings=readings_of(ATV71, {**BRAKING, "BRA": 0, "ULP0": 2580}, NOW)))
+    assert "ruled out" not in open_
+    assert "No resistor fitted: BRA on" in open_
+
+
+def test_no_value_that_is_unknown_or_older_fault_rules_anything_out() -> None:
+    assert "ruled out" not in told(view(18))
+    without_range = {code: raw for code, raw in BRAKING.items() if code not in ("VCAL", "BRA")}
+    assert "ruled out" not in told(view(18, readings=readings_of(ATV71, without_range, NOW)))
+    older = view(18, present=False, readings=readings_of(ATV71, BRAKING, NOW))
+    assert "ULP0 228.0 V)" not in told(older, 100, 30)
+    assert "BRA Yes)" in told(older, 100, 30)
+
+
+def test_a_value_of_now_does_not_exclude_what_was() -> None:
+    profile = library.load("atv312")
+    now = readings_of(profile, {"ULn": 2280, "VCAL": 2}, NOW)
+    text = told(view(None, profile=profile, fault=profile.fault(18), readings=now), 100, 30)
+    assert "(not now, ULn 228.0 V) Mains voltage already high" in text
+
+
+def test_the_cause_that_becomes_the_first_is_not_shown_as_surely_known() -> None:
+    readings = readings_of(ATV71, {"VCAL": 4, "ULP0": 2280}, NOW)
+    text = told(view(19, readings=readings), 100, 30)
+    assert text.partition("Probably")[2].splitlines()[0].endswith("practice")
+
+
+def test_what_rules_advice_out_is_read_with_it() -> None:
+    help_ = ATV71.guide.fault(18)
+    assert {"BRA", "ULP0", "VCAL"} <= set(codes_to_read(ATV71, help_))

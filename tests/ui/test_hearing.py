@@ -114,12 +114,24 @@ async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_beh
             await pilot.press("H")
             await pilot.pause(0.2)
             await pilot.press("H")
-            await until(pilot, lambda: "listens already" in said(app))
+            await until(pilot, lambda: "keys are ignored until it is open" in said(app))
             may_open.set()
             await until(pilot, lambda: isinstance(app.screen, HeardScreen))
+            await pilot.press("H")
+            await until(pilot, lambda: "listens already" in said(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
             assert not [one for one in threading.enumerate() if one.name == "listening"]
+            # canceled while it opens: nothing listens, and the port is free again
+            may_open.clear()
+            await pilot.press("H")
+            await until(pilot, lambda: app.opening.goes_on)
+            await pilot.press("escape")
+            await until(pilot, lambda: "was canceled" in said(app))
+            may_open.set()
+            await until(pilot, lambda: not app.hearing)
+            assert not [one for one in threading.enumerate() if one.name == "listening"]
+            assert app.screen is app.connection
             await pilot.press("H")
             await heard(app, pilot, peer)
 

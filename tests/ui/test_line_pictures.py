@@ -11,6 +11,7 @@ from textual.pilot import Pilot
 
 from tui.bus.api import LineState
 from tui.bus.errors import PortBusy
+from tui.screens.open_lines import LineOpening
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.known_line import KnownLine
 from tui.session.connect.known_lines import DriveMark, LineMark, LinesMemory, keep_memory
@@ -78,9 +79,12 @@ async def show(app: Any, pilot: Pilot[None], fleet: Any, line: LineState) -> Non
     app.opened, app.fleet = fakes.opened(line), fleet
     app.events = EventLog(lambda: LONG_AGO)
     if fleet is not None:
-        fleet.alarms._wall = lambda: LONG_AGO
         fleet.alarms._events = app.events
-        fleet.alarms.take({d: s for d, s in fleet.line_watch.states.items() if d != 17})
+        watch = fleet.line_watch
+        watch.tripped_at = LONG_AGO
+        fleet.alarms.take(
+            {d: s for d, s in watch.states.items() if d != 17}, watch.onsets.by_device
+        )
         app.look_around()
     screen = app.connection
     screen.form.offer_addresses("1-31" if fleet and len(fleet.found) > 10 else "1-10")
@@ -127,6 +131,7 @@ async def read_only(app: Any, pilot: Pilot[None]) -> None:
 
 
 async def opening(app: Any, pilot: Pilot[None]) -> None:
+    app.opening = LineOpening("serial:/dev/ttyUSB0,19200,8E1")
     app.connection.tell_opening("serial:/dev/ttyUSB0,19200,8E1")
     await pilot.pause()
 

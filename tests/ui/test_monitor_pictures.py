@@ -125,12 +125,12 @@ def panel(
     if snapshot is not None:
         watch.seen[2] = snapshot.state
     app.fleet = fakes.StillFleet(FoundDrive(identity, console), line_watch=watch, line=scene.line)
-    app.fleet.alarms = LineAlarms(EventLog(), lambda _fault, _what: None, lambda: WALL)
+    app.fleet.alarms = LineAlarms(EventLog(), lambda _fault, _what: None)
     reports = {2: scene.stop} if scene.stop else {}
     app.fleet.stopper = cast("Stopper", FakeStopper(reports))
     app.events = EventLog(lambda: WALL)
     if snapshot is not None and snapshot.state.kind == "fault":
-        app.fleet.alarms.take({2: snapshot.state})
+        app.fleet.alarms.take({2: snapshot.state}, watch.onsets.by_device)
         app.events.add("fault", "tripped: ObF Overbraking.", 2)
     elif scene.armed is not None:
         app.events.add("told", "Armed for one minute.")

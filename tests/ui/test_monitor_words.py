@@ -8,12 +8,20 @@ import pytest
 
 from tui.drive.orders import MOVING_ORDERS
 from tui.drive.profile import library
+from tui.drive.profile.schema import Bit
 from tui.screens.command.control import Control, hindrance
 from tui.screens.monitor.notices import NOTICE_ROWS, line_figures, notice_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import state_lines
-from tui.screens.monitor.words import bit_grid, word_line, word_pages
+from tui.screens.monitor.words import (
+    WordPage,
+    _bit_line,
+    bit_grid,
+    bit_lines,
+    word_line,
+    word_pages,
+)
 from tui.session.timeout_told import TimeoutWatch
 
 from . import fakes
@@ -47,9 +55,9 @@ def test_the_state_in_words(raws: dict[str, int], armed: float | None, says: str
 
 
 def test_a_fault_says_when_and_where_it_is_told_what_to_do() -> None:
-    view = replace(view_of(ATV71, fakes.FAULT), fault_at="16:28:05")
+    view = replace(view_of(ATV71, fakes.FAULT), fault_at="seen since 16:28:05")
     text = "\n".join(line.plain for line in state_lines(view, 22))
-    assert "since 16:28:05" in text
+    assert "seen since 16:28:05" in text
     assert "5 says what to do" in text
 
 
@@ -148,3 +156,81 @@ def test_addresses_that_are_empty_are_no_failures() -> None:
     view = view_of(ATV71, fakes.RUNNING)
     counters = replace(view.counters, timeouts=1, searched=17)
     assert "1 failed" in line_figures(replace(view, counters=counters)).plain
+
+
+def _drawn(bit: Bit, raw: int) -> tuple[str, bool]:
+    """A bit as it is drawn: its words, and whether they are lit."""
+    view = view_of(ATV71, {"ETA": raw})
+    page = WordPage(ATV71["ETA"], (bit,), 1, 1)
+    _, line = bit_lines(view, page, 60)
+    lit, dim = "●" in line.plain, "·" in line.plain
+    assert lit != dim
+    words = line.plain.split("●" if lit else "·")[1].strip()
+    return words, lit
+
+
+@pytest.mark.parametrize(
+    ("bit", "at_0", "at_1"),
+    [
+        (
+            Bit(bit=11, name="Limit", off="within LSP..HSP", on="outside LSP..HSP"),
+            ("Limit: within LSP..HSP", True),
+            ("Limit: outside LSP..HSP", True),
+        ),
+        (
+            Bit(bit=5, name="Quick stop", off="quick stop active", on="no quick stop"),
+            ("Quick stop active", True),
+            ("No quick stop", True),
+        ),
+        (
+            Bit(bit=2, name="Quick stop", off="quick stop", on="no quick stop"),
+            ("Quick stop", True),
+            ("No quick stop", True),
+        ),
+        (
+            Bit(bit=5, name="PID controller", off="Enabled", on="Off"),
+            ("PID controller: Enabled", True),
+            ("PID controller: Off", True),
+        ),
+        (Bit(bit=3, name="Fault", off="no", on="fault"), ("Fault", False), ("Fault", True)),
+        (Bit(bit=3, name="Alarm", off="Normal", on="Alarm"), ("Alarm", False), ("Alarm", True)),
+        (Bit(bit=3, name="Terminals"), ("Terminals", False), ("Terminals", True)),
+    ],
+)
+def test_a_lit_bit_states_what_is_true(
+    bit: Bit, at_0: tuple[str, bool], at_1: tuple[str, bool]
+) -> None:
+    assert _drawn(bit, 0) == at_0
+    assert _drawn(bit, 1 << bit.bit) == at_1
+
+
+@pytest.mark.parametrize("family", PROFILES)
+def test_no_bit_of_a_family_is_dim_while_its_words_are_true(family: str) -> None:
+    for parameter in library.load(family).data.parameters:
+        for bit in parameter.bits:
+            base = bit.counts.value if bit.counts else 0
+            at_0, at_1 = _drawn(bit, base), _drawn(bit, base | 1 << bit.bit)
+            assert at_1[1], (parameter.code, at_1)
+            assert at_0[1] or at_0[0] == bit.name, (parameter.code, at_0)
+            assert at_0 != at_1
+
+
+@pytest.mark.parametrize(
+    ("family", "raw", "lit"),
+    [
+        ("atv71", 0x0250, False),
+        ("atv71", 0x0218, False),
+        ("atv71", 0x0007, True),
+        ("atv71", 0x0027, False),
+        ("atv312", 0x0240, False),
+        ("atv312", 0x0207, True),
+    ],
+)
+def test_quick_stop_bit_is_lit_only_in_states_where_it_counts(
+    family: str, raw: int, lit: bool
+) -> None:
+    """In Switch on disabled and Fault the state chart leaves bit 5 open: no quick stop goes on."""
+    bit = next(one for one in library.load(family)["ETA"].bits if one.bit == 5)
+    line = _bit_line(bit, raw, 40).plain
+    assert ("● Quick stop active" in line) is lit
+    assert lit or "active" not in line

@@ -188,7 +188,7 @@ async def test_every_screen_leads_to_every_other() -> None:
 async def test_over_a_question_there_is_no_palette() -> None:
     async with bench("atv71") as made:
         await made.armed()
-        await made.pilot.press("x")
+        await made.pilot.press("z")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask | Confirm))
         asked = made.app.screen
         await made.pilot.press("ctrl+p")

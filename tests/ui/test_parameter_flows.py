@@ -23,7 +23,7 @@ from tui.screens.parameters.screen import ParametersScreen
 from . import fakes
 from .fakes import press
 from .test_command_flows import Bench, bench, writes
-from .test_flows import arm, shown, until
+from .test_flows import arm, picture, shown, until
 from .test_parameter_pictures import editor_of, failed, panel
 
 
@@ -97,6 +97,11 @@ async def message(made: Bench, *parts: str) -> None:
     await until(made.pilot, lambda: all(part in said() for part in parts))
 
 
+def lines(made: Bench) -> str:
+    """The message as it is shown, with the keys named after it."""
+    return " ".join(shown(made.app, "said").split())
+
+
 async def test_find_edit_write_and_read_back() -> None:
     async with bench("atv312") as made:
         await to_parameters(made)
@@ -150,7 +155,15 @@ async def test_what_is_told_of_edits_is_true_while_the_motor_runs() -> None:
         made.app.chosen.commander.run("forward", "20Hz")  # type: ignore[union-attr]
         await until(made.pilot, lambda: editor.state == "running")
         await find(made, "ACC")
-        await stage(made, "4", "ACC → 4.0 s: 1 staged. w writes it, with the motor running.")
+        promise = "Press w to write it, with the motor running."
+        await stage(made, "4", "ACC → 4.0 s: 1 staged.")
+        await until(made.pilot, lambda: promise in lines(made))
+        # on Scanner w is for slots: the keys are named on their own screen only
+        await made.pilot.press("4")
+        await until(made.pilot, lambda: "ACC → 4.0 s: 1 staged." in lines(made))
+        assert "Press" not in lines(made)
+        await made.pilot.press("3")
+        await until(made.pilot, lambda: promise in lines(made))
         await find(made, "TFR")
         await stage(made, "70", "TFR → 70.0 Hz: 2 staged. TFR waits until the motor stands.")
         await find(made, "DEC")
@@ -473,3 +486,22 @@ async def test_a_search_looks_everywhere_and_goes_on_in_its_group() -> None:
         assert screen.listed.chosen.group == "Monitoring"
         assert screen.listed.code == "RFR"
         assert screen.listed.count > 1
+
+
+async def test_s_in_the_results_of_a_write_asks_to_save() -> None:
+    async with bench("atv71") as made:
+        screen = await to_parameters(made)
+        for code in ("ACC", "DEC"):
+            await find(made, code)
+            await stage(made, "4", f"{code} → 4.0 s")
+        await arm(made.pilot)
+        await made.pilot.press("w")
+        await until(made.pilot, lambda: "Write 2 parameters?" in picture(made.app))
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Results))
+        assert screen.editor.unsaved == {"ACC", "DEC"}
+        await made.pilot.press("S")
+        await until(made.pilot, lambda: "Save to EEPROM?" in picture(made.app))
+        await made.pilot.press("y")
+        await message(made, "saved to EEPROM")
+        assert not screen.editor.unsaved

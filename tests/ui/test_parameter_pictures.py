@@ -172,7 +172,8 @@ def elsewhere(editor: Editor) -> None:
 
 
 def done(editor: Editor) -> None:
-    editor.session.unsaved = frozenset({"ACC", "DEC"})
+    for code in ("ACC", "DEC"):
+        editor.session.unsaved_settings.note_write(code, 30, 35)
     editor.waits_for_reset = {"ADD"}
     say(editor, OutcomeKind.DONE, "3 written and read back")
 

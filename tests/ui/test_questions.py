@@ -21,6 +21,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import Question, void_questions
 from tui.screens.keys.help import HelpScreen
 from tui.screens.parameters.results import RestQuestion
@@ -96,6 +97,7 @@ YES: dict[str, tuple[Callable[[], Question[Any]], str, object]] = {
     "leave by enter": (lambda: Leave("it runs"), "enter", "stop"),
     "leave running": (lambda: Leave("it runs"), "l", "leave"),
     "reference": (lambda: Ask("Reference", lambda _: "", text="30", number=True), "enter", "30"),
+    "file": (lambda: PickFile("Open", [("factory", "factory settings")], []), "enter", "factory"),
     "option": (
         lambda: OptionsScreen(library.load("atv71").data.charts[0].options, {}),
         "y",
@@ -113,7 +115,11 @@ async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
         await asked.put(pilot)
         for passed in (0.0, 0.1, MOMENT - 0.01):
             asked.clock.now = fakes.NOW + passed
+            asked.app.events.add("told", f"{passed} s after it was drawn")
             await pilot.press(key, key)
+            newest = asked.app.events.newest
+            assert newest is not None
+            assert newest.text.startswith("Key ignored: it came before this could be read.")
             assert asked.answers == []
             assert asked.app.screen is asked.question
         asked.clock.now = fakes.NOW + MOMENT + 0.01

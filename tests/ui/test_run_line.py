@@ -81,13 +81,13 @@ def test_steps_end_at_the_limits() -> None:
 
 def test_the_last_reference_given_is_proposed_else_the_drives_own() -> None:
     profile = library.load("atv71")
-    held = {"LFR": Decimal("-30.0")}
-    assert proposed(profile, "forward", "42.5Hz", held) == ("42.5", "Hz")
-    assert proposed(profile, "forward", "", held) == ("30.0", "Hz")
-    assert proposed(profile, "forward", "", held | {"FRH": Decimal("50.0")}) == ("30.0", "Hz")
-    assert proposed(profile, "forward", "", {"FRH": Decimal("50.0")}) == ("50.0", "Hz")
-    assert proposed(profile, "forward", "", {}) == ("0", "Hz")
-    assert proposed(library.load("varmeca"), "forward", "", {}) == ("", "")
+    held = {"LFR": -300}
+    assert proposed(profile, "42.5 Hz", held) == ("42.5", "Hz")
+    assert proposed(profile, "", held) == ("30.0", "Hz")
+    assert proposed(profile, "", held | {"FRH": 500}) == ("30.0", "Hz")
+    assert proposed(profile, "", {"FRH": 500}) == ("50.0", "Hz")
+    assert proposed(profile, "", {}) == ("0", "Hz")
+    assert proposed(library.load("varmeca"), "", {}) == ("", "")
 
 
 def test_the_moment_is_that_of_the_rules() -> None:
@@ -125,6 +125,7 @@ async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPa
             await made.pilot.pause(0.2)
             assert writes(made.app) == before
             assert open_lines(made)()
+            assert any(one.text.startswith("Enter ignored") for one in made.app.events.events)
         clock.monotonic = lambda: now + MOMENT + 0.01  # type: ignore[method-assign]
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.speed() > 2)

@@ -8,8 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.mixer import HERTZ, PERCENT, PERCENT_OF_FULL, SCALE_BY, SPEED, installed_mixer
 from tui.drive.profile import library
-from tui.screens.monitor.run_line import DIGITS_MOST, STEPS, Purpose, RunLine, proposed, run_lines
+from tui.screens.monitor.run_line import (
+    DIGITS_MOST,
+    STEPS,
+    Purpose,
+    RunLine,
+    limits,
+    proposed,
+    run_lines,
+)
 
 from . import fakes
 
@@ -80,9 +89,36 @@ def test_a_reference_past_the_limit_is_told_and_not_given() -> None:
 
 def test_the_proposal_is_the_last_reference_given_else_the_drives_own() -> None:
     profile = library.load("atv71")
-    assert proposed(profile, "forward", "37.5 Hz", {}) == ("37.5", "Hz")
-    assert proposed(profile, "forward", "", {"LFR": Decimal("20.0")}) == ("20.0", "Hz")
-    assert proposed(profile, "forward", "", {}) == ("0", "Hz")
+    assert proposed(profile, "37.5 Hz", {}) == ("37.5", "Hz")
+    assert proposed(profile, "", {"LFR": 200}) == ("20.0", "Hz")
+    assert proposed(profile, "", {}) == ("0", "Hz")
+
+
+@pytest.mark.parametrize(
+    ("reference", "raws", "unit", "text", "steps_to", "around"),
+    [
+        (HERTZ, {"REF": 200}, "Hz", "20.0", "21.0", "0 .. HIGH 60.0"),
+        (PERCENT_OF_FULL, {"REF": 400}, "%", "40.0", "41.0", "0 .. HIGH 120"),
+        (PERCENT, {"REF": 400}, "%", "40.0", "41.0", "%"),
+        (SPEED, {"REF": 900}, "rpm", "900", "910", "0 .. HIGH 1800.0"),
+        (SCALE_BY, {"REF": 200, "MODE": 0}, "Hz", "2.00", "3.00", "0 .. HIGH 60.0"),
+        (SCALE_BY, {"REF": 200}, "Hz", "0", "1", "Hz"),
+    ],
+)
+def test_run_line_has_the_unit_and_the_scale_of_the_reference(
+    reference: str, raws: dict[str, int], unit: str, text: str, steps_to: str, around: str
+) -> None:
+    profile = installed_mixer(reference)
+    assert proposed(profile, "", raws) == (text, unit)
+    line = RunLine("forward", text, unit, 0.0, 0)
+    plate = {"HIGH": 600, "LOW": 0, "FULL": 500, "FNOM": 500, "NNOM": 1450}
+    readings = fakes.readings_of(profile, raws | plate, fakes.NOW)
+    low, high, _ = limits(profile, readings)
+    stepped = line.stepped("up", low, high)
+    assert (stepped.text, stepped.reference) == (steps_to, f"{steps_to}{unit}")
+    assert around in run_lines(line, profile, readings, 200.0, 80)[1].plain
+    fault = stepped.checked(profile, readings).fault
+    assert ("MODE" in fault) == (reference == SCALE_BY and "MODE" not in raws), fault
 
 
 @pytest.mark.parametrize("width", [80, 120])

@@ -116,3 +116,13 @@ async def test_who_trips_when_left_alone_is_told_once() -> None:
         await pilot.press("escape")
         await until(pilot, lambda: not app.connection.scanning)
         assert sum("Kept asking" in text for text in said(app)) == 1
+
+
+async def test_a_drive_whose_reaction_to_a_silent_line_is_off_does_not_act() -> None:
+    ignoring = DriveSpec("atv31", 1, sets={"SLL": 0})
+    async with panel(ignoring, DriveSpec("atv21", 2)) as (app, pilot):
+        await until(pilot, lambda: any("Kept asking" in text for text in said(app)))
+        (text,) = (text for text in said(app) if "Kept asking" in text)
+        assert "Kept asking: 2 (3 s). Otherwise they trip" in text
+        assert app.fleet is not None
+        assert set(app.fleet.line_watch.left_alone()) <= {2}

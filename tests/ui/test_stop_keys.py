@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
+import pkgutil
 import time
 from dataclasses import replace
 from typing import Any
@@ -11,18 +13,20 @@ import pytest
 from textual.events import Key, Paste
 from textual.widgets import Input
 
+from tui.app import DrivePanelApp
 from tui.bus.shared_facts import SharedFacts
 from tui.screens.base import PanelScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.hands import NOBODY_TO_STOP
 from tui.session.command.commander import Commander
 from tui.session.fleet import FoundDrive
+from tui.terminal.reader import KeyReader
 from tui.terminal.stroke import Stroke, attach
 
 from . import fakes
 from .fakes import app_of
-from .test_command_flows import bench
-from .test_flows import until
+from .test_command_flows import bench, runs, writes
+from .test_flows import picture, shown, until
 
 
 @pytest.mark.parametrize("field", ["baud", "format", "addresses", "profile", "lines"])
@@ -177,7 +181,9 @@ async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
             await pilot.pause()
         told = [event for event in app.events.events if event.kind == "failed"]
         assert {event.text.partition(",")[0] for event in told} == {"NOT STOPPED: device 7"}
-        assert len(app._notifications) == 1, "over everything it is said once"
+        assert not app._notifications, "nothing may lie over it, and it over nothing else"
+        (text,) = app.frame_now().not_stopped
+        assert text.startswith("NOT STOPPED: device 7")
         app.chosen = app.fleet.consoles[0]
         assert app.take_stop_key("space")  # one drive is meant, and reached
         await pilot.pause()
@@ -204,3 +210,81 @@ async def test_a_stop_while_the_key_that_arms_has_its_effect_is_the_last_word(
         assert made.app.chosen is not None
         assert not made.app.chosen.session.arming.armed
         await made.armed()
+
+
+PLANTED = (
+    "tui.screens.hands.takes_space",
+    "tui.screens.hands.is_too_small",
+    "tui.screens.hands.soon_in_loop",
+    "tui.screens.hands.carried_on",
+    "tui.screens.hands.every_fleet",
+    "tui.screens.hands.Hands._open_drive",
+    "tui.screens.hands.Hands._stop_sessions",
+    "tui.screens.hands.Hands._stop",
+    "tui.screens.hands.Hands._space_is_text",
+    "tui.screens.hands.Hands.take_stop_key",
+    "tui.app.DrivePanelApp.hurry",
+    "tui.screens.app_port.Panel.fleets",
+    "tui.session.fleet.Fleet.stop",
+    "tui.session.fleet.Fleet.sessions",
+    "tui.session.fleet.Fleet.consoles",
+    "tui.terminal.reader.KeyReader._sorted",
+    "tui.terminal.reader.Tokenizer.feed",
+)
+
+
+def waiting(app: DrivePanelApp) -> bool:
+    """True if a stop was not answered yet."""
+    assert app.fleet is not None
+    return any(
+        not one.stop.sent and not one.stop.over for one in app.fleet.stopper._under_way.values()
+    )
+
+
+async def test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def failing(*_: object, **__: object) -> None:
+        raise RuntimeError("planted")
+
+    async with bench("atv31") as made:
+        missing = []
+        for place in PLANTED:
+            for key in (b" ", b"\x1b[24~", b"\x1b[20~"):
+                owner, _, name = place.rpartition(".")
+                before = time.monotonic()
+                with monkeypatch.context() as patch:
+                    held = inspect.getattr_static(pkgutil.resolve_name(owner), name)
+                    planted = property(failing) if isinstance(held, property) else failing
+                    patch.setattr(place, planted)
+                    KeyReader(made.app).read(key, before, made.app.stop_stamp())
+                for _ in range(200):
+                    await asyncio.sleep(0.0 if writes(made.app, before) else 0.05)
+                if not writes(made.app, before):
+                    missing.append(f"{place}, {key!r}")
+                # a stop whose frame was not answered yet is not begun again by the next key
+                await until(made.pilot, lambda: not waiting(made.app))
+        assert not missing
+
+
+async def test_nothing_covers_that_a_motor_is_not_stopped() -> None:
+    """Armed, in a question and on each size: who runs it and where to stop it, to the last word."""
+    told = "drive 1: run by its terminals (Fr1), not by Modbus. Stop it there or at the machine."
+    async with bench("atv31", sets={"CHCF": 1, "Fr1": 1}) as made:
+        made.drive().set_input("LI1", "1")
+        made.drive().set_input("AI1", "5")
+        await until(made.pilot, lambda: made.speed() > 2 and runs(made.app))
+        assert made.app.take_stop_key("space")
+        await until(made.pilot, lambda: "NOT STOPPED" in shown(made.app, "said"))
+        assert made.drive().motor.frequency > 1
+        for size in ((60, 16), (80, 24), (120, 40)):
+            await made.pilot.resize_terminal(*size)
+            for keys in ([], ["a"], ["question_mark"], ["escape"]):
+                await made.pilot.press(*keys)
+                made.app.look_around()
+                await made.pilot.pause()
+                screen = " ".join(line.strip() for line in picture(made.app).splitlines())
+                assert f"NOT STOPPED, {told}" in " ".join(screen.split()), (size, keys)
+                assert not made.app._notifications
+        made.drive().set_input("LI1", "0")
+        await until(made.pilot, lambda: "NOT STOPPED" not in picture(made.app))

@@ -241,7 +241,8 @@ async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written(
             assert as_shown in picture(app)
             app.screen.dismiss()
             await pilot.pause()
-            app.cry(text)
+            app.unreached = text, app.clock.monotonic()
+            app.draw_frame()
             await until(pilot, lambda text=as_shown: text in picture(app))  # type: ignore[misc]
             app.notify(text)
             await until(pilot, lambda text=as_shown: text[:12] in shown(app, "said"))  # type: ignore[misc]

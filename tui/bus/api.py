@@ -28,6 +28,7 @@ from .trace import Frame
 if TYPE_CHECKING:
     from .limits import Limits
     from .link import Link
+    from .prepared import PreparedWrite
     from .schedule.pace import Pace
     from .shared_facts import SharedFacts
 
@@ -143,13 +144,14 @@ class ModbusLine(Protocol):
         multiple: bool | None = None,
         replaceable: bool = False,
         forbidden: Callable[[], str] | None = None,
+        within: float | None = None,
     ) -> float:
         """Write registers, once; returns when the answer came.
 
         One word goes by function 6 and more by 16, unless `multiple` says which. A `replaceable`
         write that a newer one of the same register overtook raises Superseded, unsent.
         `forbidden` is asked just before the frame goes out; a reason that it gives is raised as
-        RequestRefused in its place.
+        RequestRefused in its place. `within` as for a read.
         """
 
     async def read_write(
@@ -197,6 +199,13 @@ class ModbusLine(Protocol):
         priority: Priority = Priority.OPERATOR_WRITE,
     ) -> float:
         """Write registers of all devices; returns when it was sent. Nobody answers."""
+
+    def send_prepared(self, writes: Sequence[PreparedWrite], ended: Callable[[str], None]) -> None:
+        """Send the finished frames of a stop around the queue, after an internal error.
+
+        `ended` gets the reason if one of them was not sent, else an empty text; in the line's
+        thread, or at once. No reply is awaited. Raises LineClosed.
+        """
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         """Run a coroutine in the line's own loop; it ends with the line. Raises LineClosed."""

@@ -65,6 +65,10 @@ class LineLost(LineError):
     """The line went away or cannot be reached; it is tried again by itself."""
 
 
+class LineFailed(LineLost):
+    """The line's own code failed: an internal error, not one of the port or of a drive."""
+
+
 OWNER_SILENT = "owns the line and does not answer"
 """What a LineLost says of a frozen program of Drive Panel that has the line."""
 

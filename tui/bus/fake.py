@@ -38,6 +38,7 @@ from .model import (
     Reply,
     Timing,
 )
+from .prepared import PreparedWrite
 from .requests import (
     BROADCAST,
     Diagnose,
@@ -45,6 +46,7 @@ from .requests import (
     ReadWrite,
     ReportId,
     Request,
+    WriteOne,
     read_request,
     write_request,
 )
@@ -185,6 +187,7 @@ class FakeLine:
         multiple: bool | None = None,
         replaceable: bool = False,
         forbidden: Callable[[], str] | None = None,
+        within: float | None = None,
     ) -> float:
         """Write registers, once."""
         take = self._device(device).take
@@ -256,6 +259,15 @@ class FakeLine:
             if not device.silent and address in device.words:
                 device.take(address, values)
         return self._clock()
+
+    def send_prepared(self, writes: Sequence[PreparedWrite], ended: Callable[[str], None]) -> None:
+        """Let the devices take finished frames."""
+        for write in writes:
+            self.requests.append(write.request)
+            device = self._device(write.request.device)
+            if isinstance(write.request, WriteOne) and not device.silent:
+                device.take(write.request.address, [write.request.value])
+        ended("")
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         """Run a coroutine in the loop of whoever calls."""

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
+from msgspec import Meta
+
+from .bounds import ByteValue, RegisterAddress, RegisterCount, Text
 from .requests import (
     BROADCAST,
     LISTEN_ONLY,
@@ -39,9 +43,9 @@ class Window:
     anywhere inside the `max_words` words that begin there.
     """
 
-    address: int
-    min_words: int
-    max_words: int
+    address: RegisterAddress
+    min_words: RegisterCount
+    max_words: RegisterCount
     fixed_start: bool
 
     def holds(self, address: int, count: int) -> bool:
@@ -53,23 +57,29 @@ class Window:
         return self.address <= address and address + count <= self.address + self.max_words
 
 
+ByteValues = Annotated[frozenset[ByteValue], Meta(max_length=256)]
+Windows = Annotated[tuple[Window, ...], Meta(max_length=256)]
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
     """What one device takes; lengths in words, `exceptions` the meaning of its codes."""
 
-    functions: frozenset[int]
-    max_read: int
-    max_write: int
-    max_read_23: int
-    max_write_23: int
+    functions: ByteValues
+    max_read: RegisterCount
+    max_write: RegisterCount
+    max_read_23: RegisterCount
+    max_write_23: RegisterCount
     single_words_only: bool = False
-    read_windows: tuple[Window, ...] = ()
-    write_windows: tuple[Window, ...] = ()
-    subfunctions: frozenset[int] = frozenset()
-    broadcast_functions: frozenset[int] = frozenset()
-    max_read_4: int = 1
+    read_windows: Windows = ()
+    write_windows: Windows = ()
+    subfunctions: Annotated[frozenset[RegisterAddress], Meta(max_length=256)] = frozenset()
+    broadcast_functions: ByteValues = frozenset()
+    max_read_4: RegisterCount = 1
     """Words of one read by function 4."""
-    exceptions: Mapping[int, str] = field(default_factory=lambda: STANDARD_EXCEPTIONS)
+    exceptions: Annotated[Mapping[ByteValue, Text], Meta(max_length=256)] = field(
+        default_factory=lambda: STANDARD_EXCEPTIONS
+    )
 
 
 CAUTIOUS = Limits(
@@ -94,7 +104,7 @@ def send_refusal(
         return "The line is read-only: nothing is written."
     if held and request.changes:
         return held
-    text = _out_of_range(request)
+    text = out_of_range(request)
     if text:
         return text
     if request.device == BROADCAST:
@@ -105,7 +115,7 @@ def send_refusal(
     return _too_long(request, limits)
 
 
-def _out_of_range(request: Request) -> str:
+def out_of_range(request: Request) -> str:
     """What no Modbus device can be sent."""
     match request:
         case Read(address=address, count=count):

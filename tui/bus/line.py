@@ -23,6 +23,7 @@ from .model import (
     Reply,
     Timing,
 )
+from .prepared import PreparedWrite
 from .program import Program
 from .requests import (
     BROADCAST,
@@ -168,6 +169,7 @@ class Line:
         multiple: bool | None = None,
         replaceable: bool = False,
         forbidden: Callable[[], str] | None = None,
+        within: float | None = None,
     ) -> float:
         """Write registers, once; returns when the answer came (line's clock, seconds).
 
@@ -180,7 +182,9 @@ class Line:
         """
         limits = self._devices[device].limits
         request = write_request(device, address, values, multiple, limits.functions)
-        reply = await self._ask(request, priority, replaceable=replaceable, forbidden=forbidden)
+        reply = await self._ask(
+            request, priority, replaceable=replaceable, forbidden=forbidden, within=within
+        )
         return reply.time
 
     async def read_write(
@@ -247,6 +251,13 @@ class Line:
         """
         request = write_request(BROADCAST, address, values, None, limits.broadcast_functions)
         return (await self._ask(request, priority, limits)).time
+
+    def send_prepared(self, writes: Sequence[PreparedWrite], ended: Callable[[str], None]) -> None:
+        """Send the finished frames of a stop around the queue; see tui.bus.api."""
+        if self.read_only:
+            ended("the line is read-only")
+        else:
+            self._engine.send_prepared(writes, ended)
 
     def spawn(self, work: ThreadWork, name: str) -> Worker:
         """Run a coroutine in the line's own loop, where no screen can hold it up.

@@ -60,6 +60,9 @@ class Master(Protocol):
     async def exchange(self, sending: Sending) -> ExchangeResult:
         """Send a request and await its end. Raises LineLost."""
 
+    async def send_finished(self, data: bytes) -> None:
+        """Send a finished frame, await no reply, and leave the line quiet for it."""
+
     def close(self) -> None:
         """Give the line back."""
 

@@ -5,6 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
+from typing import Annotated
+
+from msgspec import Meta
+
+from .bounds import (
+    MOST_DEVICES,
+    ByteValue,
+    DeviceId,
+    MonotonicTime,
+    Number,
+    Seconds,
+    Text,
+)
 
 
 class Priority(IntEnum):
@@ -35,10 +48,10 @@ class LineState:
     """State of a line; times are those of the line's clock (time.monotonic)."""
 
     status: LineStatus
-    reason: str
+    reason: Text
     """One sentence for a person, empty when there is nothing to say."""
-    since: float
-    next_try: float | None = None
+    since: MonotonicTime
+    next_try: MonotonicTime | None = None
     """When a lost line is tried again."""
 
 
@@ -48,20 +61,20 @@ class DeviceState:
 
     answers: bool | None
     """Whether its last request was answered; None before the first."""
-    failures: int
+    failures: Number
     """Requests not answered in a row."""
-    silent_since: float | None
-    next_try: float | None
+    silent_since: MonotonicTime | None
+    next_try: MonotonicTime | None
     """When polls are sent again; None when they are sent now."""
-    turnaround: float | None
+    turnaround: Seconds | None
     """Seconds from the end of a request to the start of its reply, longest of the recent ones."""
-    usual_turnaround: float | None
+    usual_turnaround: Seconds | None
     """The median of the same."""
-    heard: float | None
+    heard: MonotonicTime | None
     """When its last reply ended, on the line's clock; None before the first."""
-    lateness: float = 0.0
+    lateness: Seconds = 0.0
     """Seconds by which a reply came after its time-out, the longest; fades with those in time."""
-    copies_within: float = 0.0
+    copies_within: Seconds = 0.0
     """Seconds after a reply in which it may come once more; 0 where none ever came twice."""
 
 
@@ -86,29 +99,32 @@ class IdentificationObjects:
 
 TURNAROUND_EDGES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Seconds at which one bar of the histogram of turnarounds ends and the next begins."""
+_BARS = len(TURNAROUND_EDGES) + 1
+TurnaroundBars = Annotated[tuple[Number, ...], Meta(min_length=_BARS, max_length=_BARS)]
+ExceptionCounts = Annotated[Mapping[ByteValue, Number], Meta(max_length=256)]
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceCounters:
     """What was exchanged with one device since the line was opened; device 0 is all of them."""
 
-    requests: int = 0
+    requests: Number = 0
     """Frames that were sent to it, repeated ones too."""
-    replies: int = 0
+    replies: Number = 0
     """Whole and right replies, refusals among them."""
-    timeouts: int = 0
-    checksum: int = 0
+    timeouts: Number = 0
+    checksum: Number = 0
     """Replies that came damaged."""
-    wrong: int = 0
-    repeats: int = 0
+    wrong: Number = 0
+    repeats: Number = 0
     """Requests that were sent again."""
-    exceptions: Mapping[int, int] = field(default_factory=dict)
+    exceptions: ExceptionCounts = field(default_factory=dict)
     """Refusals by their code."""
-    bytes_out: int = 0
-    bytes_in: int = 0
+    bytes_out: Number = 0
+    bytes_in: Number = 0
     """Bytes that came while its reply was due, strange ones too."""
-    busy_seconds: float = 0.0
-    turnarounds: tuple[int, ...] = (0,) * (len(TURNAROUND_EDGES) + 1)
+    busy_seconds: Seconds = 0.0
+    turnarounds: TurnaroundBars = (0,) * _BARS
     """Replies by their turnaround: up to each edge, and beyond the last."""
 
 
@@ -116,30 +132,32 @@ class DeviceCounters:
 class LineCounters:
     """What happened on a line since it was opened."""
 
-    requests: int = 0
-    replies: int = 0
-    timeouts: int = 0
+    requests: Number = 0
+    replies: Number = 0
+    timeouts: Number = 0
     """Requests without an answer, to devices that have answered or that were asked on purpose."""
-    searched: int = 0
+    searched: Number = 0
     """Requests of a search without an answer: nobody was known to be there."""
-    checksum: int = 0
-    wrong: int = 0
-    exceptions: int = 0
-    resyncs: int = 0
+    checksum: Number = 0
+    wrong: Number = 0
+    exceptions: Number = 0
+    resyncs: Number = 0
     """Replies found behind or between bytes that did not belong to them."""
-    stale: int = 0
+    stale: Number = 0
     """Whole frames that came when none was due, and were thrown away."""
-    bytes_out: int = 0
-    bytes_in: int = 0
-    busy_seconds: float = 0.0
-    framing: int = 0
+    bytes_out: Number = 0
+    bytes_in: Number = 0
+    busy_seconds: Seconds = 0.0
+    framing: Number = 0
     """Characters that the port saw without their stop bit; 0 too where it does not tell."""
-    parity: int = 0
-    breaks: int = 0
-    overruns: int = 0
-    repeats: int = 0
+    parity: Number = 0
+    breaks: Number = 0
+    overruns: Number = 0
+    repeats: Number = 0
     """Requests that were sent again."""
-    devices: Mapping[int, DeviceCounters] = field(default_factory=dict)
+    devices: Annotated[Mapping[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = field(
+        default_factory=dict
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import msgspec
 
+from .bounds import Number, ProgramId, Word
+
 
 class Program(msgspec.Struct, frozen=True):
     """A program on the line, as others name it."""
 
-    id: str
+    id: ProgramId
     """Its own among all programs."""
-    name: str
+    name: Word
     """`panel`, `run` and the like."""
-    pid: int = 0
-    user: str = ""
-    where: str = ""
+    pid: Number = 0
+    user: Word = ""
+    where: Word = ""
     """Its terminal; empty where that is unknown."""
 
     @property

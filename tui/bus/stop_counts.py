@@ -1,14 +1,17 @@
 """How many stops each device was given, by which program; two tellings of one stop count once.
 
 A write carries the count that its program knew of: one that is older than a stop does not go out.
+Counts wrap: no number that another program sends keeps a later stop from changing the total.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from types import MappingProxyType
+
+from .bounds import MOST_STOPPERS, STOPS_WRAP
 
 GivenStops = Mapping[int, Mapping[str, int]]
 """Counts of stops, by device and program."""
@@ -17,6 +20,16 @@ STOPS_KEPT = 600.0
 """Seconds for which the next owner of a line is told when a device was stopped."""
 GIVEN_BY_NOBODY = ""
 """Under which the stops of programs are counted that have left."""
+
+
+def next_count(count: int) -> int:
+    """The count after one more stop."""
+    return (count + 1) % STOPS_WRAP
+
+
+def is_newer(count: int, than: int) -> bool:
+    """True if a count is ahead of another by less than half of all counts."""
+    return 0 < (count - than) % STOPS_WRAP < STOPS_WRAP // 2
 
 
 class StopCounts:
@@ -37,7 +50,9 @@ class StopCounts:
 
     def stamp(self, device: int) -> int:
         """The count that a write to a device goes by; a broadcast goes by those of all."""
-        return self.totals.get(device, 0) if device else sum(self.totals.values())
+        if device:
+            return self.totals.get(device, 0)
+        return sum(self.totals.values()) % STOPS_WRAP
 
     def of(self, program: str, devices: Iterable[int]) -> tuple[int, ...]:
         """How often a program has stopped each device."""
@@ -46,7 +61,7 @@ class StopCounts:
     def give(self, program: str, devices: tuple[int, ...], by: str) -> None:
         """A program stops devices now."""
         with self._lock:
-            counts = tuple(count + 1 for count in self.of(program, devices))
+            counts = tuple(map(next_count, self.of(program, devices)))
             self.note(program, devices, counts, by)
 
     def note(
@@ -103,8 +118,38 @@ class StopCounts:
             for device, counts in told.items():
                 known = most.setdefault(device, {})
                 for program, count in counts.items():
-                    known[program] = max(known.get(program, 0), count)
+                    if is_newer(count, known.get(program, 0)):
+                        known[program] = count
             return self._put(most)
+
+    def learn_greeting(
+        self, program: str, greeting: GivenStops, present: Collection[str]
+    ) -> tuple[int, ...]:
+        """Take over the counts that a program sends as it attaches; returns as `learn` does.
+
+        Its own count is the one that it sends: what others added to it before stays in the total,
+        so that its next stop is news. Programs that are `present` send their own counts.
+        """
+        with self._lock:
+            given = {device: dict(counts) for device, counts in self.given.items()}
+            corrected = []
+            for device, counts in given.items():
+                own = greeting.get(device, {}).get(program, 0)
+                if program in counts and is_newer(known := counts[program], own):
+                    counts[program] = own
+                    _add(counts, GIVEN_BY_NOBODY, known - own)
+                    corrected.append(device)
+            self._put(given)
+            others = set(present) - {program}
+            news = self.learn(
+                {
+                    device: {one: count for one, count in counts.items() if one not in others}
+                    for device, counts in greeting.items()
+                }
+            )
+            crowded = [counts for counts in self.given.values() if len(counts) > MOST_STOPPERS // 2]
+            self.fold(set().union(*crowded) - {program, GIVEN_BY_NOBODY, *present})
+            return tuple({*news, *corrected})
 
     def replace(self, told: GivenStops, me: str) -> tuple[int, ...]:
         """Take over the counts of the line's owner, but for those of this program itself.
@@ -117,21 +162,30 @@ class StopCounts:
             }
             before, self.given = self.totals, MappingProxyType(told)
             self.learn(own)
-            return tuple(one for one, n in self.totals.items() if n > before.get(one, 0))
+            return self._risen(before)
 
-    def fold(self, program: str) -> None:
-        """A program has left: its stops count on without its name."""
+    def fold(self, programs: Collection[str]) -> None:
+        """Programs have left: their stops count on without their names."""
         with self._lock:
             folded: dict[int, dict[str, int]] = {}
             for device, counts in self.given.items():
-                rest = {one: count for one, count in counts.items() if one != program}
-                if program in counts:
-                    rest[GIVEN_BY_NOBODY] = rest.get(GIVEN_BY_NOBODY, 0) + counts[program]
+                rest = {one: count for one, count in counts.items() if one not in programs}
+                for one in counts.keys() - rest.keys():
+                    _add(rest, GIVEN_BY_NOBODY, counts[one])
                 folded[device] = rest
             self._put(folded)
 
     def _put(self, given: Mapping[int, Mapping[str, int]]) -> tuple[int, ...]:
         before = self.totals
         self.given = MappingProxyType(dict(given))
-        self.totals = MappingProxyType({one: sum(of.values()) for one, of in given.items()})
-        return tuple(one for one, n in self.totals.items() if n > before.get(one, 0))
+        self.totals = MappingProxyType(
+            {one: sum(of.values()) % STOPS_WRAP for one, of in given.items()}
+        )
+        return self._risen(before)
+
+    def _risen(self, before: Mapping[int, int]) -> tuple[int, ...]:
+        return tuple(one for one, n in self.totals.items() if is_newer(n, before.get(one, 0)))
+
+
+def _add(counts: dict[str, int], program: str, more: int) -> None:
+    counts[program] = (counts.get(program, 0) + more) % STOPS_WRAP

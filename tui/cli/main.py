@@ -70,6 +70,7 @@ Exit status:
     3  no answer, or trouble on the line
     4  the drive refused
     5  refused here: nothing was written
+    6  ended after something was written; the message names it
    70  an error of drivepanel itself; its log has more
   130  ended by Ctrl-C
 """

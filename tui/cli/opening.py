@@ -5,9 +5,10 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from .shared.signals import ending_by_signal
+from .shared.signals import BY_SIGNAL, ending_by_signal, never_suspended
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
@@ -42,6 +43,7 @@ def open_panel(
     from tui.app import DrivePanelApp
     from tui.session.connect.open_line import open_line
     from tui.terminal.abilities import abilities_of, fewer_colours, given_environment
+    from tui.terminal.loop import soon_in_loop
 
     abilities = abilities_of(
         given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
@@ -60,9 +62,24 @@ def open_panel(
         abilities=fewer_colours(abilities) if low_bandwidth else abilities,
         on_shown=collect_garbage,
     )
-    with ending_by_signal(app, stop=on_hangup == STOP):
+
+    def tell(text: str) -> None:
+        soon_in_loop(app, app.tell, f"{text} q leaves the panel.")
+
+    _come_to_the_front()
+    with never_suspended(tell), ending_by_signal(app, stop=on_hangup == STOP) as came:
         app.run()
-    return app.return_code or 0
+    return BY_SIGNAL + came[0] if came else app.return_code or 0
+
+
+def _come_to_the_front() -> None:
+    """Wait in the background of a shell: the system suspends a program that sets its terminal."""
+    try:
+        import termios
+    except ImportError:  # Windows
+        return
+    with suppress(termios.error):
+        termios.tcsetattr(0, termios.TCSANOW, termios.tcgetattr(0))
 
 
 def _open_with_demo(

@@ -19,3 +19,7 @@ class UnknownParameter(DriveError):
 
 class ValueRefused(DriveError):
     """A typed value cannot be held by the parameter: out of range, unknown name, no number."""
+
+
+class UnitRefused(ValueRefused):
+    """A typed value in a unit that nothing known leads to the parameter's own from."""

@@ -70,6 +70,7 @@ def family_page(profile: Profile) -> list[PageSection]:
         PageSection("Line", tuple(_line(data))),
         PageSection("Addresses", tuple(_addresses(data))),
         PageSection("When the line falls silent", tuple(_silence(data))),
+        PageSection("After a fault reset", tuple(_after_reset(data))),
         PageSection("Lamps and display", tuple(_lamps(data))),
         PageSection("Command words", tuple(_commands(data))),
         PageSection("Where the manuals are wrong", tuple(_errata(data))),
@@ -177,6 +178,11 @@ def _silence(data: ProfileData) -> Iterator[PageRow]:
         yield PageRow(head, f"{one.name}: {one.does}", "", one.motor_keeps_running)
     if watch.note:
         yield PageRow("", watch.note)
+
+
+def _after_reset(data: ProfileData) -> Iterator[PageRow]:
+    for one in data.faults.after_reset:
+        yield PageRow("*", one.text, SURENESS[one.confidence], one.by == "others")
 
 
 def _lamps(data: ProfileData) -> Iterator[PageRow]:

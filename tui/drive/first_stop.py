@@ -95,6 +95,21 @@ def stop_places(families: Sequence[StopFacts], named: Sequence[str] = ()) -> lis
     )
 
 
+def families_beside(families: Sequence[StopFacts], named: str) -> tuple[StopFacts, ...]:
+    """A named family, and those that are stopped by one of its registers.
+
+    No other register may be written to a drive whose family the user has named.
+    """
+    places = stop_places(families, [named])
+    ids = {
+        one.id
+        for place in places
+        if any(family.id == named for family in place.families)
+        for one in place.families
+    }
+    return tuple(one for one in families if one.id in ids)
+
+
 def first_word(
     place: StopPlace, raws: Mapping[int, int], wanted: OrderId, named: Sequence[str] = ()
 ) -> FirstWord | None:
@@ -133,6 +148,16 @@ def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tupl
         if alone is not None and alone.word == what.word:
             found.append(family.id)
     return tuple(found)
+
+
+def blind_stops(families: Sequence[StopFacts]) -> list[FirstWord]:
+    """The words that stop a drive of any of these families in any chart; one for each register.
+
+    Nothing needs to be known of the drive. Empty if no word stops them all.
+    """
+    named = [one.id for one in families]
+    found = [first_word(place, {}, "stop", named) for place in stop_places(families, named)]
+    return [one for one in found if one is not None] if all(found) else []
 
 
 def _stopped_by(family: StopFacts, address: int, word: int, raws: Mapping[int, int]) -> bool:

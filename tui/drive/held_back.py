@@ -8,7 +8,7 @@ from typing import Literal
 
 from .channel import Channel, command_channel
 from .chart import state_now
-from .orders import MOVING_ORDERS, OrderRefused, choose, locked_by, order_target, unmet
+from .orders import MOVING_ORDERS, OrderRefused, choose, locked_by, order_target, unmet, walk
 from .profile.profile import Profile
 from .profile.schema import Chart, OrderId
 
@@ -58,11 +58,13 @@ def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str
     state = state_now(profile, chart, raws)
     if state.kind == "fault":
         return IN_FAULT
-    if chart.runs_in is None:  # else it is walked there from any other state
-        try:
+    try:
+        if chart.runs_in is None:
             choose(chart, id, raws, state)
-        except OrderRefused as refused:
-            return str(refused)
+        else:
+            walk(chart, state.id, chart.runs_in)
+    except OrderRefused as refused:
+        return str(refused)
     return ""
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from .profile.profile import Profile
 from .profile.schema import FaultHelp, HelpConfidence, Hint, ResetWay
+from .reset_text import MAY_START
+from .shown import shown
 from .values import set_bits
 
 TRUST: Mapping[HelpConfidence, str] = {
@@ -16,14 +18,35 @@ TRUST: Mapping[HelpConfidence, str] = {
 }
 """How surely the first cause is known, in words."""
 RESETS: Mapping[ResetWay | None, str] = {
-    "by-reset": "{by} once the cause is gone; a run command may start it",
-    "automatic": "{by} once the cause is gone; or a restart by itself, if on",
-    "by-itself": "alone, once the cause is gone; a run command starts it",
-    "power-cycle": "switch off and on, the cause gone; {by} does nothing",
-    None: "{by} once the cause is gone; a run command may start it",
+    "by-reset": "{by} once the cause is gone.",
+    "automatic": "{by} once the cause is gone, or the automatic restart, if it is on.",
+    "by-itself": "The drive leaves the fault once the cause is gone; a run command may start it.",
+    "power-cycle": "Switch off and on once the cause is gone; {by} does nothing.",
+    None: "{by} once the cause is gone.",
 }
-RESET_NOW = "{by} works now, says the drive; a run command may start it"
-RESET_NOT_YET = "not yet, says the drive: the cause is still there"
+RESET_NOW = "{by} works now, says the drive."
+RESET_NOT_YET = "Not yet, says the drive: the cause is still there."
+
+
+@dataclass(frozen=True, slots=True)
+class ExcludedAdvice:
+    """A cause or a check that a value rules out, and that value in words."""
+
+    text: str
+    code: str
+    reason: str
+    """`ruled out, BRA Yes`; `not now, ULN 228.0 V` where the value at the fault is not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultAdvice:
+    """The causes and checks of a fault that its values leave."""
+
+    probable: tuple[str, ...]
+    check: tuple[str, ...]
+    excluded: tuple[ExcludedAdvice, ...]
+    confidence: HelpConfidence
+    """The confidence of the first remaining cause: practice, unless the help lists it first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +58,20 @@ class ResetText:
     wait: str = ""
 
 
-def reset_text(help_: FaultHelp | None, ready: bool | None, by: str) -> ResetText:
+def reset_text(
+    help_: FaultHelp | None, ready: bool | None, by: str, follows: str = MAY_START
+) -> ResetText:
     """How a fault ends; `by` names what resets it: a key, or the command.
 
     `ready` is what the drive says of it now, None where it says nothing. The drive is believed
-    before what is only recalled.
+    before what is only recalled. `follows` is the motor's reaction, of `reset_follows`.
     """
     if ready is not None:
         text = RESET_NOW if ready else RESET_NOT_YET
-        return ResetText(text.format(by=by), True)
+        return ResetText(f"{text.format(by=by)} {follows}", True)
     wait = f"wait about {help_.wait_s} s before it" if help_ and help_.wait_s else ""
-    return ResetText(RESETS[help_.reset if help_ else None].format(by=by), False, wait)
+    text = RESETS[help_.reset if help_ else None].format(by=by)
+    return ResetText(f"{text} {follows}", False, wait)
 
 
 def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
@@ -61,7 +87,35 @@ def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
     """Parameters to read for a fault that is looked at."""
     told = profile.data.faults.reset_ready
     codes = [look.code for look in hint.look_at] if hint else []
+    for row in hint.ruled_out if hint else ():
+        codes += [row.parameter, *(when.parameter for when in row.when)]
     return list(dict.fromkeys([*codes, *([told.parameter] if told else [])]))
+
+
+def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: bool) -> FaultAdvice:
+    """The causes and checks of a fault or an alarm, without those that values rule out.
+
+    `latest` is false for a fault that is not the last one: what the drive stored is not of it.
+    """
+    stored = frozenset(profile.data.faults.stored[0]) if profile.data.faults.stored else frozenset()
+    known = raws if latest else {code: raw for code, raw in raws.items() if code not in stored}
+    rows = {row.text: row for row in reversed(hint.ruled_out) if row.holds(known)}
+    probable = tuple(text for text in hint.probable if text not in rows)
+    excluded = []
+    for text in (*hint.probable, *hint.check):
+        if (row := rows.get(text)) is not None:
+            parameter = profile[row.parameter]
+            value = shown(profile, parameter, known[row.parameter], known)
+            measured = parameter.access == "r" and bool(parameter.unit)
+            word = "not now" if measured and row.parameter not in stored else "ruled out"
+            reason = f"{word}, {row.parameter} {value.text} {value.unit}".rstrip()
+            excluded.append(ExcludedAdvice(text, row.parameter, reason))
+    return FaultAdvice(
+        probable,
+        tuple(text for text in hint.check if text not in rows),
+        tuple(excluded),
+        hint.confidence if probable[:1] == tuple(hint.probable[:1]) else "practice",
+    )
 
 
 def alarm_words(profile: Profile) -> list[str]:
@@ -82,13 +136,15 @@ def alarms_on(profile: Profile, raws: Mapping[str, int]) -> list[tuple[str, int,
 
 
 def hint_markdown(
-    profile: Profile, hint: Hint, value: Callable[[str], str], reset: str = ""
+    profile: Profile, hint: Hint, left: FaultAdvice, value: Callable[[str], str], reset: str = ""
 ) -> list[str]:
     """What is known of a fault as lines of Markdown; `value` tells what a parameter holds."""
-    trust = TRUST[hint.confidence]
-    lines = [f"- Probably ({trust}): {_joined(hint.probable)}"]
-    if hint.check:
-        lines.append(f"- Check (general practice): {_joined(hint.check)}")
+    lines = []
+    if left.probable:
+        lines.append(f"- Probably ({TRUST[left.confidence]}): {_joined(left.probable)}")
+    if left.check:
+        lines.append(f"- Check (general practice): {_joined(left.check)}")
+    lines += [f"- {one.text}: {one.reason}." for one in left.excluded]
     lines += [
         f"- Look at {look.code}, {profile[look.code].name}: {value(look.code)} ({look.why})"
         for look in hint.look_at

@@ -1,4 +1,4 @@
-"""A raw value as a person reads it: the one way to text for screen, journal and command line.
+"""A raw value as a person reads it, and back: the one way for screen, journal and command line.
 
 Needed are the raw values that the parameter's scale and unit follow, and what the drive lacks:
 where a scale is not known the value is shown raw, never in a unit that it may not have.
@@ -10,10 +10,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from decimal import Decimal
 
+from msgspec import structs
+
+from .errors import ValueRefused
 from .profile.profile import Profile
 from .profile.schema import Parameter
 from .teaching import TaughtScale
-from .values import Value, decode
+from .values import Conversion, Value, decode, encode, engineering
 
 
 def shown(
@@ -31,6 +34,33 @@ def shown(
     if parameter.unit_by is not None and value.number is not None:
         value = replace(value, unit=profile.unit(parameter, raws))
     return value
+
+
+def raw_of_text(
+    profile: Profile,
+    parameter: Parameter,
+    text: str,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> Conversion:
+    """The raw value of a typed text: the one conversion of all writes, as `shown` of all reads.
+
+    Raises ValueRefused as `encode` does, and where the unit or the sign is not known.
+    """
+    if parameter.unit_by is not None and (unit := profile.unit(parameter, raws)) != parameter.unit:
+        if unit == "raw":
+            follows = parameter.unit_by.parameter
+            raise ValueRefused(
+                f"{parameter.code}: its unit follows {follows}, which was not read; nothing can be"
+                " written."
+            )
+        parameter = structs.replace(parameter, unit=unit)
+    scale = profile.scale(parameter, raws, absent)
+    found = encode(parameter, text, profile.names(parameter), scale)
+    taught = profile.taught.get(parameter.code)
+    if taught is not None and taught.number(found.raw) is None:
+        raise ValueRefused(f"{text} is past what is known of {parameter.code}: its sign is open.")
+    return found
 
 
 def _taught_value(raw: int, taught: TaughtScale) -> Value:
@@ -84,7 +114,7 @@ def number_of(
     if (taught := profile.taught.get(parameter.code)) is not None:
         return taught.number(raw)
     scale = profile.scale(parameter, raws, absent)
-    return None if scale is None else raw * scale
+    return None if scale is None else engineering(raw, scale)
 
 
 def scale_sources(profile: Profile) -> frozenset[str]:

@@ -33,3 +33,9 @@ def factor_between(typed: str, own: str) -> Decimal | None:
         if typed.casefold() in sizes and own.casefold() in sizes:
             return sizes[typed.casefold()] / sizes[own.casefold()]
     return None
+
+
+def spelled(typed: str) -> str:
+    """A unit in the usual capitals: `hz` is Hz; an unknown one as it was typed."""
+    known = (unit for kind in KINDS for unit in kind if unit.casefold() == typed.casefold())
+    return next(known, typed)

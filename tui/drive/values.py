@@ -19,6 +19,8 @@ LONGEST_NUMBER = 30
 """Places before or behind the point of a number that anybody means."""
 NOT_AVAILABLE = "-----"
 HALF_A_STEP = Decimal("0.5")
+SPARE_DECIMALS = 1
+"""Decimals that a scale may have beyond those that its counts need, and keeps: 0.25, 1.5."""
 _WITH_UNIT = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,].*)", re.DOTALL)
 
 
@@ -116,8 +118,21 @@ def raw_range(parameter: Parameter) -> tuple[int, int]:
 
 
 def engineering(raw: int, scale: Decimal) -> Decimal:
-    """The engineering value of a raw one; its decimals are those of the scale."""
-    return raw * scale
+    """The engineering value of a raw one, with as many decimals as `decimals_of` its scale."""
+    number, decimals = raw * scale, decimals_of(scale)
+    if -int(scale.as_tuple().exponent) <= decimals:
+        return number
+    return number.quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)
+
+
+def decimals_of(scale: Decimal) -> int:
+    """The number of decimals with which a value of this scale is shown.
+
+    Those of the scale itself (0.1, 0.25). A longer scale (60/32767) gets as many as keep two
+    neighboring counts apart, so that a shown value always leads back to its raw value.
+    """
+    own, needed = max(0, -int(scale.as_tuple().exponent)), max(0, -scale.adjusted())
+    return own if own <= needed + SPARE_DECIMALS else needed
 
 
 def decode(
@@ -183,7 +198,8 @@ def encode(
         number = _number(parameter, typed, names)
         counts = number / scale
         raw = int(counts.to_integral_value(ROUND_HALF_UP))
-        rounded = counts != raw
+        # the decimals of a long scale are cut where it is shown: what is shown can be typed
+        rounded = counts != raw and number != engineering(raw, scale)
         lossy = rounded and (raw == 0 or abs(counts - raw) >= HALF_A_STEP)
     check_raw(parameter, raw, names, scale)
     return Conversion(raw, rounded, lossy)
@@ -278,6 +294,7 @@ __all__ = [
     "Conversion",
     "Value",
     "check_raw",
+    "decimals_of",
     "decode",
     "encode",
     "engineering",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import TYPE_CHECKING
 
-from tui.drive.plain import plain
 from tui.terminal.lean_app import LeanApp
 
 if TYPE_CHECKING:
@@ -16,12 +15,12 @@ if TYPE_CHECKING:
     from tui.session.clock import Clock
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
-    from tui.session.events import EventLog
+    from tui.session.events import Event, EventLog
     from tui.session.fleet import Fleet
     from tui.terminal.stroke import Stroke
     from tui.widgets.strip import FrameView
 
-    from .open_lines import PanelLine
+    from .open_lines import LineOpening, PanelLine
 
 
 class Panel(LeanApp):
@@ -43,8 +42,14 @@ class Panel(LeanApp):
     """All lines that are open."""
     events: EventLog
     """Everything that was said."""
+    opening: LineOpening
+    """The line that is being opened, if one is: then only stops, Esc and help mean something."""
+    key_hint: tuple[Event | None, str, str] = (None, "", "")
+    """Keys shown after a message: the message, the screen on which they work, the sentence."""
     hearing: str = ""
     """The line that is listened to, as it was typed: nothing is sent there, no stop either."""
+    unreached: tuple[str, float]
+    """The last text about drives that a stop of all does not reach, and its monotonic time."""
     chosen: DriveConsole | None
     """The drive that was opened last on the open line; the stop key means it."""
 
@@ -77,10 +82,6 @@ class Panel(LeanApp):
         """Say something in the line of messages, where the newest replaces the one before."""
         kinds = {"information": "told", "warning": "alarm", "error": "failed"}
         self.events.add(kinds[severity], f"{title} {message}".strip())
-
-    def cry(self, message: str) -> None:
-        """Say over everything that a motor does not stop; text, never markup."""
-        super().notify(plain(message, lines=True), severity="error", timeout=30.0, markup=False)
 
     def action_help_quit(self) -> None:
         """Ctrl+C ends nothing here."""

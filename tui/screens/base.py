@@ -16,7 +16,7 @@ from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
 from .frame import SELDOM, Framed
-from .keys.table import elsewhere, keys_line, typing_line
+from .keys.table import elsewhere, keys_line, opening_line, typing_line
 
 
 class PanelScreen(Framed):
@@ -59,21 +59,28 @@ class PanelScreen(Framed):
         found = self.query_one(f"#{place}", Lines)
         found.show([_fitted(line, found.size.width) for line in lines])
 
+    def put_all(self, place: str, lines: Sequence[Text]) -> None:
+        """The same in a place that is given as many rows as there are lines."""
+        found = self.query_one(f"#{place}", Lines)
+        if found.size.height != len(lines):
+            found.styles.height = len(lines)
+        self.put(place, lines)
+
     def look(self) -> None:
         """Show what there is now; lines that stay the same are not drawn."""
         # when the panel ends the parts of a screen go one by one, and timers still tick
-        if self.is_current and self.size.width and self.app.is_running:
+        if self.is_current and self.app.is_running and not self.is_too_small:
             self.draw(self.size.width)
 
     def draw(self, width: int) -> None:
-        """Put every line, here that of the keys; the screen is on top and has a size."""
+        """Put every line, here that of the keys; the screen is on top and large enough."""
         self.put("keys", self.keys_now(width))
 
     def draw_stop_keys(self) -> None:
         """The line of keys names them, and which keys mean something beside them."""
         for found in self.query("#keys").results(Lines):  # none while the screen is made, or goes
             width = found.size.width
-            if width and self.is_current:
+            if width and self.is_current and not self.is_too_small:
                 found.show([_fitted(line, width) for line in self.keys_now(width)])
 
     def keys_now(self, width: int) -> list[Text]:
@@ -83,7 +90,9 @@ class PanelScreen(Framed):
     def _keys(self, width: int) -> list[Text]:
         """The line of keys."""
         whom, field = self.app.stops_whom, self.focused
-        if takes_text(field):
+        if self.app.opening.goes_on:
+            keys = opening_line(width, whom)
+        elif takes_text(field):
             keys = typing_line(width, whom, self.typing_keys(), spaces=takes_space(field))
         else:
             keys = keys_line(self.name_of_screen, width, whom)
@@ -104,6 +113,10 @@ class PanelScreen(Framed):
             return
         if said := elsewhere(self.name_of_screen, event.key, event.character):
             self.app.tell(said)
+
+    def hint_keys(self, keys: str) -> None:
+        """Show a sentence about keys after the newest message, on this screen only."""
+        self.app.key_hint = (self.app.events.newest, self.name_of_screen, keys)
 
     def action_leave(self) -> None:
         """Back to the screen below."""

@@ -6,21 +6,22 @@ It is live everywhere: whoever answers a question sees what the motor does meanw
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rich.style import Style
 from rich.text import Text
-from textual.events import ScreenResume
+from textual.events import Key, Resize, ScreenResume
 from textual.screen import Screen
 from textual.widget import Widget
 
 from tui.drive.plain import plain
 from tui.terminal.fields import takes_space, takes_text
+from tui.terminal.names import STOP_KEYS
 from tui.widgets.drawing import key_line, wrapped
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
 from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import FrameView, Said, Tab, said_line, strip_line, tabs_line
 
@@ -34,7 +35,7 @@ from .keys.action import (
     PARAMETERS,
     SOURCES,
 )
-from .keys.table import stop_keys
+from .keys.table import once_closed, stop_keys
 
 if TYPE_CHECKING:
     from .app_port import Panel
@@ -65,6 +66,9 @@ WARNS = frozenset({"fault", "failed", "error", "refused", "alarm", "told"})
 WHOLE_FOR = 15.0
 """Seconds for which a message that warns takes more lines than its own."""
 WHOLE_LINES = 3
+NOT_STOPPED_LINES = 6
+"""Rows of the motors that a stop does not stop; more are named in one sentence."""
+NOT_STOPPED_MANY = "NOT STOPPED: {} drives. Stop them at the machine. Press m for the reasons."
 DIALOG_KEYS = "dialog-keys"
 """The place of the stop keys of a dialog: over the line of keys of the screen below."""
 
@@ -99,15 +103,29 @@ class Framed(Screen[Any]):
         here = (self.TITLE or "").lower() or view.place
         here = FRAMES if here == LISTENING else here  # a mode of it
         lead = not self.takes_letters
+        news = view.said is not None or not view.not_stopped
         parts = {
             "strip": [strip_line(view.strip, width)],
             "tabs": [tabs_line(TABS, here, view.marks, width, lead=lead)],
-            "said": said_lines(view.said, width, lead=lead),
+            "said": [
+                *not_stopped_lines(view.not_stopped, width),
+                *(said_lines(view.said, width, lead=lead) if news else ()),
+            ],
         }
         if self.is_modal:
             stops = stop_keys(self.app.stops_whom, typing=takes_space(self.focused))
             parts[DIALOG_KEYS] = [key_line(stops)]
         return parts
+
+    @property
+    def is_too_small(self) -> bool:
+        """True if the terminal has room for the sentence that says so, and for nothing else."""
+        return is_too_small(*self.app.size)
+
+    def on_resize(self, event: Resize) -> None:
+        """Say at once that the terminal is too small, or no longer."""
+        if self.is_current and self.app.is_running:
+            self.draw_frame(self.app.frame_now())
 
     @property
     def takes_letters(self) -> bool:
@@ -128,13 +146,23 @@ class Framed(Screen[Any]):
         """What stood still below another screen is not shown for a moment."""
         self.draw_frame(self.app.frame_now())
 
+    def on_key(self, event: Key) -> None:
+        """Report where a key works that means nothing to a dialog, and do nothing."""
+        typed = takes_text(self.focused) and event.is_printable
+        known = event.key in STOP_KEYS or event.key in self.active_bindings
+        if not self.is_modal or typed or known:
+            return
+        if text := once_closed(self.app.place, event.key, event.character):
+            self.app.tell(text)
+
     def draw_frame(self, view: FrameView) -> None:
         """Put the frame as it is now; what stays the same is not drawn."""
-        width = self.size.width
-        if not width:
+        if not self.size.width:
             return
         self._draw_small(view)
-        parts = self._parts(view, width)
+        if self.is_too_small:
+            return
+        parts = self._parts(view, self.size.width)
         # kept by hand: to look for them costs more than to draw them
         for place, lines in parts.items():
             part = self._frame_parts.get(place)
@@ -153,15 +181,26 @@ class Framed(Screen[Any]):
 
     def _draw_small(self, view: FrameView) -> None:
         """Cover the screen where the terminal is too small for it."""
-        if not is_too_small(*self.app.size):
+        if not self.is_too_small:
             if self._small is not None:
                 self._small.remove()
                 self._small = None
             return
         if self._small is None:
+            if not any(part.is_attached for part in self._frame_parts.values()):
+                return  # the frame would come over it
             self._small = Lines(id="small")
             self.mount(self._small)
         self._small.show(small_lines(view.strip, self.app.stops_whom, *self.size))
+
+
+def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
+    """Motors that a stop does not stop: each text whole, or all in one sentence if many."""
+    room = max(10, width - 2)
+    parts = [part for text in texts for part in wrapped(text, room, NOT_STOPPED_LINES)]
+    if len(parts) > NOT_STOPPED_LINES:
+        parts = wrapped(NOT_STOPPED_MANY.format(len(texts)), room, NOT_STOPPED_LINES)
+    return [Text(f" {part:<{room}} ", FAULT_BLOCK, no_wrap=True) for part in parts]
 
 
 def said_lines(said: Said | None, width: int, *, lead: bool = True) -> list[Text]:

@@ -14,6 +14,7 @@ from tui.widgets.strip import DriveNow, FrameView, Said, StripView
 
 from .frame import at
 from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
+from .not_stopped import not_stopped_texts, repeats
 
 if TYPE_CHECKING:
     from tui.session.command.stop_report import StopReport
@@ -32,6 +33,8 @@ STOP_SHOWN = 10.0
 """Seconds for which a stop that failed stands in place of the state, though that is known."""
 LOOK_IS_OLD = 10.0
 """Seconds after which a look at a drive that no monitor watches is not its present any more."""
+STOP_WORDS = {"sending": "STOP WAITS", "stopping": "STOPPING"}
+"""A stop on its way: its frame waits for the line, or was sent."""
 DIRECTION_WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}
 
 
@@ -59,7 +62,11 @@ class FrameSource:
             read_only=app.read_only,
             off_record=bool(app.journal_trouble),
         )
-        return FrameView(strip, app.place, _marks(console, fleet), self._said(console, now))
+        marks = _marks(console, fleet)
+        news, not_stopped = self._said(console, now), not_stopped_texts(app, now)
+        if news is not None and repeats(news.text, not_stopped):
+            news = None
+        return FrameView(strip, app.place, marks, news, not_stopped)
 
     def _line(self, fleet: Fleet | None) -> str:
         if not self._app.line_label:
@@ -108,6 +115,9 @@ class FrameSource:
         text = f"drive {event.device}: {event.text}" if there else event.text
         if there and event.kind == "fault":
             text = f"drive {event.device} {event.text}"
+        message, place, keys = self._app.key_hint
+        if message is event and place == self._app.place:
+            text = f"{text} {keys}".strip()  # on another screen they may mean something else
         return Said(at(event.wall), text, event.kind, time.time() - event.wall, there)
 
     def _trouble_below(self, now: float) -> str:
@@ -204,9 +214,10 @@ def said_state(
 ) -> tuple[str, str]:
     """The kind of the state and its words, a stop on its way before it."""
     if report is not None:
-        if report.phase.value in ("sending", "stopping"):
-            return "stop", "STOPPING"
-        if report.phase.value == "failed" and now - report.since < STOP_SHOWN:
+        if report.phase.value in STOP_WORDS:
+            return "stop", STOP_WORDS[report.phase.value]
+        shown = report.phase.value == "unheeded" or now - report.since < STOP_SHOWN
+        if report.phase.value in ("unheeded", "failed") and shown:
             return "stop failed", "NOT STOPPED"
     if state is None:
         return "", "reading"

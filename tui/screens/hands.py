@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -9,8 +10,9 @@ from typing import TYPE_CHECKING
 from textual.events import Event, InputEvent, Key, Paste
 
 from tui.bus.errors import LineClosed
+from tui.session.carry_on import carried_on
 from tui.terminal.admission import Admission
-from tui.terminal.fields import takes_space
+from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.terminal.stroke import Stroke
 
+log = logging.getLogger(__name__)
+
 NO_STOP_HERE = (
     "No stop goes out to a line that is only listened to: its master stops it. Esc ends listening."
 )
@@ -36,6 +40,8 @@ UNREACHED = (
     " its profile on Line, then s."
 )
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
+IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
+TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it again."
 
 
 class Hands(Panel):
@@ -45,8 +51,7 @@ class Hands(Panel):
         super().__init__()
         self._stops = 0
         self._trying_f12 = False
-        self._unreached: list[int] = []
-        """Devices of which it was said over everything that no stop reaches them."""
+        self.unreached = ("", 0.0)
         self._typed = TypeAhead(self, Admission(self, self).admits)
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
@@ -55,17 +60,33 @@ class Hands(Panel):
         `left_at` is when a key was read that may leave a text, like Escape: a Space behind it is no
         text, though that key may not have had its effect yet.
         """
-        left = left_at is not None and left_at > self._typed.done_to
         if key not in STOP_KEYS:
             return False
-        in_text = takes_space(self.focused) and not left and not is_too_small(*self.size)
-        if key == STOP_OUTSIDE_TEXT and in_text:
+        if key == STOP_OUTSIDE_TEXT and self._is_text(left_at):
             return False
-        self.hurry()
+        carried_on(self.hurry)
         self._stop(everything=key == STOP_ALL)
         if key == STOP and self._trying_f12:
-            self._f12_arrived()
+            carried_on(self._f12_arrived)
         return True
+
+    def _is_text(self, left_at: float | None) -> bool:
+        """True if a space is text now; after an internal error it is a stop."""
+        try:
+            left = left_at is not None and left_at > self._typed.done_to
+            return self._space_is_text() and not left
+        except Exception:
+            log.exception("a space is taken for a stop")
+            return False
+
+    def last_stop(self, error: Exception) -> None:
+        """Stop every drive by its prepared frames: keys, or what they do, failed by an error.
+
+        Uses nothing that `take_stop_key` uses.
+        """
+        self._stops += 1
+        for line in self.panel_lines:
+            line.fleet.last_stop(error)
 
     def sequence_swallowed(self, data: bytes) -> None:
         """A key came that no known terminal sends; in the thread that reads the keys."""
@@ -112,8 +133,13 @@ class Hands(Panel):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""
         if action == "stop_by_space":
-            return not takes_space(self.focused) or is_too_small(*self.size)
+            return not self._space_is_text()
         return super().check_action(action, parameters)
+
+    def _space_is_text(self) -> bool:
+        """True if a space is text under the cursor. While a line opens, nothing is typed."""
+        ignored = self.opening.goes_on and not self.screen.is_modal
+        return takes_space(self.focused) and not ignored and not is_too_small(*self.size)
 
     def action_stop_by_space(self) -> None:
         """Stop the drive that is shown, while no text is being typed."""
@@ -129,16 +155,23 @@ class Hands(Panel):
 
     def _stop(self, *, everything: bool) -> None:
         self._stops += 1
-        chosen = None if everything else self._open_drive()
+        try:
+            chosen = None if everything else self._open_drive()
+        except Exception:
+            log.exception("which drive is open is not known: every drive is stopped")
+            chosen = None
+        for fleet in every_fleet(self):
+            try:
+                if chosen is None:
+                    self._stop_sessions(fleet, fleet.sessions)
+                elif chosen in fleet.consoles:
+                    self._stop_sessions(fleet, [chosen.session])
+            except Exception as error:
+                fleet.last_stop(error, chosen)
         if self.hearing:
-            soon_in_loop(self, self.notify, NO_STOP_HERE)
-        for fleet in self.fleets:
-            if chosen is None:
-                self._stop_sessions(fleet, fleet.sessions)
-            elif chosen in fleet.consoles:
-                self._stop_sessions(fleet, [chosen.session])
-        if chosen is None and not self.hearing:
-            soon_in_loop(self, self._tell_unreached)
+            carried_on(lambda: soon_in_loop(self, self.notify, NO_STOP_HERE))
+        elif chosen is None:
+            carried_on(lambda: soon_in_loop(self, self._tell_unreached))
 
     def _tell_unreached(self) -> None:
         """A stop of all that reached nobody, or not everybody, says so; once over everything."""
@@ -147,11 +180,9 @@ class Hands(Panel):
             if not any(fleet.sessions for fleet in self.fleets):
                 self.tell(NOBODY_TO_STOP)
         else:
-            told = UNREACHED.format(", ".join(map(str, strangers)))
-            self.events.add("failed", told)
-            if strangers != self._unreached:
-                self.cry(told)
-        self._unreached = strangers
+            text = UNREACHED.format(", ".join(map(str, strangers)))
+            self.events.add("failed", text)
+            self.unreached = text, self.clock.monotonic()
 
     def _stop_sessions(
         self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"
@@ -162,7 +193,7 @@ class Hands(Panel):
         with suppress(LineClosed):
             fleet.stop(sessions, order)
         devices = [session.device for session in sessions]
-        soon_in_loop(self, self._void_questions, devices)
+        carried_on(lambda: soon_in_loop(self, self._void_questions, devices))
 
     def _void_questions(self, devices: list[int]) -> None:
         from .dialogs.question import void_questions
@@ -189,6 +220,8 @@ class Hands(Panel):
         if isinstance(event, Key | Paste) and not event.is_forwarded:
             if not self._typed.admit(event) or is_too_small(*self.size):
                 return  # nobody acts on a screen that cannot be seen
+            if self._is_ignored(event):
+                return
             self.hurry()
             if isinstance(event, Key):
                 for fleet in self.fleets:
@@ -197,6 +230,31 @@ class Hands(Panel):
         elif isinstance(event, Key) and self._is_void(event):
             return
         await super().on_event(event)
+
+    def _is_ignored(self, typed: Key | Paste) -> bool:
+        """Ignore a key typed while a line opens, and report it; Esc cancels the opening."""
+        name = typed.key if isinstance(typed, Key) else ""
+        if name in STOP_KEYS or self.screen.is_modal:
+            return False
+        if not self.opening.goes_on:
+            stroke = stroke_of(typed)
+            if stroke is None or stroke.read_at > self.opening.ended:
+                return False
+            self.tell(TYPED_BEFORE.format(self.opening.text))
+        elif name == "f1" or (name == "question_mark" and not takes_text(self.focused)):
+            return False  # help
+        elif name == "escape" and self.opening.cancel():
+            self._tell_canceled()
+        else:
+            self.tell(IGNORED.format(self.opening.text))
+        return True
+
+    def _tell_canceled(self) -> None:
+        if self.opening.connected:
+            self.say_first("The search was canceled.", "The line stays open: press s to search.")
+        else:
+            canceled = f"Opening {self.opening.text} was canceled."
+            self.say_first(canceled, "Choose a line and press Enter.")
 
     def _is_void(self, key: Key) -> bool:
         """Whether a stop came while a key went through the screen, before it has its effect."""
@@ -216,3 +274,12 @@ class Hands(Panel):
         if self.hearing and not self.fleets:
             return STOPS_NOBODY
         return f"STOP {chosen.device}" if chosen is not None else STOPS_ALL
+
+
+def every_fleet(panel: Panel) -> list[Fleet]:
+    """The drives of every open line, also after an internal error in finding the shown one."""
+    try:
+        return panel.fleets
+    except Exception:
+        log.exception("which line is shown is not known")
+        return [one.fleet for one in panel.panel_lines]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
+from textual.worker import get_current_worker
+
 from tui.bus.errors import LineError
 from tui.bus.link import SerialLink
 from tui.drive.errors import DriveError
@@ -53,13 +55,21 @@ def why_not_hear(fleet: Fleet) -> str:
     return ""
 
 
-async def hear(app: Panel) -> None:
-    """Listen to the line under the cursor of Line, else to the one that is shown."""
-    meant = getattr(app.screen, "line_to_hear", None)
-    text, profile = meant() if meant is not None else (app.line_text, "")
-    if not text:
-        app.tell(NO_LINE)
-        return
+def chosen_line(app: Panel) -> tuple[str, str]:
+    """The line under the cursor of Line, else the one that is shown, with the typed profile."""
+    choice = getattr(app.screen, "line_to_hear", None)
+    return choice() if choice is not None else (app.line_text, "")
+
+
+async def hear(app: Panel, text: str, profile: str) -> None:
+    """Listen to a line; the app's keys are ignored until that has begun."""
+    try:
+        await _ask_to_hear(app, text, profile)
+    finally:
+        app.opening.end(get_current_worker())
+
+
+async def _ask_to_hear(app: Panel, text: str, profile: str) -> None:
     if (here := app.open_line_of(text)) is not None:
         if why := why_not_hear(here.fleet):
             app.notify(why, severity="warning")
@@ -91,7 +101,13 @@ async def _listen(app: Panel, text: str, profile: str) -> None:
     try:
         named = await asyncio.to_thread(_named, profile)
         heard = HeardLine(text, "panel", named)
-        await asyncio.to_thread(heard.open)
+        opening = asyncio.ensure_future(asyncio.to_thread(heard.open))
+        try:
+            await asyncio.shield(opening)
+        except asyncio.CancelledError:
+            await asyncio.wait([opening])  # until then nothing else can have the port
+            await asyncio.to_thread(heard.close)
+            raise
     except (LineError, DriveError) as error:
         app.hearing = ""
         app.say_first(str(error), "Enter opens the line; H tries to listen again.", "error")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tui.terminal.loop import soon_in_loop
 
 from .app_port import Panel
+from .last_stops import LastStops, LineStops
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -19,8 +20,7 @@ if TYPE_CHECKING:
     from .dialogs.confirm import Confirm
     from .dialogs.leave import LeaveChoice
 
-STOPPED_WITHIN = 60.0
-"""Seconds that a motor may take to its standstill before the panel gives up waiting."""
+STOP_OR_TAKE_OVER = "Space stops it. To take it over: Esc, then T on Monitor."
 
 
 class Leaving(Panel):
@@ -64,6 +64,7 @@ class Leaving(Panel):
         for fleet in fleets:
             running = fleet.line_watch.under_command()
             here = self._left_running(fleet, running, on_purpose=on_purpose)
+            here += self._left_behind(fleet)
             here += [*self._tripping(fleet, running), *self._unfinished(fleet)]
             label = next((o.opened.label for o in self.panel_lines if o.fleet is fleet), "")
             told += [f"{label}:", *here] if here and len(self.panel_lines) > 1 else here
@@ -81,6 +82,16 @@ class Leaving(Panel):
             told.append(left_alone_text(one, watch=fleet.line_watch.watch(one.device)))
             told += [others] if (others := left_to_others(one, on_purpose=on_purpose)) else []
         return told
+
+    def _left_behind(self, fleet: Fleet) -> list[str]:
+        """Motors that no program commands, who started each, and what to do."""
+        from tui.session.monitor.timeout import names_of
+
+        return [
+            f"{names_of([one.session])}: {left[0].lower()}{left[1:]} {STOP_OR_TAKE_OVER}"
+            for one in fleet.consoles
+            if (left := fleet.left_behind(one))
+        ]
 
     def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
         """Which drives act on their communication time-out once they are left, and when."""
@@ -140,17 +151,19 @@ class Leaving(Panel):
 
         Waits for it; may be called in any thread but the loop's.
         """
-        from tui.bus.errors import LineClosed
+        return self.order_stops().wait()
 
-        running = [(fleet, fleet.line_watch.under_command()) for fleet in self.fleets]
-        running = [one for one in running if one[1]]
-        for fleet, sessions in running:
-            try:
-                fleet.stop(sessions, by="leaving the panel")
-            except LineClosed:
-                return False
-        waits = [fleet.stopper.wait(sessions, STOPPED_WITHIN) for fleet, sessions in running]
-        return not any(summary.failed for summary in waits)
+    def order_stops(self) -> LastStops:
+        """Order a stop of every motor that Drive Panel runs, and end all other work.
+
+        May be called in any thread, returns at once and raises nothing.
+        """
+        labels = {id(one.fleet): f"{one.opened.label}: " for one in self.panel_lines}
+        several = len(labels) > 1
+        lines = [LineStops(one, labels.get(id(one), "") if several else "") for one in self.fleets]
+        for line in lines:
+            line.order()
+        return LastStops(lines)
 
     def _leave(self, sure: bool | None) -> None:
         if sure:
@@ -213,4 +226,5 @@ def _concerned(fleet: Fleet) -> list[DriveSession]:
     """Drives of a line that run by a command from here, or act once they are left alone."""
     turning = {session.device for session in fleet.line_watch.under_command()}
     turning |= fleet.line_watch.left_alone().keys()
+    turning |= {one.device for one in fleet.consoles if fleet.left_behind(one)}
     return [session for session in fleet.sessions if session.device in turning]

@@ -68,7 +68,7 @@ class LineOwner(Panel):
         shown = self._shown()
         if shown is not None and not shown.fleet.found:
             await self._close(shown)  # nothing is on it
-        opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text))
+        opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text, remember))
         try:
             opened = await asyncio.shield(opening)
         except asyncio.CancelledError:
@@ -88,8 +88,7 @@ class LineOwner(Panel):
         self.show_line(one)
         self._look_after(fleet)
         log.info("opened %s", opened.label)
-        if remember:
-            await asyncio.to_thread(_remember, opened.text)
+        self.opening.connected = True
 
     def open_line_of(self, text: str) -> PanelLine | None:
         """The open line that a text means, whatever its settings; None where it is not open."""
@@ -135,7 +134,7 @@ class LineOwner(Panel):
             clock=self.clock,
         )
 
-    def _open_here(self, text: str) -> OpenLine:
+    def _open_here(self, text: str, remember: bool) -> OpenLine:
         """Open a line in a thread; closed again where the panel was left meanwhile."""
         opened = self._open(
             text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN, program="panel"
@@ -151,6 +150,8 @@ class LineOwner(Panel):
         if self._gone:
             opened.close()
             raise LineClosed
+        if remember:
+            _remember(opened.text)
         return opened
 
     def stopped_elsewhere(self, devices: list[int]) -> None:
@@ -171,10 +172,16 @@ class LineOwner(Panel):
         if self.opened is one.opened:
             self.show_line(self.panel_lines[-1] if self.panel_lines else None)
         one.fleet.forget()
-        await asyncio.to_thread(one.opened.close)
-        if one.fleet.starts is not None:
-            await asyncio.to_thread(one.fleet.starts.close)
+        # whole, though the opening that it is closed for may be canceled
+        await asyncio.shield(asyncio.to_thread(_close_all_of, one))
         log.info("closed %s", one.opened.label)
+
+
+def _close_all_of(one: PanelLine) -> None:
+    """Close a line, and wait for what is still to be written of its motors."""
+    one.opened.close()
+    if one.fleet.starts is not None:
+        one.fleet.starts.close()
 
 
 def _remember(text: str) -> None:

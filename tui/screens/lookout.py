@@ -11,10 +11,12 @@ from .frame import SELDOM, Framed
 from .frame_source import FrameSource
 
 if TYPE_CHECKING:
-    from tui.session.command.stop_report import StopReport
+    from tui.session.console import DriveConsole
 
 FRAME_LOOK = 0.25
 """Seconds between two looks at what stands around every screen."""
+
+WHAT_TO_DO = "Open it: Space stops it, T takes it over."
 
 
 class Lookout(Panel):
@@ -25,24 +27,25 @@ class Lookout(Panel):
 
     def __init__(self) -> None:
         super().__init__()
-        self._cried: list[StopReport] = []
-        """Stops that failed, and of which that was said."""
         self._frame = FrameSource(self)
         self._drawn: object = None
         """What of the frame is shown at once, as it was drawn last."""
         self._drawn_at = 0.0
-        self._stops_whom = ""
-        """Whom the stop key meant at the last look."""
+        self._keys_meant = ("", False)
+        """Whom the stop key meant at the last look, and whether other keys meant nothing."""
         self._journal_trouble = ""
+        self._left_behind_seen: set[DriveConsole] = set()
+        """Drives of which it was said that no program commands their motor."""
 
     def look_around(self) -> None:
-        """What must be seen on every screen: the frame, a new fault, a stop that failed."""
+        """What must be seen on every screen: the frame with stops that failed, and a new fault."""
         if not self.is_running:
             return  # the panel ends: its screens are gone before its timers
-        new = [fleet.alarms.take(fleet.line_watch.states) for fleet in self.fleets]
+        watches = [(fleet.alarms, fleet.line_watch) for fleet in self.fleets]
+        new = [alarms.take(watch.states, watch.onsets.by_device) for alarms, watch in watches]
         if any(new) and self.bell_rings:
             self.bell()
-        self._cry_for_stops()
+        self._say_left_behind()
         trouble = self.journal_trouble
         if trouble and trouble != self._journal_trouble:
             self.notify(trouble, severity="error")
@@ -57,8 +60,9 @@ class Lookout(Panel):
         """Put the frame of the screen on top as it is now; on a slow link its figures seldom."""
         if not isinstance(self.screen, Framed):
             return
-        if self.stops_whom != self._stops_whom:
-            self._stops_whom = self.stops_whom
+        keys_meant = self.stops_whom, self.opening.goes_on
+        if keys_meant != self._keys_meant:
+            self._keys_meant = keys_meant
             self.screen.draw_stop_keys()
         view, now = self._frame.view(), self.clock.monotonic()
         drawn = (self.screen, self.screen.size, view.at_once)
@@ -69,15 +73,13 @@ class Lookout(Panel):
         self._drawn, self._drawn_at = drawn, now
         self.screen.draw_frame(view)
 
-    def _cry_for_stops(self) -> None:
-        """Say over everything, once, that a motor does not stop."""
-        failed = []
-        labels = {id(one.fleet): f"{one.opened.label}: " for one in self.panel_lines}
+    def _say_left_behind(self) -> None:
+        """Say once of a motor that its program has exited and that no program commands it."""
+        left = set()
         for fleet in self.fleets:
-            line = labels.get(id(fleet), "") if len(labels) > 1 else ""
-            for report in fleet.stopper.reports.values():
-                if report.phase.value == "failed":
-                    failed.append(report)
-                    if report not in self._cried:
-                        self.cry(f"{line}Device {report.device}: {report.text}")
-        self._cried = failed
+            for console in fleet.consoles:
+                if text := fleet.left_behind(console):
+                    left.add(console)
+                    if console not in self._left_behind_seen:
+                        self.events.add("alarm", f"{text} {WHAT_TO_DO}", console.device)
+        self._left_behind_seen = left

@@ -1,13 +1,16 @@
-"""The lines that the panel has open: one is shown, the others go on below."""
+"""The lines that the panel has open: one is shown, the others go on below; and one that opens."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tui.session.events import Event, EventLog
 
 if TYPE_CHECKING:
+    from textual.worker import Worker
+
     from tui.session.connect.open_line import OpenLine
     from tui.session.fleet import Fleet
 
@@ -19,6 +22,46 @@ class PanelLine(NamedTuple):
     fleet: Fleet
 
 
+class LineOpening:
+    """The opening of a line, from the key that asks for it; keys are ignored until it ends.
+
+    `text` is the line as it was typed. Times are those of time.monotonic(). It may be read in any
+    thread.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        self.text = text
+        self.connected = False
+        """True once the line is open, while the work that asked for it still has to end."""
+        self.ended = float("-inf")
+        """When the last opening ended: a key read before was typed while it went on."""
+        self._goes_on = bool(text)
+        self._work: Worker[Any] | None = None
+
+    @property
+    def goes_on(self) -> bool:
+        """True while a line is being opened."""
+        work = self._work
+        return self._goes_on and (work is None or not work.is_finished)
+
+    def begin(self, text: str, work: Worker[Any]) -> None:
+        """Ignore keys from now on, until this work or the one that takes its place ends it."""
+        self.text, self._work, self.connected, self._goes_on = text, work, False, True
+
+    def end(self, work: Worker[Any] | None = None) -> None:
+        """Take keys again; if another work has begun an opening since, nothing changes."""
+        if self._goes_on and (work is None or work is self._work):
+            self.ended, self._goes_on = time.monotonic(), False
+
+    def cancel(self) -> bool:
+        """Cancel the work; False if it has not begun yet."""
+        if self._work is None:
+            return False
+        self._work.cancel()
+        self.end()
+        return True
+
+
 class LineEvents(EventLog):
     """What is said about the drives of one line: with its name, unless it is the one shown."""
 
@@ -28,13 +71,15 @@ class LineEvents(EventLog):
         self._label = label
         self._is_shown = is_shown
 
-    def add(self, kind: str, text: str, device: int | None = None) -> None:
+    def add(
+        self, kind: str, text: str, device: int | None = None, wall: float | None = None
+    ) -> None:
         """Keep an event among those of all lines."""
         if self._is_shown():
-            self._all.add(kind, text, device)
+            self._all.add(kind, text, device, wall)
         else:
             drive = "" if device is None else f", drive {device}"
-            self._all.add(kind, f"{self._label}{drive}: {text}")
+            self._all.add(kind, f"{self._label}{drive}: {text}", None, wall)
 
     @property
     def newest(self) -> Event | None:

@@ -57,7 +57,7 @@ class OpeningScreen(PanelScreen):
         next_step = (
             "It is asked which drive it is; then Monitor watches it."
             if opened
-            else "The line is opened. Esc goes to Line, where others can be chosen."
+            else "Opening the line. Press Esc to cancel. Other keys are ignored."
         )
         room = max(10, width - 4)
         lines = [Text(f"  {part}", STRONG) for part in wrapped(now, room, DOING_LINES)]

@@ -159,12 +159,16 @@ class Places(Panel):
 
     async def action_hear(self) -> None:
         """Listen to a line on which another master asks."""
-        from .hear import LISTENS_ALREADY, hear
+        from .hear import LISTENS_ALREADY, NO_LINE, chosen_line, hear
 
-        if self.hearing:
-            self.tell(LISTENS_ALREADY)
+        text, profile = chosen_line(self)
+        if self.hearing or not text:
+            self.tell(LISTENS_ALREADY if self.hearing else NO_LINE)
             return
-        self.run_worker(hear(self), exclusive=True, group="hear", exit_on_error=False)
+        work = hear(self, text, profile)
+        self.opening.begin(
+            text, self.run_worker(work, exclusive=True, group="hear", exit_on_error=False)
+        )
 
     def action_save_shown(self) -> None:
         """Save what the screen shows to a file."""

@@ -48,17 +48,20 @@ class Arming:
         OrderRefused on a line that is read-only, or held until a person says otherwise, and where
         it is barred; CommandedElsewhere where another program commands the drive.
         """
-        if self._line.read_only:
-            raise OrderRefused("The line is read-only: nothing is written.")
-        if self._line.held:
-            raise OrderRefused(self._line.held)
-        if self.barred:
-            raise OrderRefused(self.barred)
+        if why := self.hindrance:
+            raise OrderRefused(why)
         if self._device is not None and (why := self._line.facts.claim(self._device)):
             raise CommandedElsewhere(why)
         self._span, self._why = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds
+
+    @property
+    def hindrance(self) -> str:
+        """Why the drive cannot be armed now, whatever a person does here; empty if it can."""
+        if self._line.read_only:
+            return "The line is read-only: nothing is written."
+        return self._line.held or self.barred
 
     def disarm(self, why: str = "") -> None:
         """Let no write through any more."""

@@ -16,10 +16,12 @@ from .clock import REAL_CLOCK, Clock
 from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
+from .connect.prepared_stop import prepared_stop
 from .image import RegisterImage
 from .reading import Rating
 from .starts.keeper import StartKeeper
 from .timeout_told import Timeout
+from .unsaved import UnsavedSettings
 from .work import WorkQueue
 
 OWN_PROFILE = "Nothing is written by a profile that is not the drive's own."
@@ -67,10 +69,12 @@ class DriveSession:
         """What it has told of its communication time-out; None while it was not asked."""
         self.told_by_line = False
         """Whether a command or reference word was written to it from here, a stop among them."""
-        self.unsaved: frozenset[str] = frozenset()
-        """Codes of settings that were written from here and are lost at power-off until saved."""
+        self.unsaved_settings = UnsavedSettings()
+        """What was written by this program and is lost at power-off until the drive saves it."""
         self.followed: tuple[str, ...] = ()
         """Codes of words that were written from here and are polled on."""
+        self.prepared = prepared_stop(line, device, [profile])
+        """The frames that stop it in any chart, for when its usual stop fails by an error here."""
         self.starts: StartKeeper | None = None
         """Where the starts of its motor are put on record; None where they are not."""
         self.rest_seen = -math.inf
@@ -108,6 +112,11 @@ class DriveSession:
     def known_identity(self) -> DriveIdentity:
         """What the drive says of itself; empty where it says nothing."""
         return self.identity or DriveIdentity(self.device, "", "", "", "", None, ())
+
+    @property
+    def unsaved(self) -> frozenset[str]:
+        """Codes of settings written by this program that are lost at power-off until saved."""
+        return self.unsaved_settings.codes
 
     @property
     def commanded(self) -> bool:

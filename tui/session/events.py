@@ -29,13 +29,16 @@ class EventLog:
         self._lock = Lock()
         self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
 
-    def add(self, kind: str, text: str, device: int | None = None) -> None:
-        """Keep an event; the same again right behind itself is kept once."""
+    def add(
+        self, kind: str, text: str, device: int | None = None, wall: float | None = None
+    ) -> None:
+        """Keep an event, of the time `wall` if given; a repetition in a row is kept once."""
         with self._lock:
             last = self._events[-1] if self._events else None
             if last is not None and (last.device, last.kind, last.text) == (device, kind, text):
                 return
-            self._events.append(Event(self._wall(), device, kind, text))
+            at = self._wall() if wall is None else wall
+            self._events.append(Event(at, device, kind, text))
 
     def __bool__(self) -> bool:
         """A log is there however empty it is."""

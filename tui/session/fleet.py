@@ -6,6 +6,7 @@ Everything may be looked at from any thread: a mapping is replaced as a whole, n
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -15,22 +16,27 @@ from types import MappingProxyType
 
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
+from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 
 from .clock import REAL_CLOCK, Clock
 from .command.stop import Stopper
 from .connect.identify import DriveIdentity
+from .connect.prepared_stop import prepared_stop
 from .connect.search import Search
 from .console import DriveConsole
 from .drive import DriveSession
 from .events import EventLog
-from .journal import Entry, Journal, now_text
+from .journal import FAULT_WHYS, Entry, Journal, entry_time
 from .monitor.alarms import LineAlarms, PresentFault
 from .monitor.line_watch import LineWatch
+from .monitor.snapshot import Snapshot
 from .monitor.strangers_asked import StrangersAsked
 from .sharing.handover import Handover
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
+
+log = logging.getLogger(__name__)
 
 PROGRAM_ENDS_WITHIN = 0.3
 """Seconds after which a program that has left the line is no process any more."""
@@ -79,7 +85,7 @@ class Fleet:
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
-        self.alarms = LineAlarms(self.events, self._record_fault, clock.wall)
+        self.alarms = LineAlarms(self.events, self._record_fault)
         """The faults of all of them."""
         self.handover = Handover(line, self.events, self._session_of, clock)
         """Who commands a drive when two programs want to."""
@@ -142,8 +148,9 @@ class Fleet:
             before.close()
         self._strangers.let_go(session.device)
         self.line_watch.keep(session, console.monitor)
+        console.monitor.listen(partial(self._note_fault, session.device))
         # reads files: in a thread that nobody waits for
-        threading.Thread(target=self._recall, args=(console,), daemon=True).start()
+        threading.Thread(target=self._recall, args=(console, guessed), daemon=True).start()
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
@@ -158,8 +165,17 @@ class Fleet:
         self.events.add("refused", told, session.device)
         return True
 
-    def _recall(self, console: DriveConsole) -> None:
-        """What earlier programs have left of a drive: a motor that runs, and what was taught."""
+    def _recall(self, console: DriveConsole, guessed: bool) -> None:
+        """What earlier programs have left of a drive: a motor that runs, and what was taught.
+
+        One that may be of another family is prepared to be stopped as that, too.
+        """
+        session, said = console.session, console.session.known_identity
+        if guessed or session.contradiction:
+            may_be = [said.profile] if said.profile else said.candidates
+            others = [library.load(one) for one in may_be if one != session.profile.id]
+            families = [session.profile, *others]
+            session.prepared = prepared_stop(self.line, session.device, families)
         if self.starts is not None:
             self.starts.look(console.session)
         console.teacher.recall()
@@ -187,18 +203,24 @@ class Fleet:
         if outcome.kind is not OutcomeKind.WORKING:
             self.events.add(outcome.kind, outcome.text, device)
 
+    def _note_fault(self, device: int, latest: Snapshot) -> None:
+        """Keep when a drive went into its fault; called in the line's thread."""
+        if not latest.error:
+            self.line_watch.onsets.note(device, latest.state, latest.wall)
+
     def _record_fault(self, fault: PresentFault, what: str) -> None:
-        """Put a trip, or its end, into the journal."""
+        """Put a trip, the first sight of a fault, or its end, into the journal."""
         console = self.console(fault.device)
         if console is None:
             return
         session = console.session
         codes = session.profile.data.faults.codes
         raw = next((one.raw for one in codes if one.code == fault.code), 0)
+        when = entry_time(None if what == "reset" else fault.wall)
         self.journal.add(
             Entry(
-                now_text(), session.line_text, session.device, session.profile.id, fault.code,
-                0, None, "", raw, fault.name, what, None, "seen from here", kind="fault",
+                when, session.line_text, session.device, session.profile.id, fault.code,
+                0, None, "", raw, fault.name, what, None, FAULT_WHYS[what], kind="fault",
             )
         )  # fmt: skip
 
@@ -226,10 +248,33 @@ class Fleet:
         """Stop drives; may be called in any thread. Raises LineClosed."""
         self.stopper.stop(sessions, order, by)
 
+    def last_stop(self, error: Exception, only: DriveConsole | None = None) -> None:
+        """Stop every drive, or only one, by its prepared frames, after an internal error.
+
+        Uses nothing that `stop` uses. May be called in any thread.
+        """
+        for one in tuple(self._found.values()):
+            console = one.console
+            if console is None or only not in (None, console):
+                continue
+            try:
+                self.stopper.send_prepared(console.session, error)
+            except Exception:
+                log.exception("the last stop of device %s", console.device)
+
     @property
     def strangers(self) -> list[int]:
         """Devices that answered and that no stop reaches: nobody knows the word that stops them."""
         return [device for device, one in self._found.items() if one.console is None]
+
+    def left_behind(self, console: DriveConsole) -> str:
+        """Describe a motor whose program has exited and that no program commands; empty if none."""
+        device, starts = console.device, self.starts
+        seen = console.latest is not None or device in self.line_watch.looks
+        if starts is None or not seen:
+            return ""
+        text = starts.offered(console.session, runs=self.line_watch.turns(device))
+        return f"{text[0].upper()}{text[1:]}." if text else ""
 
     @property
     def stamp(self) -> Stamp:

@@ -62,12 +62,21 @@ class Entry:
     why: str
     """The command or edit that it belongs to."""
     kind: Literal["write", "fault", "read-back", "proof", "reset"] = "write"
-    """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written.
+    """`fault`: `code` and `new` are the fault's, nothing was written. `answer` is `tripped` for a
+    trip that was seen, `seen` for a fault that was there at the first sight, `reset` for its end.
     `read-back` completes a write whose answer was lost: `read_back` is what the drive held then.
     `proof` is a proof of communication loss, whose words are in `new`.
     `reset` set the drive's own counters to 0, by the function that `code` names."""
     of: str = ""
     """The time of the write that a `read-back` completes."""
+
+
+FAULT_WHYS = {
+    "tripped": "the trip was seen",
+    "seen": "in fault when first seen",
+    "reset": "the end was seen",
+}
+"""By the answer of a `fault` entry its reason. Older files have `seen from here` with each."""
 
 
 class Journal:
@@ -85,6 +94,7 @@ class Journal:
         self._changed = threading.Condition()
         """Guards all below; never held over disk work."""
         self._recent: deque[Entry] = deque(maxlen=ENTRIES_KEPT)
+        self._sent: deque[Entry] = deque(maxlen=ENTRIES_KEPT)
         self._waiting: deque[Entry] = deque()
         self._begun: float | None = None
         """Since when an entry is being written, in monotonic time."""
@@ -115,6 +125,12 @@ class Journal:
             return tuple(entry for entry in self._recent if entry.kind == "write")
 
     @property
+    def sent(self) -> tuple[Entry, ...]:
+        """Writes whose frame was sent, or may have been; oldest first."""
+        with self._changed:
+            return tuple(self._sent)
+
+    @property
     def lost(self) -> int:
         """How many entries were given up, since too many waited for the disk."""
         with self._changed:
@@ -138,9 +154,14 @@ class Journal:
         told = f"The journal cannot be written: {why}: {self.path}."
         return told + (f" {lost} entries lost." if lost else "")
 
-    def add(self, entry: Entry) -> None:
-        """Keep an entry; returns at once and never raises, whatever the disk does."""
+    def add(self, entry: Entry, *, sent: bool = True) -> None:
+        """Keep an entry; returns at once and never raises, whatever the disk does.
+
+        `sent` is False for a write that was refused before its frame.
+        """
         with self._changed:
+            if sent and entry.kind in ("write", "reset"):
+                self._sent.append(entry)
             self._recent.append(entry)
             self._waiting.append(entry)
             self._closed = False
@@ -277,4 +298,10 @@ def _tell(before: str, why: str, took: float, left: int, lost: int) -> None:
 
 def now_text() -> str:
     """The local time of an entry."""
-    return datetime.now().astimezone().isoformat(timespec="milliseconds")
+    return entry_time(None)
+
+
+def entry_time(wall: float | None) -> str:
+    """The local time of an entry: that of `wall` in seconds since 1970, else now."""
+    when = datetime.now() if wall is None else datetime.fromtimestamp(wall)
+    return when.astimezone().isoformat(timespec="milliseconds")

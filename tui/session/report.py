@@ -10,7 +10,7 @@ from tui.drive.blocks.assignment import slot_target
 from tui.drive.channel import switch_texts
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
-from tui.drive.hints import hint_markdown, reset_text
+from tui.drive.hints import advice, hint_markdown, reset_text
 from tui.drive.model import model_told
 from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
@@ -21,6 +21,7 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
 from .journal import Entry
+from .trips import trips_of
 
 ENTRIES_SHOWN = 200
 """How many entries of the journal a report shows at most, the last ones."""
@@ -172,7 +173,7 @@ class _Report:
     def faults(self) -> list[str]:
         """The present or last fault, and the history that the drive keeps."""
         data = self.profile.data.faults
-        codes = [code for code in (data.parameter, *data.history) if code]
+        codes = list(dict.fromkeys(code for code in (data.parameter, *data.history) if code))
         rows = [(code, self.profile[code].name, self._fault(code)) for code in codes]
         lines = ["## Faults", "", *_table(("code", "name", "fault"), rows)]
         for code, stored in zip(data.history, data.stored, strict=False):
@@ -192,7 +193,10 @@ class _Report:
             if fault is None or help_ is None:
                 continue
             reset = reset_text(help_, None, "a fault reset").text
-            told = hint_markdown(self.profile, help_, self.text, reset)
+            held = self.values.raws
+            latest = raw == held.get(self.profile.data.faults.parameter)
+            left = advice(self.profile, help_, held, latest=latest)
+            told = hint_markdown(self.profile, help_, left, self.text, reset)
             lines += ["", f"What {fault.code} {fault.name} points at:", "", *told]
         return lines
 
@@ -206,11 +210,18 @@ class _Report:
         return f"{fault.code} {fault.name}"
 
     def seen(self) -> list[str]:
-        """The trips of this drive that were seen from this machine."""
+        """The trips of this drive that were seen on this computer, each once."""
         rows = [
-            (_when(e.time, self.zone), e.code, e.new, e.answer) for e in self.trips[-ENTRIES_SHOWN:]
+            (
+                _when(one.tripped, self.zone) if one.tripped else "not seen",
+                _when(one.seen, self.zone),
+                one.code,
+                one.name,
+                _when(one.reset, self.zone) if one.reset else "",
+            )
+            for one in trips_of(self.trips)[-ENTRIES_SHOWN:]
         ]
-        head = ("time", "fault", "name", "")
+        head = ("tripped at", "seen since", "fault", "name", "reset seen at")
         return ["## Trips seen from here", "", *_table(head, rows)] if rows else []
 
     def journal(self) -> list[str]:

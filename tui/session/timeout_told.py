@@ -14,13 +14,18 @@ class TimeoutWatch:
     timeout: float
     reaction: Reaction | None
     active: bool = True
-    """False where it begins only with a first command, and none was sent from here."""
+    """False where the reaction is off, and before the first command where it begins with that."""
     code: str = ""
     """The parameter that sets the time-out."""
     fault: str = ""
     """The fault in which its reaction ends; empty where it ends in none, or it is not known."""
     sure: bool = True
     """Whether a document says when it begins; it is taken to have begun where none does."""
+
+    @property
+    def acts(self) -> bool:
+        """True if a reaction follows a silent line; it may be switched off."""
+        return self.reaction is None or not self.reaction.never_set
 
     @property
     def trips(self) -> bool:

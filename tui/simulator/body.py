@@ -120,13 +120,16 @@ class Body:
         return self.registers.in_force(parameter) * self.scale(parameter)
 
     def scale(self, parameter: Parameter) -> float:
-        """What one count is worth, after the parameter that its scale follows."""
-        raws: dict[str, int] = {}
-        if parameter.scale_by is not None:
-            other = self.profile[parameter.scale_by.parameter]
-            raws[other.code] = self.registers.in_force(other)
-        scale = self.profile.scale(parameter, raws)
-        return float(parameter.scale if scale is None else scale)
+        """What one count is worth, after the parameter that its scale follows.
+
+        The panel has a conversion of its own, and this one is there to show its mistakes.
+        """
+        follows = parameter.scale_by
+        if follows is None:
+            return float(parameter.scale)
+        other = self.registers.named(follows.parameter)
+        chosen = "" if other is None else str(self.registers.in_force(other))
+        return float(follows.scales.get(chosen, parameter.scale))
 
     def setting(self, code: str, default: int) -> int:
         """Raw value in force of a setting by its code in any case; the default without it."""

@@ -54,8 +54,6 @@ class Traits:
     """Writing a stopped-only word takes Ready and Switched on back to disabled (ATV31/312)."""
     running_bit: bool = False
     """Extended status bit 4 tells that the motor runs (ATV31/312), not the speed mode."""
-    history_before: bool = False
-    """The fault history begins with the fault before the last one (ATV31/312)."""
     remote_always: bool = False
     """Status bit 9 tells only that no forced local is on (ATV31/312)."""
     max_hz_high_resolution: float | None = None
@@ -81,7 +79,6 @@ _COMPACT = Traits(
     access_levels=True,
     config_disables=True,
     running_bit=True,
-    history_before=True,
     remote_always=True,
     max_hz_high_resolution=600.0,
     first_values={**_LINE_CONTROL, "LAC": 2},

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from .names import STOP_KEYS, Named, of_character, of_sequence, with_alt
-from .sequences import EIGHT_BIT, MOUSE, REPLY_BEGINS, REPLY_ENDS, REPORT, RXVT
+from . import sequences
+from .names import SPACE, SPACE_ALONE, STOP_KEYS, Named, of_character, of_sequence, with_alt
+from .sequences import ESC, PASTE_ENDS
 from .tokens import KeyToken, Paste, Report, Token
 
 ESCAPE_DELAY: Final = 0.1
@@ -22,19 +23,6 @@ SEQUENCE_WITHIN: Final = 1.0
 
 APART: Final = 0.05
 """Seconds between two reads above which they are not one piece."""
-
-LONGEST_KEY: Final = 32
-"""Characters that no sequence of a key is longer than."""
-
-LONGEST_REPLY: Final = 4096
-"""Characters after which a reply without an end is none."""
-
-ESC: Final = "\x1b"
-PASTE_BEGINS: Final = "\x1b[200~"
-PASTE_ENDS: Final = "\x1b[201~"
-SPACE: Final = ("space", " ")
-SPACE_ALONE: Final = ("space", None)
-"""Space behind an ESC that may have been Escape: a stop, and no text."""
 
 
 class Tokenizer:
@@ -125,7 +113,7 @@ class Tokenizer:
         elif character == ESC:
             self._begin(ESC)
             self._state = self._escape
-        elif (second := EIGHT_BIT.get(character)) is not None:
+        elif (second := sequences.EIGHT_BIT.get(character)) is not None:
             self._begin(ESC)
             self._introduce(second)
         else:
@@ -141,8 +129,8 @@ class Tokenizer:
             self._late_before = self._began + self._escape_delay + SEQUENCE_WITHIN
             self._begin(ESC)
             self._alt = together  # ESC twice at once is Alt with what follows
-        elif character in "[O" or character in REPLY_BEGINS:
-            self._introduce(character)
+        elif (second := sequences.EIGHT_BIT.get(character, character)) in sequences.ESCAPED:
+            self._introduce(second)
         else:
             self._key(SPACE_ALONE if character == " " else with_alt(character))
 
@@ -153,7 +141,7 @@ class Tokenizer:
 
     def _broken(self, character: str) -> bool:
         """Whether a character ends a sequence of keys that it cannot belong to."""
-        if character == ESC:
+        if character == ESC or character in sequences.EIGHT_BIT:
             cut = self._state, self._text, self._began, self._mark, self._alt, self._mute
             self._ground(character)
             self._cut = *cut, self._before
@@ -172,7 +160,7 @@ class Tokenizer:
             return
         if character == "[" and self._text == "\x1b[":
             self._state = self._linux
-        ends = character >= "\x40" or (character == "$" and RXVT.fullmatch(self._text))
+        ends = character >= "\x40" or (character == "$" and sequences.RXVT.fullmatch(self._text))
         self._text += character
         if self._text == "\x1b[M" and self._mouse:
             self._state = self._mouse_place
@@ -197,19 +185,21 @@ class Tokenizer:
     def _mouse_place(self, character: str) -> None:
         """After ESC [ M where the mouse is reported: a button and a place."""
         self._text += character
-        if len(self._text) == len("\x1b[M") + 3:
+        if character == ESC or character in sequences.EIGHT_BIT:
+            self._ground(character)  # no button and no place: the rest of the report was lost
+        elif len(self._text) == len("\x1b[M") + 3:
             self._finish()
 
     def _finish(self) -> None:
         """A sequence is complete."""
         text, self._state = self._text, self._ground
-        if text == PASTE_BEGINS:
+        if text == sequences.PASTE_BEGINS:
             self._state = self._paste
-        elif REPORT.fullmatch(text) or (self._mouse and MOUSE.fullmatch(text)):
+        elif sequences.REPORT.fullmatch(text) or (self._mouse and sequences.MOUSE.fullmatch(text)):
             self._found.append(Report(text))
             self._go_on()
         else:
-            named = of_sequence(text[: LONGEST_KEY + 1], kitty=self._mouse)
+            named = of_sequence(text[: sequences.LONGEST_KEY + 1], kitty=self._mouse)
             self._key(named)
             if named is None:
                 self._go_on()
@@ -226,7 +216,7 @@ class Tokenizer:
     def _opening(self, character: str) -> None:
         """After ESC ], ESC P or ESC _: a reply, or a key with Alt."""
         second = self._text[-1]
-        if character in REPLY_BEGINS[second]:
+        if character in sequences.REPLY_BEGINS[second]:
             self._state = self._reply
         else:
             self._key(with_alt(second))
@@ -235,20 +225,27 @@ class Tokenizer:
     def _reply(self, character: str) -> None:
         """In a reply; what it says is not looked at."""
         if character == ESC:
+            self._began, self._mark = self._now, self._here
             self._state = self._reply_escape
-        elif character in REPLY_ENDS:
+        elif character in sequences.REPLY_ENDS:
             self._state = self._ground
+            self._go_on()
+        elif character in sequences.EIGHT_BIT:
+            self._ground(character)  # the end was lost: this begins another sequence
         else:
             self._long.append(character)
-            if len(self._long) > LONGEST_REPLY:
+            if len(self._long) > sequences.LONGEST_REPLY:
                 self._no_reply()
 
     def _reply_escape(self, character: str) -> None:
         """After ESC in a reply: its end, or the first of another sequence."""
-        self._state = self._ground
-        if character != "\\":
-            self._begin(ESC)
-            self._escape(character)
+        if character == "\\":
+            self._reply(sequences.REPLY_ENDS[0])
+            return
+        began, mark = self._began, self._mark
+        self._begin(ESC)
+        self._began, self._mark, self._state = began, mark, self._escape
+        self._escape(character)
 
     def _no_reply(self) -> None:
         """What began like a reply has no end: a Space in it was typed."""
@@ -275,7 +272,7 @@ class Tokenizer:
         """
         if self._state not in (self._paste, self._reply) or self._now - self._last <= APART:
             return False
-        named = SPACE_ALONE if text == " " else of_sequence(text[:LONGEST_KEY])
+        named = SPACE_ALONE if text == " " else of_sequence(text[: sequences.LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:
             return False
         self._found.append(KeyToken(*named, self._now, self._now, self._here))

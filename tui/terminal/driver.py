@@ -7,10 +7,14 @@ given its stroke.
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import os
 import selectors
 import signal
+import threading
 import time
+from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -27,6 +31,8 @@ from .tokens import Report
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from selectors import BaseSelector
+
+log = logging.getLogger(__name__)
 
 END_POLL_INTERVAL = 0.1
 """Seconds between two looks whether the panel is to end."""
@@ -45,11 +51,22 @@ UNASKED = ("\x1b[>", "\x1b[<u", "\x1b]22;")
 """How the kitty keyboard protocol is begun and ended, and how the mouse gets another shape."""
 
 
+FULL_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[?7l"
+"""The other page of the terminal, without a cursor and without wrapping."""
+
+
 class WithMouse(Protocol):
     """What the driver asks of the app at its start."""
 
     mouse: bool
     """Whether the terminal is to report its mouse and to speak the kitty protocol."""
+
+
+class Fails(Protocol):
+    """An app that the thread of the keys can end when it cannot go on."""
+
+    def end_by(self, error: BaseException) -> None:
+        """End the app because of an error."""
 
 
 class Drawing(Protocol):
@@ -58,12 +75,52 @@ class Drawing(Protocol):
     def picture_taken(self, at: float) -> None:
         """The terminal has drawn a frame, and said so at this time."""
 
+    def action_redraw(self) -> None:
+        """Draw the whole screen again."""
+
 
 @lru_cache(maxsize=1)
 def with_own_keys(driver: type[Driver]) -> type[Driver]:
     """The driver of this platform, asking for less and reading keys the panel's way."""
-    quiet = _quiet(driver)
+    quiet = _quiet(_giving_back(driver))
     return _reading(quiet) if driver.__name__ == POSIX else _stopping(quiet)
+
+
+def _giving_back(driver: type[Driver]) -> type[Driver]:
+    class GivingBackDriver(driver):  # type: ignore[valid-type, misc]
+        """Leaves the screen once, from any thread; what is drawn after that is dropped."""
+
+        def __init__(self, app: Any, **settings: Any) -> None:
+            self._gate = threading.RLock()
+            self._left = False
+            super().__init__(app, **settings)
+
+        def write(self, data: str) -> None:
+            with self._gate:
+                if not self._left:
+                    super().write(data)
+
+        def start_application_mode(self) -> None:
+            """Take the terminal, for the first time or again."""
+            self._left = False
+            super().start_application_mode()
+
+        def stop_application_mode(self) -> None:
+            """Leave the screen."""
+            self.disable_input()  # before the gate: its thread may be about to write
+            with self._gate:
+                if self._left:
+                    return
+                super().stop_application_mode()
+                super().write(NO_REPORTS)  # only the main thread disables its input
+                self._left = True
+
+        def say_below(self, text: str) -> None:
+            """Write a line on the terminal once the screen was left; in any thread."""
+            with self._gate:
+                super().write(f"{text}\n")
+
+    return GivingBackDriver
 
 
 def _quiet(driver: type[Driver]) -> type[Driver]:
@@ -98,6 +155,26 @@ def _reading(driver: type[Driver]) -> type[Driver]:
             """Read until the panel ends; in a thread of its own."""
             read_keys(self)
 
+        def _sigcont_application(self, *_: object) -> None:
+            """After SIGSTOP, take the terminal back from the shell; Textual would open it twice."""
+            soon_in_loop(self._app, self._take_back)
+
+        def _take_back(self) -> None:
+            import termios
+            import tty
+
+            if _in_background(self.fileno):
+                asyncio.get_running_loop().call_later(END_POLL_INTERVAL, self._take_back)
+                return
+            with suppress(termios.error):
+                mode = termios.tcgetattr(self.fileno)
+                mode[tty.LFLAG] = self._patch_lflag(mode[tty.LFLAG])
+                mode[tty.IFLAG] = self._patch_iflag(mode[tty.IFLAG])
+                termios.tcsetattr(self.fileno, termios.TCSANOW, mode)
+            self.write(FULL_SCREEN)
+            self._enable_bracketed_paste()
+            cast("Drawing", self._app).action_redraw()
+
     return ReadingDriver
 
 
@@ -109,13 +186,16 @@ def read_keys(driver: Any) -> None:
     """Read the keys of a driver's terminal until its panel ends.
 
     Where the terminal goes away the panel is given SIGHUP: the system gives it to the program
-    that leads the terminal's session alone, and that may be another, which goes on.
+    that leads the terminal's session alone, and that may be another, which goes on. An error here
+    ends the panel: no key would stop a motor any more.
     """
     try:
         _read_keys(driver)
     except TerminalGone:
         os.kill(os.getpid(), signal.SIGHUP)
         driver.exit_event.wait()
+    except BaseException as error:
+        cast("Fails", driver._app).end_by(error)
 
 
 def _read_keys(driver: Any) -> None:
@@ -126,8 +206,12 @@ def _read_keys(driver: Any) -> None:
         selector.register(driver.fileno, selectors.EVENT_READ)
         while not driver.exit_event.is_set():
             for one in _look(driver, selector, keys):
-                for message in _messages(one, reports):
-                    driver.process_message(message)
+                try:
+                    for message in _messages(one, reports):
+                        driver.process_message(message)
+                except Exception:
+                    # the next key may be a stop
+                    log.exception("a key was lost")
         if selector.select(0):  # what is typed while the panel ends is for nobody
             os.read(driver.fileno, READ_SIZE)
 
@@ -153,13 +237,22 @@ def _typed(driver: Any) -> bytes:
     try:
         data = os.read(driver.fileno, READ_SIZE)
     except OSError as error:
-        raise TerminalGone from error
+        if not _in_background(driver.fileno):
+            raise TerminalGone from error
+        data = b""
     if data:
         return data
     if not os.isatty(driver.fileno):
         raise TerminalGone
     driver.exit_event.wait(END_POLL_INTERVAL)
     return data
+
+
+def _in_background(terminal: int) -> bool:
+    """Return True if the terminal belongs to another program for now, a shell for example."""
+    with suppress(OSError):
+        return os.tcgetpgrp(terminal) != os.getpgrp()
+    return False
 
 
 def _messages(read: TerminalInput, reports: XTermParser) -> Iterator[Message]:

@@ -20,6 +20,10 @@ STOP_KEYS: Final = frozenset({"space", "f12", "f9"})
 Named = tuple[str, str | None]
 """A key as Textual names it, and the character it types, if any."""
 
+SPACE: Final = ("space", " ")
+SPACE_ALONE: Final = ("space", None)
+"""Space behind an ESC that may have been Escape: a stop, and no text."""
+
 VT100_PLUS: Final = {f"\x1bO{final}": f"f{n}" for n, final in enumerate("TUVWXYZ[", 5)}
 """PuTTY's VT100+ mode from F5 on; F1 to F4 are those of an xterm."""
 

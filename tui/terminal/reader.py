@@ -7,6 +7,7 @@ the terminal takes.
 from __future__ import annotations
 
 import codecs
+import logging
 from typing import NamedTuple, Protocol
 
 from .bursts import Bursts, Given
@@ -15,6 +16,10 @@ from .names import STOP_KEYS
 from .stroke import Stroke
 from .tokens import KeyToken, Paste, Report, Token
 
+log = logging.getLogger(__name__)
+
+MAY_STOP = (b" ", b"\x1b")
+"""One of these is in the bytes of every stop key, whatever terminal sends it."""
 EDITING = frozenset({"backspace", "delete", "left", "right", "home", "end"})
 """Keys that edit a text, besides those that write it; any other one may leave it."""
 
@@ -30,6 +35,9 @@ class Stops(Protocol):
 
     def stop_stamp(self) -> object:
         """Another object after every stop."""
+
+    def last_stop(self, error: Exception) -> None:
+        """Stop every drive: keys, or what they do, failed by an internal error."""
 
     def sequence_swallowed(self, data: bytes) -> None:
         """A sequence came that no known terminal sends; it did nothing."""
@@ -53,14 +61,25 @@ class KeyReader:
         self, stops: Stops, *, mouse: bool = False, escape_delay: float = ESCAPE_DELAY
     ) -> None:
         self._stops = stops
+        self._mouse, self._escape_delay = mouse, escape_delay
+        self._begin()
+
+    def _begin(self) -> None:
+        """Nothing is known of the bytes before."""
         # a byte that is no text stays what it is: it may begin a sequence
         self._decode = codecs.getincrementaldecoder("utf-8")("surrogateescape").decode
-        self._tokens = Tokenizer(mouse=mouse, escape_delay=escape_delay)
+        self._tokens = Tokenizer(mouse=self._mouse, escape_delay=self._escape_delay)
         self._bursts = Bursts()
         self._left_at: float | None = None
 
     def read(self, data: bytes, now: float, stamp: object = None) -> list[TerminalInput]:
         """Bytes that were read at this time, when the app's stamp of stops was this."""
+        try:
+            return self._read(data, now, stamp)
+        except Exception as error:
+            return self._failed(error, data)
+
+    def _read(self, data: bytes, now: float, stamp: object) -> list[TerminalInput]:
         tokens = self._tokens.feed(self._decode(data), now, stamp)
         if not tokens and self._tokens.pending is None and data.startswith(b"\x1b"):
             self._stops.sequence_swallowed(data)
@@ -68,7 +87,22 @@ class KeyReader:
 
     def tick(self, now: float) -> list[TerminalInput]:
         """What is known by this time because nothing more was read."""
-        return self._sorted(self._tokens.tick(now), now)
+        try:
+            return self._sorted(self._tokens.tick(now), now)
+        except Exception as error:
+            # what a sequence was that had begun is not known
+            return self._failed(error, MAY_STOP[1])
+
+    def _failed(self, error: Exception, data: bytes) -> list[TerminalInput]:
+        """Stop every drive if the lost bytes may have been a stop key; then begin again."""
+        log.error("keys could not be read", exc_info=error)
+        try:
+            if any(one in data for one in MAY_STOP):
+                self._stops.last_stop(error)
+        except Exception:
+            log.exception("no drive was stopped")
+        self._begin()
+        return []
 
     @property
     def deadline(self) -> float | None:

@@ -3,6 +3,17 @@
 from __future__ import annotations
 
 import re
+from typing import Final
+
+LONGEST_KEY: Final = 32
+"""Characters that no sequence of a key is longer than."""
+
+LONGEST_REPLY: Final = 4096
+"""Characters after which a reply without an end is none."""
+
+ESC: Final = "\x1b"
+PASTE_BEGINS: Final = "\x1b[200~"
+PASTE_ENDS: Final = "\x1b[201~"
 
 REPORT = re.compile(
     r"\x1b\[(\d+;\d+R"  # where the cursor stands
@@ -19,3 +30,5 @@ EIGHT_BIT |= {chr(0xDC00 + ord(code)): same for code, same in EIGHT_BIT.items()}
 REPLY_BEGINS = {"]": "0123456789", "P": "0123456789;>!$+=?|", "_": "G"}
 """Replies of any length, and how they go on: Alt+] and Alt+P begin the same."""
 REPLY_ENDS = "\x07\x9c\udc9c\x18\x1a"
+ESCAPED = frozenset({"[", "O", *REPLY_BEGINS})
+"""What begins a sequence behind ESC; anything else is a key with Alt."""

@@ -60,7 +60,7 @@ def wrapped(text: str, width: int, most: int) -> list[str]:
     if not text or most < 1:
         return []
     text = plain(text, lines=True)
-    return textwrap.wrap(text, width, max_lines=most, placeholder=" …")
+    return textwrap.wrap(text, max(1, width), max_lines=most, placeholder=" …")
 
 
 KeyLabel = tuple[str, str, str]

@@ -264,6 +264,8 @@ class FrameView(NamedTuple):
     place: str
     marks: dict[str, tuple[str, Style]]
     said: Said | None
+    not_stopped: tuple[str, ...] = ()
+    """A text for each motor that a stop does not stop; drawn over everything, whole."""
 
     @property
     def at_once(self) -> object:
@@ -274,4 +276,4 @@ class FrameView(NamedTuple):
         # figures in a message count seconds
         text = said and re.sub(r"\d+", "", said.text)
         faults = strip.faults, strip.unseen
-        return who, armed, faults, strip.off_record, self.place, self.marks, text
+        return who, armed, faults, strip.off_record, self.place, self.marks, text, self.not_stopped

@@ -197,6 +197,16 @@ class RtuMaster:
         result.turnaround = max(0.0, end - self._sent - reply)
         return result
 
+    async def send_finished(self, data: bytes) -> None:
+        """Send a finished frame, await no reply, and leave the line quiet for it.
+
+        For a stop whose usual way has failed: it uses nothing that an exchange uses.
+        """
+        await asyncio.sleep(self._gap)
+        await self._transport.send(data)
+        on_wire = len(data) * self._character
+        self._hold = self._around.clock() + on_wire + self._around.timing.turnaround_delay
+
     async def _send(self, data: bytes) -> None:
         try:
             await self._transport.send(data)

@@ -8,7 +8,7 @@ import os
 import socket
 from collections.abc import Callable
 
-from ..errors import LineError, LineLost
+from ..errors import LineError, LineFailed, LineLost
 from ..link import Link, RtuTcpLink, SerialLink, TcpLink, label
 from ..master import LineContext, Master
 from ..model import LineState, LineStatus
@@ -23,6 +23,7 @@ from ..transport.tcp import TcpTransport
 from .backoff import pause
 from .dispatcher import Dispatcher
 from .inside import SharedLine
+from .last_way import LastWay
 
 log = logging.getLogger(__name__)
 
@@ -57,6 +58,13 @@ async def connect_tcp(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
     raise LineLost(f"{label(link)} cannot be reached: {reason}")
 
 
+async def open_transport(link: Link, around: LineContext, *, alone: bool = True) -> Transport:
+    """Open the port of a line, or connect to it. Raises the line's errors."""
+    if isinstance(link, SerialLink):
+        return open_port(link, alone=alone)
+    return await connect_tcp(link, around.timing.connect_timeout)
+
+
 async def open_master(
     link: Link,
     around: LineContext,
@@ -69,13 +77,8 @@ async def open_master(
 
     Raises the line's errors.
     """
-    wire_time = False
-    match link:
-        case SerialLink():
-            transport = open_port(link, alone=alone)
-            wire_time = not is_pseudo_terminal(link.path)
-        case TcpLink() | RtuTcpLink():
-            transport = await connect_tcp(link, around.timing.connect_timeout)
+    transport = await open_transport(link, around, alone=alone)
+    wire_time = isinstance(link, SerialLink) and not is_pseudo_terminal(link.path)
     opened(transport.note)
     if isinstance(link, TcpLink):
         return TcpMaster(transport, around, wake)
@@ -102,8 +105,10 @@ class Connection:
         dispatcher: Dispatcher,
         changed: Callable[[LineState, LineError | None], None],
         shared: SharedLine | None = None,
+        last_way: LastWay | None = None,
     ) -> None:
         self._shared = shared
+        self._last_way = last_way
         self._link = link
         self._around = around
         self._dispatcher = dispatcher
@@ -124,13 +129,17 @@ class Connection:
             except Exception as error:
                 # a fault of this program must not take the line away for good
                 log.exception("the line's loop failed")
-                failure = LineLost(f"The line failed: {error!r}.")
+                failure = LineFailed(f"The line failed: {error!r}.")
             self._failures += 1
             timing = self._around.timing
             delay = pause(self._failures, timing.reconnect_first, timing.reconnect_longest)
             self.refusal = failure
             self._say(LineStatus.LOST, str(failure), failure, delay)
-            self._dispatcher.fail_all(str(failure), LineLost)
+            kind = LineFailed if isinstance(failure, LineFailed) else LineLost
+            try:
+                self._dispatcher.fail_all(str(failure), kind)
+            except Exception:
+                log.exception("what waits for the line was not told that it is lost")
             await asyncio.sleep(delay)
 
     async def _once(self) -> None:
@@ -143,8 +152,12 @@ class Connection:
         try:
             self.refusal = None
             self._failures = 0
+            if self._last_way is not None:
+                self._last_way.master = master
             await self._dispatcher.serve(master)
         finally:
+            if self._last_way is not None:
+                self._last_way.lose()
             master.close()
 
     def _say_opened(self, note: str) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from ..errors import LineClosed, LineError, LineLost, NoAnswer, RequestRefused
+from ..errors import LineClosed, LineError, LineFailed, LineLost, NoAnswer, RequestRefused
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import Read
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
+from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
 from .patience import Devices
 from .queue import Job, JobQueue
@@ -44,6 +45,8 @@ class Dispatcher:
         """Whether a request was sent whose end is not known yet."""
         self.held_back: Callable[[], bool] = bool
         """Whether nothing but stops may go out now: others may have sent stops meanwhile."""
+        self.last_way: LastWay | None = None
+        """Where stops wait that go around the queue."""
         self.left = False
         """Whether no further request is served past the owner."""
 
@@ -125,6 +128,8 @@ class Dispatcher:
         """Send requests until the line is lost. Raises LineLost."""
         while True:
             self._wake.clear()
+            if self.last_way is not None and self.last_way.waits:
+                await self.last_way.send_waiting()
             pause: float | None = None
             if master.failure is not None:
                 raise LineLost(str(master.failure))
@@ -225,7 +230,7 @@ class Dispatcher:
             job.fail(LineClosed(with_fate(job, "The line was closed during the request.")))
             raise
         except BaseException as error:
-            job.fail(LineError(with_fate(job, f"The request failed: {error!r}.")))
+            job.fail(LineFailed(with_fate(job, f"The request failed: {error!r}.")))
             raise
         self.in_flight = False
         self._conclude(job, result)

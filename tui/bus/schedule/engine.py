@@ -5,25 +5,27 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from ..errors import LineClosed, LineError, LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from ..link import Link, TcpLink, label
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
+from ..prepared import PreparedWrite
 from ..shared_facts import SharedFacts
 from ..tally import Tally
 from ..trace import Trace
-from .connection import Connection
+from .connection import Connection, open_transport
 from .dispatcher import Dispatcher
 from .inside import LineInside, SharedLine
+from .last_way import Ended, LastWay
 from .pace import Pace
 from .patience import Devices
 from .queue import Job
 from .worker import ThreadWork, Worker
 
-T = TypeVar("T")
+T = TypeVar("T", Job, Worker)
 
 log = logging.getLogger(__name__)
 
@@ -80,7 +82,15 @@ class Engine:
             link, around, self._dispatcher, self.devices, self.pace, lambda: self.state, self._take
         )
         self._shared = share(inside) if share is not None else None
-        self._connection = Connection(link, around, self._dispatcher, self._changed, self._shared)
+        self._last_way = self._dispatcher.last_way = LastWay(
+            lambda message: self._shared is not None and self._shared.pass_on(message),
+            self._dispatcher.wake,
+            lambda: open_transport(link, around, alone=False),
+            lambda data: self.trace.add(clock(), "out", data),
+        )
+        self._connection = Connection(
+            link, around, self._dispatcher, self._changed, self._shared, self._last_way
+        )
 
     def start(self, wait: float | None) -> None:
         """Start the thread; see Line.open."""
@@ -144,9 +154,21 @@ class Engine:
             if not self._accepting or self._loop is None:
                 raise LineClosed
             try:
-                self._loop.call_soon_threadsafe(action, argument)
+                self._loop.call_soon_threadsafe(_do, action, argument)
             except RuntimeError:
                 raise LineClosed from None
+
+    def send_prepared(self, writes: Sequence[PreparedWrite], ended: Ended) -> None:
+        """Send finished frames around the queue; `ended` is called in the loop. Raises LineClosed.
+
+        It shares nothing with `submit` and `spawn`, which may be what has failed.
+        """
+        if self._loop is None:
+            raise LineClosed
+        try:
+            self._loop.call_soon_threadsafe(self._last_way.put, writes, ended)
+        except RuntimeError:
+            raise LineClosed from None
 
     def _take(self, job: Job) -> None:
         if self._closed:
@@ -243,3 +265,12 @@ class Engine:
         now = self._clock()
         late = now + self._timing.late_reply if self._dispatcher.in_flight else now
         return max(late, self.devices.last_reply_by(now)) - now
+
+
+def _do(action: Callable[[T], None], argument: T) -> None:
+    """Do something in the loop; who waits for it hears of an error in that."""
+    try:
+        action(argument)
+    except Exception as error:
+        log.exception("an internal error of the line")
+        argument.break_off(error)

@@ -55,6 +55,9 @@ class SharedLine(Protocol):
     async def own(self, say: Callable[[LineStatus, str], None]) -> None:
         """Return once this program owns the line; until then its requests go to the owner."""
 
+    def pass_on(self, message: bytes) -> bool:
+        """Send a finished message to the owner; False if none takes it."""
+
     def tell_state(self) -> None:
         """The line's state has changed."""
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Hashable, Mapping
 
+from ..bounds import MOST_SHARE
+
 SHARE = 0.9
 """Share of the line's time that regular polls may take; the rest is the operator's."""
 
@@ -29,7 +31,7 @@ class Pace:
         with self._lock:
             for device, share in self._wishes.values():
                 shares[device] = shares.get(device, 0.0) + share
-        return shares
+        return {device: min(share, MOST_SHARE) for device, share in shares.items()}
 
     def claim(self, who: Hashable, device: int, seconds: float, period: float) -> float:
         """Tell a wish: so many seconds of the line in each period; returns the period to keep."""

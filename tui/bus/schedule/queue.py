@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from ..errors import LineBusy, LineError, Superseded
+from ..errors import LineBusy, LineError, LineFailed, Superseded
 from ..expectation import Expectation
 from ..limits import Limits
 from ..model import Priority, Reply
@@ -62,6 +62,10 @@ class Job:
         if self.begun or self.answer.set_running_or_notify_cancel():
             self.begun = True
             self.answer.set_exception(error)
+
+    def break_off(self, error: Exception) -> None:
+        """An internal error kept it from being queued."""
+        self.fail(LineFailed(f"The line failed: {error!r}."))
 
     def finish(self, pdu: bytes, time: float) -> None:
         """Hand back a checked reply, without device and checksum."""

@@ -44,6 +44,11 @@ class Worker:
         if not self._ended.done():
             self._ended.set_result(None)
 
+    def break_off(self, error: Exception) -> None:
+        """An internal error kept the work from being begun."""
+        self.error = error
+        self.abandon()
+
     def _done(self, task: asyncio.Task[object]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
             self.error = error

@@ -13,8 +13,9 @@ from ..requests import BROADCAST
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from .failures import error_of
-from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw, request_form
+from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw
 from .past_owner import PastOwner
+from .request_forms import request_form
 
 OWNER_ENDED = "The program that owned the line ended"
 
@@ -51,7 +52,7 @@ class RequestsAsked:
         limits = job.limits if request.device == BROADCAST else None
         self._tell(
             Asking(
-                number, kind, fields, int(job.priority), job.replaceable, job.max_age,
+                number, kind, fields, job.priority, job.replaceable, job.max_age,
                 job.stamp, job.asked, limits, job.within,
             )
         )  # fmt: skip

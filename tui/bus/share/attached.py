@@ -9,6 +9,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from ..bounds import MOST_BYTES, MOST_FRAMES
 from ..errors import RequestRefused
 from ..limits import CAUTIOUS, Limits
 from ..model import DeviceCounters, DeviceState, Reply
@@ -24,18 +25,17 @@ from .messages import (
     Failed,
     News,
     NoMessage,
-    asked_request,
+    SeenFrame,
     packed,
-    priority_of,
 )
+from .request_forms import asked_request
 
 log = logging.getLogger(__name__)
 
 MOST_ASKED = 256
 """Requests of one client that may wait."""
-MOST_UNREAD = 1 << 20
+MOST_UNREAD = 1 << 23
 """Bytes that a client may leave unread; one that stalls is let go, and may come back."""
-FRAMES_TOLD = 200
 
 
 @dataclass(eq=False, slots=True)
@@ -93,7 +93,7 @@ class Client:
         """It asks for something on the line. Raises NoMessage."""
         if len(self.asked) >= MOST_ASKED:
             raise NoMessage("too many requests at once")
-        request, priority = asked_request(message), priority_of(message.priority)
+        request, priority = asked_request(message), message.priority
         limits = message.limits or self.limits.get(request.device, CAUTIOUS)
         job = Job(request, priority, limits, replaceable=message.replaceable)
         job.program, job.stamp = self.program.id, message.stamp
@@ -130,12 +130,14 @@ class Client:
             state = inside.devices.state(device)
             if self.known.get(device) != state:
                 self.known[device] = changed[device] = state
-        frames: tuple[tuple[float, str, bytes, str], ...] = ()
+        frames: tuple[SeenFrame, ...] = ()
         count = inside.around.trace.count
         if self.trace:
-            new = min(count - self.frames, FRAMES_TOLD)
+            new = min(count - self.frames, MOST_FRAMES)
             last = inside.around.trace.frames()[-new:] if new else ()
-            frames = tuple((one.time, one.direction, one.data, one.note) for one in last)
+            frames = tuple(
+                (one.time, one.direction, one.data[:MOST_BYTES], one.note) for one in last
+            )
         self.frames = count
         counters = inside.around.tally.frozen()
         counted = {d: one for d, one in counters.devices.items() if self.counted.get(d) != one}

@@ -72,7 +72,7 @@ class ShareClient:
         self._owner = owner
         self._say = say
         self._loop = asyncio.get_running_loop()
-        self._writer: asyncio.StreamWriter | None = None
+        self.writer: asyncio.StreamWriter | None = None
         self._asked = RequestsAsked(inside, past, self._tell)
         self._state: LineState | None = None
         self._note = ""
@@ -103,7 +103,7 @@ class ShareClient:
                 reader, writer = await asyncio.open_unix_connection(address)
         except (OSError, ValueError) as error:
             raise OwnerAway from error
-        self._writer = writer
+        self.writer = writer
         closing = True
         try:
             self._greet()
@@ -176,7 +176,7 @@ class ShareClient:
                 self._killed()
                 return
             except NoMessage as error:
-                log.error("%s says nothing sensible: %s", self._owner.program.text, error)
+                log.error("%s sent a malformed message: %s", self._owner.program.text, error)
                 self._killed()
                 return
             self._hear_life()
@@ -258,7 +258,7 @@ class ShareClient:
                 self._past.when_ended(lambda: self._tell(Here(number)))
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
-            case StopGiven(devices=devices, by=by, program=program):
+            case StopGiven(devices=devices, by=by, program=program) if program.id != facts.me.id:
                 counts, who = message.counts, f"{by}, {program.text}"
                 facts.stops.note(program.id, devices, counts, who, message.when)
                 facts.hear_stop(devices, by, program)
@@ -306,5 +306,5 @@ class ShareClient:
             self._loop.call_soon_threadsafe(self._tell, message)
 
     def _tell(self, message: AnyMessage) -> None:
-        if self._writer is not None and not self._writer.transport.is_closing():
-            self._writer.write(packed(message))
+        if self.writer is not None and not self.writer.transport.is_closing():
+            self.writer.write(packed(message))

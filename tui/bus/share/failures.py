@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import msgspec
 
+from ..bounds import (
+    MOST_BYTES,
+    ByteString,
+    ByteValue,
+    DeviceId,
+    RegisterAddress,
+    Seconds,
+    Text,
+)
 from ..errors import (
     ChecksumFault,
     DeviceException,
     LineBusy,
     LineClosed,
     LineError,
+    LineFailed,
     LineLost,
     NoAnswer,
     RequestRefused,
@@ -23,20 +34,20 @@ from ..errors import (
 class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
     """An error as a message carries it; which fields count is its kind's own business."""
 
-    text: str = ""
-    device: int = 0
-    function: int = 0
-    address: int = 0
-    detail: str = ""
-    received: bytes = b""
-    code: int = 0
-    meaning: str = ""
-    register: int = 0
-    retry_in: float | None = None
+    text: Text = ""
+    device: DeviceId = 0
+    function: ByteValue = 0
+    address: RegisterAddress = 0
+    detail: Text = ""
+    received: ByteString = b""
+    code: ByteValue = 0
+    meaning: Text = ""
+    register: RegisterAddress = 0
+    retry_in: Seconds | None = None
 
 
 _PLAIN: Mapping[str, type[LineError]] = {
-    kind.__name__: kind for kind in (RequestRefused, LineBusy, LineLost, LineClosed)
+    kind.__name__: kind for kind in (RequestRefused, LineBusy, LineLost, LineFailed, LineClosed)
 }
 
 
@@ -56,13 +67,18 @@ def failure_told(error: BaseException) -> tuple[str, ErrorForm]:
     """The kind of an error and what it tells, as a message carries them."""
     name = type(error).__name__
     if name not in _MADE:
-        return name if name in _PLAIN else "LineError", ErrorForm(str(error))
+        return name if name in _PLAIN else "LineError", ErrorForm(_clipped(str(error)))
     held = {
-        key: getattr(error, key)
+        key: _clipped(getattr(error, key))
         for key in ErrorForm.__struct_fields__
         if key != "text" and hasattr(error, key)
     }
-    return name, ErrorForm(str(error), **held)
+    return name, ErrorForm(_clipped(str(error)), **held)
+
+
+def _clipped(value: Any) -> Any:
+    """A text or bytes without its beginning, if it is longer than a message may carry."""
+    return value[-MOST_BYTES:] if isinstance(value, str | bytes) else value
 
 
 def error_of(kind: str, form: ErrorForm) -> LineError:

@@ -6,32 +6,47 @@ Times are those of the machine's monotonic clock, which all its programs share.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
+from ..bounds import (
+    MOST_DEVICES,
+    MOST_FRAMES,
+    MOST_PROGRAMS,
+    MOST_STOPPERS,
+    ByteString,
+    DeviceId,
+    MonotonicTime,
+    Notice,
+    Number,
+    ProgramId,
+    Seconds,
+    Share,
+    StopCount,
+    StopperId,
+    StopTimes,
+    Text,
+    Word,
+)
 from ..limits import Limits
 from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
 from ..program import Program
-from ..requests import (
-    Diagnose,
-    Identify,
-    Read,
-    ReadInput,
-    ReadWrite,
-    ReportId,
-    Request,
-    WriteMany,
-    WriteOne,
-)
+from ..trace import FrameDirection
 from .failures import ErrorForm
 
 VERSION = 3
 """Of the messages; programs of different versions do not share a line."""
-LONGEST_MESSAGE = 1 << 18
+LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; more is no message of ours."""
 LENGTH = 4
+
+DeviceIds = Annotated[tuple[DeviceId, ...], Meta(max_length=MOST_DEVICES)]
+Shares = Annotated[dict[DeviceId, Share], Meta(max_length=MOST_DEVICES)]
+ByProgram = Annotated[dict[StopperId, StopCount], Meta(max_length=MOST_STOPPERS)]
+SeenFrame = tuple[MonotonicTime, FrameDirection, ByteString, Word]
+StopsByDevice = Annotated[dict[DeviceId, ByProgram], Meta(max_length=MOST_DEVICES)]
 
 
 class Message(msgspec.Struct, frozen=True, tag=True):
@@ -41,13 +56,13 @@ class Message(msgspec.Struct, frozen=True, tag=True):
 class Hello(Message, frozen=True):
     """A program wants to attach."""
 
-    version: int
+    version: Number
     program: Program
-    label: str
+    label: Text
     """The line as it was meant, with its settings."""
-    stops: dict[int, dict[str, int]]
+    stops: StopsByDevice
     """The stops that it knows of, by device and program."""
-    stopped: dict[int, float] = {}
+    stopped: StopTimes = {}
     """When each device was stopped last, as far as it knows."""
 
 
@@ -55,7 +70,7 @@ class Welcome(Message, frozen=True):
     """The owner takes a program in."""
 
     owner: Program
-    label: str
+    label: Text
     """The line as it is open."""
     asked: bool = True
     """Whether it is open with the settings that were meant."""
@@ -66,79 +81,83 @@ class Welcome(Message, frozen=True):
 class TurnedAway(Message, frozen=True):
     """The owner takes a program not in, and why."""
 
-    why: str
+    why: Text
 
 
 class Describe(Message, frozen=True):
     """What a device may be sent."""
 
-    device: int
+    device: DeviceId
     limits: Limits
 
 
 class Asking(Message, frozen=True):
     """A request for the line."""
 
-    number: int
-    kind: str
-    fields: dict[str, Any]
-    priority: int
+    number: Number
+    kind: Word
+    fields: Annotated[dict[Word, Any], Meta(max_length=8)]
+    priority: Priority
     replaceable: bool
-    max_age: float
-    stamp: int
+    max_age: Seconds
+    stamp: StopCount
     """The count of stops of the device that the asker knew of."""
-    asked: float
+    asked: MonotonicTime
     """When the program asked."""
     limits: Limits | None = None
     """Where they are not those of the device: of a broadcast."""
-    within: float | None = None
+    within: Seconds | None = None
     """Seconds in which the answer is to begin, where the asker says it."""
 
 
 class Withdraw(Message, frozen=True):
     """Nobody waits for a request any more."""
 
-    number: int
+    number: Number
 
 
 class Answer(Message, frozen=True):
     """What the line answered; `time` when its last byte was on the wire."""
 
-    number: int
-    pdu: bytes
-    time: float
+    number: Number
+    pdu: ByteString
+    time: MonotonicTime
 
 
 class Failed(Message, frozen=True):
     """What became of a request that was not answered well."""
 
-    number: int
-    error: str
+    number: Number
+    error: Word
     form: ErrorForm
 
 
 class StopGiven(Message, frozen=True):
     """Somebody stops devices: all that was meant for them before is void."""
 
-    devices: tuple[int, ...]
-    counts: tuple[int, ...]
+    devices: DeviceIds
+    counts: Annotated[tuple[StopCount, ...], Meta(max_length=MOST_DEVICES)]
     """How often the program has stopped each of them by now."""
-    by: str
+    by: Text
     program: Program
-    when: float | None = None
+    when: MonotonicTime | None = None
     """When; None: just now."""
+
+    def __post_init__(self) -> None:
+        if len(self.counts) != len(self.devices):
+            raise ValueError("not one count for each device")
 
 
 class RollCall(Message, frozen=True):
     """The owner stood still, and asks who is there: what was said meanwhile comes before it."""
 
-    number: int
+    number: Number
 
 
 class Here(Message, frozen=True):
     """The answer to a RollCall; nothing goes out past the owner any more."""
 
-    number: int
+    number: Number
 
 
 class Alive(Message, frozen=True):
@@ -148,45 +167,45 @@ class Alive(Message, frozen=True):
 class Claim(Message, frozen=True):
     """A program wants to command a device, or no longer."""
 
-    device: int
+    device: DeviceId
     take: bool
 
 
 class Denied(Message, frozen=True):
     """Another program commands the device."""
 
-    device: int
+    device: DeviceId
     holder: Program
 
 
 class AskedFor(Message, frozen=True):
     """A program asks the one that commands a device to leave it."""
 
-    device: int
+    device: DeviceId
     program: Program
 
 
 class Granting(Message, frozen=True):
     """The answer to a AskedFor, to `program`."""
 
-    device: int
-    program: str
+    device: DeviceId
+    program: ProgramId
     yes: bool
-    why: str = ""
+    why: Text = ""
 
 
 class Hush(Message, frozen=True):
     """A device is left alone, or with no reason no longer."""
 
-    device: int
-    why: str
+    device: DeviceId
+    why: Notice
 
 
 class Told(Message, frozen=True):
     """Something that every person on the line is to read."""
 
-    device: int
-    text: str
+    device: DeviceId
+    text: Text
 
 
 class PollWish(Message, frozen=True):
@@ -195,21 +214,21 @@ class PollWish(Message, frozen=True):
     `trace` where it shows frames.
     """
 
-    shares: dict[int, float]
+    shares: Shares
     trace: bool
 
 
 class Facts(Message, frozen=True):
     """What all must know; sent when it changes."""
 
-    programs: tuple[Program, ...]
-    commanders: dict[int, str]
+    programs: Annotated[tuple[Program, ...], Meta(max_length=MOST_PROGRAMS)]
+    commanders: Annotated[dict[DeviceId, ProgramId], Meta(max_length=MOST_DEVICES)]
     """Ids of the programs that command, by device."""
-    stops: dict[int, dict[str, int]]
+    stops: StopsByDevice
     """How many stops each device was given, by program."""
-    hushed: dict[int, tuple[str, str]]
+    hushed: Annotated[dict[DeviceId, tuple[ProgramId, Notice]], Meta(max_length=MOST_DEVICES)]
     """Who leaves which device alone, and why."""
-    stopped: dict[int, float] = {}
+    stopped: StopTimes = {}
     """When each device was stopped last."""
 
 
@@ -218,19 +237,19 @@ class News(Message, frozen=True):
 
     state: LineState
     counters: LineCounters
-    devices: dict[int, DeviceState]
+    devices: Annotated[dict[DeviceId, DeviceState], Meta(max_length=MOST_DEVICES)]
     """Those that have changed."""
-    shares: dict[int, float]
+    shares: Shares
     """The share of the line's time that all other programs' polls take, by device."""
-    frames: tuple[tuple[float, str, bytes, str], ...] = ()
-    counted: dict[int, DeviceCounters] = {}
+    frames: Annotated[tuple[SeenFrame, ...], Meta(max_length=MOST_FRAMES)] = ()
+    counted: Annotated[dict[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = {}
     """Counts of the devices whose counts have changed."""
 
 
 class Goodbye(Message, frozen=True):
     """The owner ends; a reply may still come for `quiet` seconds."""
 
-    quiet: float
+    quiet: Seconds
 
 
 AnyMessage = (
@@ -241,11 +260,6 @@ AnyMessage = (
 
 _ENCODER = msgspec.msgpack.Encoder()
 _DECODER: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
-
-REQUEST_KINDS: Mapping[str, type[Request]] = {
-    kind.__name__: kind
-    for kind in (Read, ReadInput, WriteOne, WriteMany, ReadWrite, Diagnose, Identify, ReportId)
-}
 
 
 class NoMessage(Exception):
@@ -278,32 +292,4 @@ def unpacked(data: bytes) -> AnyMessage:
     try:
         return _DECODER.decode(data)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise NoMessage(str(error)) from error
-
-
-def request_form(request: Request) -> tuple[str, dict[str, Any]]:
-    """A request as a message carries it."""
-    return type(request).__name__, msgspec.to_builtins(request, builtin_types=(bytes,))
-
-
-def asked_request(message: Asking) -> Request:
-    """The request that a message carries. Raises NoMessage."""
-    kind = REQUEST_KINDS.get(message.kind)
-    if kind is None:
-        raise NoMessage(f"request {message.kind!r}")
-    try:
-        request = msgspec.convert(message.fields, kind)
-        bytes([request.device])
-        request.pdu()
-    except Exception as error:
-        # a request that cannot be put into bytes, for whichever reason, is none
-        raise NoMessage(str(error)) from error
-    return request
-
-
-def priority_of(number: int) -> Priority:
-    """A priority that a message carries. Raises NoMessage."""
-    try:
-        return Priority(number)
-    except ValueError as error:
         raise NoMessage(str(error)) from error

@@ -20,6 +20,7 @@ from typing import IO
 
 import msgspec
 
+from ..bounds import MonotonicTime, Number, StopTimes, Text
 from ..program import Program
 
 log = logging.getLogger(__name__)
@@ -34,13 +35,13 @@ LONGEST_LOCK = 1 << 14
 class Owner(msgspec.Struct, frozen=True):
     """What a lock file tells of the program that holds it."""
 
-    version: int
+    version: Number
     program: Program
-    socket: str
+    socket: Text
     """Where it listens; empty where it does not yet, or has ended."""
-    quiet_until: float = 0.0
+    quiet_until: MonotonicTime = 0.0
     """Monotonic time until which a reply to an owner that has ended may come."""
-    stopped: dict[int, float] = {}
+    stopped: StopTimes = {}
     """When each device was stopped of late (monotonic)."""
 
 

@@ -7,6 +7,7 @@ import logging
 import os
 from contextlib import suppress
 
+from ..bounds import MOST_PROGRAMS
 from ..limits import CAUTIOUS
 from ..link import label
 from ..program import Program
@@ -112,7 +113,8 @@ class ShareServer:
         except (EOFError, OSError, TimeoutError):
             pass
         except NoMessage as error:
-            log.warning("a program on the socket of the line says nothing sensible: %s", error)
+            who = "A program" if client is None else client.program.text
+            log.warning("%s sent a malformed message and is disconnected: %s", who, error)
         except asyncio.CancelledError:
             pass
         except Exception:
@@ -130,19 +132,12 @@ class ShareServer:
     ) -> Client | None:
         async with asyncio.timeout(HELLO_WITHIN):
             message = await next_message(reader)
-        if not isinstance(message, Hello):
-            raise NoMessage("no greeting")
-        if not self._may_attach(writer):
-            writer.write(packed(TurnedAway("This line is shared with other users only.")))
-            return None
-        facts, inside = self._inside.facts, self._inside
-        if message.version != VERSION:
-            why = (
-                f"{facts.me.text} owns the line, in another version of Drive Panel."
-                " Close it, or use the same version."
-            )
+        if not isinstance(message, Hello) or message.program.id == self._inside.facts.me.id:
+            raise NoMessage("no greeting, or one in the name of the owner")
+        if why := self._refusal(message, writer):
             writer.write(packed(TurnedAway(why)))
             return None
+        facts, inside = self._inside.facts, self._inside
         client = Client(message.program, writer, heard=inside.clock())
         own = label(inside.link)
         gone = client.program.id in self._gone_before
@@ -157,17 +152,25 @@ class ShareServer:
         client.frames = inside.around.trace.count
         log.info("%s shares the line", client.program.text)
         facts.stops.learn_times(message.stopped)
-        if unheard := facts.stops.learn(message.stops):
+        present = [one.id for one in facts.programs]
+        if unheard := facts.stops.learn_greeting(client.program.id, message.stops, present):
             # given while nobody owned the line
             self._hear_stops(unheard, "a stop while nobody owned the line", client.program)
         self._tell_facts()
         self._tell_line(client)
         return client
 
-    def _may_attach(self, writer: asyncio.StreamWriter) -> bool:
-        """Whether the user at the other end may share the line: the socket's mode, twice."""
+    def _refusal(self, hello: Hello, writer: asyncio.StreamWriter) -> str:
+        """Why a program may not share the line, or empty; its user as by the socket's mode."""
         mine = (os.getuid(), 0, None)
-        return self._group is not None or user_of(writer.get_extra_info("socket")) in mine
+        if self._group is None and user_of(writer.get_extra_info("socket")) not in mine:
+            return "This line is shared with other users only."
+        if hello.version != VERSION:
+            who = f"{self._inside.facts.me.text} owns the line, in another version of Drive Panel."
+            return f"{who} Close it, or use the same version."
+        if len({*self._clients, hello.program.id}) >= MOST_PROGRAMS:
+            return "Too many programs share this line. Close some."
+        return ""
 
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
@@ -178,9 +181,7 @@ class ShareServer:
         log.info("%s has left the line", client.program.text)
         facts = self._inside.facts
         self._missing(client.program)
-        for one in facts.departed:
-            if has_ended(one):
-                facts.stops.fold(one.id)
+        facts.stops.fold({one.id for one in facts.departed if has_ended(one)})
         self._tell_facts()
 
     def _miss_departed(self) -> None:
@@ -232,7 +233,7 @@ class ShareServer:
 
     def _hear_of_devices(self, client: Client, message: AnyMessage) -> None:
         match message:
-            case StopGiven():
+            case StopGiven() if message.program.id == client.program.id:
                 self._stopped(message)
             case Claim():
                 self._commanding.claimed(client.program, message)

@@ -94,7 +94,8 @@ class Sharing:
             self._client = None
             self._attached = self._attached or client.taken_in
         log.info("%s does not own the line any more", owner.program.text)
-        self._quiet_until = max(self._quiet_until, client.quiet_until)
+        latest = inside.clock() + LONGEST_QUIET
+        self._quiet_until = max(self._quiet_until, min(client.quiet_until, latest))
 
     async def _begin(self, served: Owner | None) -> None:
         """Listen as the owner, and wait until no reply to an owner before may come."""
@@ -112,6 +113,14 @@ class Sharing:
         except OSError as error:
             log.error("the line cannot be shared: %s", error)
         await asyncio.sleep(max(0.0, self._quiet_until - inside.clock()))
+
+    def pass_on(self, message: bytes) -> bool:
+        """Send a finished message to the owner; False if none takes it."""
+        client = self._client
+        if client is None or client.frozen or client.writer is None:
+            return False
+        client.writer.write(message)
+        return True
 
     def tell_state(self) -> None:
         """The line's state has changed."""

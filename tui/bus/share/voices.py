@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..bounds import MOST_NOTICE, MOST_TEXT
 from ..shared_facts import SharedFacts
 from .messages import AnyMessage, AskedFor, Claim, Granting, Hush, StopGiven, Told
 
@@ -19,7 +20,7 @@ class ProgramVoice:
         """Devices are stopped by this program."""
         me, stops = self._facts.me, self._facts.stops
         when = max(stops.times.get(one, 0.0) for one in devices) if devices else None
-        self._send(StopGiven(devices, stops.of(me.id, devices), by, me, when))
+        self._send(StopGiven(devices, stops.of(me.id, devices), by[:MOST_TEXT], me, when))
 
     def claim(self, device: int, take: bool) -> None:
         """This program commands a device now, or no longer."""
@@ -31,12 +32,12 @@ class ProgramVoice:
 
     def reply(self, device: int, program: str, yes: bool, why: str) -> None:
         """This program answers one that asked."""
-        self._send(Granting(device, program, yes, why))
+        self._send(Granting(device, program, yes, why[:MOST_TEXT]))
 
     def hushed(self, device: int, why: str) -> None:
         """A device is left alone by this program, or with no reason no longer."""
-        self._send(Hush(device, why))
+        self._send(Hush(device, why[:MOST_NOTICE]))
 
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""
-        self._send(Told(device, text))
+        self._send(Told(device, text[:MOST_TEXT]))

@@ -126,6 +126,10 @@ class TcpMaster:
         result.sent, result.end, result.turnaround = begun, end, max(0.0, end - begun)
         return result
 
+    async def send_finished(self, data: bytes) -> None:
+        """Send a finished frame; the connection keeps its reply apart by its transaction."""
+        await self._transport.send(data)
+
     async def _send(self, data: bytes) -> None:
         try:
             await self._transport.send(data)

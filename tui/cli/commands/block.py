@@ -186,11 +186,11 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
             head = drive_json(line_text, session)
             print_json({**head, "dry_run": True, "changes": changes})
         return DONE
-    journal, sent = told_journal(), dict[str, bool]()
+    journal, sent, permit = told_journal(), dict[str, bool](), permit_of(session)
     try:
         for plan in plans:
             done = await write_assignment(
-                session, journal, plan, permit=permit_of(session), expected=held,
+                session, journal, plan, permit=permit, expected=held,
                 sent=lambda change, taken: sent.update({change.slot: taken}),
             )  # fmt: skip
             say(f"{plan.block.name}: {done.text}", err=wanted.as_json)

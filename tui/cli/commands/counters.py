@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure, told
+from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
     connect_drive,
@@ -51,7 +52,7 @@ COUNTER_TITLES = 18
 @click.option(
     "--for",
     "seconds",
-    type=click.FloatRange(min=0.0),
+    type=seconds_range(),
     default=0.0,
     metavar="SECONDS",
     help="Count for so long, too: what other programs on the line send.",

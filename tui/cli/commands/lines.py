@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..shared.errors import USAGE, told
+from ..shared.left_behind import LeftBehind, left_on_lines
 from ..shared.options import json_option
 from ..shared.say import say
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 def lines(as_json: bool) -> None:
     """List the lines that the settings file names, and the adapters and drives remembered.
 
+    A motor that may still run although the program that started it has exited is listed too.
     The settings file is checked: each fault is told with its file, line and key, and the status
     is 2 then.
     """
@@ -30,7 +32,7 @@ def lines(as_json: bool) -> None:
 
     from ..shared.output import print_json
 
-    settings, memory = line_settings(), load_memory()
+    settings, memory, left = line_settings(), load_memory(), left_on_lines()
     named = list(settings.lines.values())
     places = settings.places.items()
     found = (f"{at}: {fault}" for name, at in places for fault in _faults(settings.lines[name]))
@@ -42,6 +44,7 @@ def lines(as_json: bool) -> None:
                 "faults": faults,
                 "lines": [_named_json(one) for one in named],
                 "known": [_known_json(key, mark) for key, mark in memory.lines.items()],
+                "left_behind": [_left_json(one) for one in left],
             }
         )
     else:
@@ -55,6 +58,9 @@ def lines(as_json: bool) -> None:
             say(f"Remembered: {key}{f' ({mark.adapter})' if mark.adapter else ''}")
             for device, drive_mark in mark.drives.items():
                 say(f"  {device:>3} {drive_mark.text}")
+        for motor in left:
+            say(f"{motor.record.line} device {motor.record.device}: {motor.text}.")
+            say(f"  {motor.advice(motor.record.line)}", to_copy=True)
     for fault in faults:
         say(f"drivepanel: {fault}", err=True)
     if faults:
@@ -85,6 +91,10 @@ def _faults(one: NamedLine) -> Iterator[str]:
 
 def _named_json(one: NamedLine) -> dict[str, Any]:
     return {"name": one.name, "line": one.line, "device": one.device, "profile": one.profile}
+
+
+def _left_json(one: LeftBehind) -> dict[str, Any]:
+    return {"line": one.record.line, "device": one.record.device, **one.as_json()}
 
 
 def _known_json(key: str, mark: LineMark) -> dict[str, Any]:

@@ -13,8 +13,10 @@ import click
 from ..shared.completion import complete_line, complete_profile
 from ..shared.errors import INTERRUPTED, USAGE, Failure, told
 from ..shared.line_argument import LineArgument
+from ..shared.numbers import seconds
 from ..shared.options import json_option
 from ..shared.say import say
+from ..shared.signals import BY_SIGNAL, interrupted_by_signal, never_suspended, signal_name
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -51,14 +53,14 @@ LAST_ADDRESS_HEARD = 255
 @click.option("--force", is_flag=True, help="Replace a file that exists.")
 @click.option(
     "--every",
-    type=click.FloatRange(min=1.0),
+    type=seconds(1.0),
     metavar="S",
     help="Tell what it comes to every S seconds, and not only at the end.",
 )
 @click.option(
     "--for",
     "seconds",
-    type=click.FloatRange(min=0, min_open=True),
+    type=seconds(above=True),
     metavar="S",
     help="Listen for S seconds, else until Ctrl-C.",
 )
@@ -91,7 +93,11 @@ def listen(
     from ..running.listening import HearingRun
     from ..shared.listen_outputs import HeardJson, HeardLines
 
-    with _serial_line(line_to_listen(line_text, PROGRAM_NAME)) as place:
+    with (
+        never_suspended(),
+        interrupted_by_signal() as came,
+        _serial_line(line_to_listen(line_text, PROGRAM_NAME)) as place,
+    ):
         families = Families(known_profiles(), named, remembered_families(place.line.link))
         output = HeardJson(line_text, families) if as_json else HeardLines(families)
         file = _opened_file(pcap_path, line_text, raw=raw, force=force)
@@ -106,7 +112,9 @@ def listen(
             raise
         except KeyboardInterrupt:
             listening.end()
-            raise Failure(f"Ended by Ctrl-C. {listening.text}", INTERRUPTED) from None
+            by = signal_name(came[0]) if came else "Ctrl-C"
+            status = BY_SIGNAL + came[0] if came else INTERRUPTED
+            raise Failure(f"Ended by {by}. {listening.text}", status) from None
         finally:
             if file is not None:
                 file.close()

@@ -13,7 +13,7 @@ import click
 from tui.drive.orders import OrderRefused
 from tui.session.work import Outcome, OutcomeKind
 
-from ..shared.errors import LINE_TROUBLE, REFUSED_HERE, Failure, status_of
+from ..shared.errors import LINE_TROUBLE, REFUSED_HERE, Failure, note_journal, status_of
 from ..shared.options import (
     Target,
     connect_drive,
@@ -60,7 +60,9 @@ def told_journal() -> Journal:
     """A journal whose trouble is said at once, on standard error."""
     from tui.session.journal import Journal
 
-    return Journal(on_trouble=lambda trouble: complain(f"{trouble} The command goes on."))
+    journal = Journal(on_trouble=lambda trouble: complain(f"{trouble} The command goes on."))
+    note_journal(journal)
+    return journal
 
 
 def close_journal(journal: Journal) -> None:
@@ -73,7 +75,7 @@ def close_journal(journal: Journal) -> None:
 
 def moved(journal: Journal) -> bool:
     """Whether a command was sent, answered or not; a reference alone moves nothing."""
-    return any(not entry.why.startswith("reference") for entry in journal.recent)
+    return any(not entry.why.startswith("reference") for entry in journal.sent)
 
 
 def latest_of(console: DriveConsole) -> Snapshot:

@@ -13,6 +13,7 @@ from ..plant.broker import Broker, broker_of, mqtt_password_option
 from ..plant.wish import check_names
 from ..shared.completion import complete_line_or_code
 from ..shared.errors import told
+from ..shared.numbers import check_rate
 from ..shared.options import Target, drives_options, every_option, json_option
 from ..shared.output import print_json
 from ..shared.say import say
@@ -76,6 +77,8 @@ async def _published(
     from ..plant.publishing import Changes, published_to, reading
 
     changes = Changes()
+    for line, wish in zip(opened, wishes, strict=True):
+        check_rate(line.line.link, every, len(wish.on(line)))
     lines = [
         PlantLine(
             wish.name,

@@ -6,6 +6,7 @@ import click
 
 from ..running.motor import Wish, run_motor
 from ..shared.errors import told
+from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
     drive_options,
@@ -26,7 +27,7 @@ from .orders import arm_option, need_arming
 @click.option(
     "--for",
     "seconds",
-    type=click.FloatRange(min=0, min_open=True),
+    type=seconds_range(above=True),
     metavar="S",
     help="End after S seconds.",
 )
@@ -62,7 +63,7 @@ def run(
 ) -> None:
     """Run a motor as long as this command runs; Ctrl-C stops it on its ramp.
 
-    So do SIGTERM, SIGHUP, a closed standard output and the end of --for.
+    So do all other signals that end a program, a closed standard output and the end of --for.
     """
     need_arming(arm, "run starts the motor")
     wish = Wish(

@@ -14,7 +14,6 @@ import click
 
 from ..plant.broker import mqtt_password_option
 from ..plant.wish import PlantWish, check_drives, check_names, plant_wish, read_drives
-from ..running.holding import BY_SIGNAL
 from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
 from ..shared.completion import complete_line
@@ -23,10 +22,12 @@ from ..shared.errors import told
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors
+from ..shared.numbers import SHORTEST_CYCLE, seconds
 from ..shared.options import CONNECT_WITHIN, json_option, profile_of, usual_settings
 from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.served_lines import ServedLine, served_lines
+from ..shared.signals import BY_SIGNAL, never_suspended
 
 
 @click.command()
@@ -44,7 +45,7 @@ from ..shared.served_lines import ServedLine, served_lines
 )
 @click.option(
     "--fresh",
-    type=click.FloatRange(min=0),
+    type=seconds(),
     default=0.0,
     metavar="S",
     help="Answer by what was read up to S seconds ago.",
@@ -70,7 +71,7 @@ from ..shared.served_lines import ServedLine, served_lines
 @mqtt_password_option
 @click.option(
     "--every",
-    type=click.FloatRange(min=0.05),
+    type=seconds(SHORTEST_CYCLE),
     metavar="S",
     help="Cycle time in seconds of what goes to --metrics and --mqtt; 1 unless told otherwise.",
 )
@@ -130,6 +131,7 @@ def serve(
         return text
 
     with ExitStack() as stack:
+        stack.enter_context(never_suspended())
         opened = [_opened(stack, one, plant) for one in served]
         ending = asyncio.run(served_until_signal(opened, wish, plant, service, ready))
     if ending == signal.SIGTERM:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,10 +12,12 @@ import click
 from ..shared.completion import complete_profile
 from ..shared.errors import told
 from ..shared.host_port import host_port, written_host_port
+from ..shared.numbers import FiniteRange
 from ..shared.options import json_option
 from ..shared.output import document, json_text, print_json
 from ..shared.say import say, say_beside
-from ..shared.standard_input import stay_in_background, typed_lines
+from ..shared.signals import handled, never_suspended
+from ..shared.standard_input import typed_lines
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, FaultRates, Simulation
@@ -78,7 +79,7 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 @click.option(
     "--run",
     "run_hz",
-    type=float,
+    type=FiniteRange(-1000, 1000),
     default=0.0,
     metavar="HZ",
     help="Motors run at this frequency, by terminals or as another master left them.",
@@ -113,9 +114,7 @@ def simulate(
         drives, baud, form, any_settings, real_time, sets, protects, faults, seed, run_hz
     )
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    with simulation:
+    with never_suspended(), handled(lambda *_: stop.set()), simulation:
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
         specs = [drive.spec for drive in simulation.drives]
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
@@ -124,7 +123,6 @@ def simulate(
             print_json({"event": "ready", "line": where, "drives": found}, compact=True)
         else:
             say(f"Ready: {names} on {where}. Ctrl-C ends it.")
-        stay_in_background()
         inputs = (simulation, as_json)
         threading.Thread(target=_follow, args=inputs, name="inputs", daemon=True).start()
         stop.wait()
@@ -266,7 +264,7 @@ def _rates(faults: tuple[str, ...]) -> FaultRates:
         if kind not in FAULT_KINDS:
             raise click.UsageError(f"{text!r}: a line fault is one of {', '.join(FAULT_KINDS)}.")
         try:
-            rates[kind] = float(rate)
-        except ValueError:
+            rates[kind] = FiniteRange(0, 1).convert(rate, None, None)
+        except click.BadParameter:
             raise click.UsageError(f"{text!r}: write KIND=RATE, for example late=0.15.") from None
     return replace(FaultRates(), **rates)  # type: ignore[arg-type]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tui.drive.orders import chart_in_force, follows_from
+from tui.bus.errors import LineError
+from tui.drive.fault_reset import not_in_command, reset_codes, reset_follows
+from tui.drive.reset_text import MAY_START
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, told
 from ..shared.messages import Messages
@@ -91,7 +94,7 @@ def reference(
     _ordered(target, read_only, work, as_json=as_json)
 
 
-@click.command()
+@click.command(help=f"Reset a drive's fault. Its cause must be gone.\n\n{MAY_START}")
 @line_argument
 @drive_options
 @arm_option
@@ -105,17 +108,11 @@ def reset(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Reset a drive's fault. Its cause must be gone.
-
-    It commands no run; a run command that waits at the terminals may start the motor.
-    """
     need_arming(arm, "reset writes the drive's command word and ends its fault")
 
     async def work(console: DriveConsole, messages: Messages) -> str:
-        session = console.session
-        chart = chart_in_force(session.profile, session.image.raws)
-        if chart is not None and (besides := follows_from(chart, "reset")):
-            messages.tell(besides)
+        if latest_of(console).state.kind == "fault":
+            messages.tell(await _follows(console))
         outcome = await carried_out(console.commander, lambda: console.commander.order("reset"))
         await _out_of_fault(console, outcome)
         name, _, came = outcome.text.partition(":")
@@ -123,6 +120,15 @@ def reset(
         return f"{name}: {latest_of(console).state.headline}{';' * bool(now)}{now}"
 
     _ordered(target, read_only, work, as_json=as_json)
+
+
+async def _follows(console: DriveConsole) -> str:
+    """The motor's reaction to the reset, with the inputs that are closed now."""
+    profile, current = console.session.profile, {}
+    with suppress(LineError):  # what cannot be read is reported as not read
+        found = await console.read(reset_codes(profile))
+        current = {code: r.raw for code, r in found.items() if r.raw is not None}
+    return reset_follows(profile, {**console.session.image.raws, **current}, current)
 
 
 async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
@@ -138,6 +144,8 @@ async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
     if latest.error:
         raise Failure(latest.error, LINE_TROUBLE)
+    if why := not_in_command(console.session.profile, console.session.image.raws):
+        raise Failure(why, DRIVE_REFUSED)
     raise Failure(
         f"The drive stays in {latest.state.headline}: its cause is not gone. Look at the machine.",
         DRIVE_REFUSED,

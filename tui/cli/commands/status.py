@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tui.drive.plain import plain
-
 from ..shared.completion import complete_line
-from ..shared.drive_status import drive_in_a_line, status_json, status_of_drive
+from ..shared.drive_status import status_json, status_of_drive
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, told
+from ..shared.errors import told
 from ..shared.every_drive import USUAL_SEARCH, every_drive
 from ..shared.line_argument import takes_line_as
 from ..shared.options import (
@@ -24,9 +22,8 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.say import say
 from ..shared.several_lines import FirstOfLines, LineWish, lines_wished, on_lines
-from ..shared.status_lines import StatusWish, say_status, status_of_lines
+from ..shared.status_lines import StatusWish, say_in_a_line, say_status, status_of_lines
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
@@ -93,10 +90,10 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
         sessions.append(session)
         found = await status_of_drive(session, opened)
         if wanted.every and not wanted.as_json:
-            say(plain(drive_in_a_line(found)))
+            say_in_a_line(found)
         elif not wanted.as_json:
             say_status(found)
-        return status_json(target.line_text, found), DONE
+        return status_json(target.line_text, found), found.status
 
     async def work(opened: OpenLine) -> int:
         drives = target

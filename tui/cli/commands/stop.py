@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -12,6 +12,7 @@ from ..running.stop_targets import StoppableDrive, first_stopped, found_at, reme
 from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
 from ..shared.left_alone import LeftAlone, look_after
+from ..shared.left_behind import forget_start
 from ..shared.options import (
     Target,
     drives_options,
@@ -32,6 +33,11 @@ if TYPE_CHECKING:
 
 USUAL_ADDRESSES = "1-10"
 STOP_POLL_INTERVAL = 0.05
+NOT_PROVED = (
+    "a stop word was sent, but it is not known if the motor stopped. The drive does not identify"
+    " itself. Read as {}, it is at standstill. Look at the machine, or repeat with -p."
+)
+"""The text for a drive whose family is neither named nor proved."""
 
 
 @click.command()
@@ -115,14 +121,23 @@ def has_order(session: DriveSession, order: OrderId) -> bool:
     return any(one.id == order for chart in charts for one in chart.orders)
 
 
-async def ended(stopper: Stopper, device: int) -> StopReport:
-    """The report of a stop that was ordered, once nothing more is awaited."""
-    from tui.session.command.stop_report import Phase
+async def ended(
+    stopper: Stopper, device: int, warn: Callable[[str], None] = lambda _: None
+) -> StopReport:
+    """The report of a stop that was ordered, once nothing more is awaited.
 
+    `warn` gets at once why a motor is not going to stop, as far as is known.
+    """
+    from tui.session.command.stop_report import OVER, Phase
+
+    warned = False
     while True:
         report = stopper.reports[device]
-        if report.phase in (Phase.STOPPED, Phase.FAILED):
+        if report.phase in OVER:
             return report
+        if report.phase is Phase.UNHEEDED and not warned:
+            warned = True
+            warn(report.text)
         await asyncio.sleep(STOP_POLL_INTERVAL)
 
 
@@ -161,13 +176,18 @@ async def _seen_through(
     # a drive without the wished way is stopped all the same; it is told by which
     way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
     stopper.stop([session], way, by="drivepanel stop")
-    report = await ended(stopper, session.device)
+    who = f"Device {session.device}, {found.name}"
+    report = await ended(stopper, session.device, lambda text: complain(f"{who}: {text}"))
     if telling.as_json:
         await LeftAlone(session, "", goes_on=True).learn()
-    who = f"Device {session.device}, {found.name}"
+    if report.phase is Phase.STOPPED and not found.proved:
+        text = f"Device {session.device}: {NOT_PROVED.format(found.name)}"
+        telling.failed(session.device, None, text, DRIVE_REFUSED)
+        return DRIVE_REFUSED
     if report.phase is Phase.STOPPED:
         lacks = "" if way == order else f" (it has no {order}: ramp stop)"
         telling.stopped(session, f"{who}: {report.text}{lacks}.")
+        await asyncio.to_thread(forget_start, session)
         return 0
     status = await _why(session)
     telling.failed(session.device, session.profile.id, f"{who}: {report.text}", status)

@@ -16,6 +16,7 @@ from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
 from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, told
 from ..shared.found_drives import find_drives
+from ..shared.numbers import check_rate
 from ..shared.options import (
     Target,
     drives_options,
@@ -132,6 +133,8 @@ def watch(
         found, seen.missing = await find_drives(pairs, as_json=as_json)
         watched = [_watched(session, one, codes) for one, session in found]
         drives = sum(len(one.on(opened)) for opened, one in pairs)
+        for opened, one in pairs:
+            check_rate(opened.line.link, every, len(one.on(opened)))
         several = Several(lines=len(wishes) > 1, drives=drives > 1)
         with ExitStack() as stack:
             outputs: list[Output] = [

@@ -20,6 +20,7 @@ from .parts import (
     FaultTold,
     FirstWordTold,
     HeardTold,
+    LeftBehindDocument,
     ModelTold,
     OldTimeoutTold,
     StateTold,
@@ -99,7 +100,9 @@ class StatusTold(OfDriveTold, kw_only=True):
     why_not: str | None
     control: ControlTold | None
     watch: OldTimeoutTold | None
+    left_behind: LeftBehindDocument | None
     values: dict[str, ValueTold | None]
+    unread: list[str]
 
 
 class RunTold(DocumentTold, kw_only=True):

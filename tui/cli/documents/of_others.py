@@ -7,6 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from .of_drives import DocumentTold
+from .parts import LeftBehindDocument
 
 
 class PortTold(DocumentTold, kw_only=True):
@@ -50,6 +51,13 @@ class KnownLineTold(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     drives: list[KnownDriveTold]
 
 
+class LeftOnLineDocument(LeftBehindDocument, kw_only=True):
+    """The same with its place."""
+
+    line: str
+    device: int
+
+
 class LinesTold(DocumentTold, kw_only=True):
     """`lines`: the names, what is wrong with the settings file, and what is remembered."""
 
@@ -58,6 +66,7 @@ class LinesTold(DocumentTold, kw_only=True):
     faults: list[str]
     lines: list[NamedLineTold]
     known: list[KnownLineTold]
+    left_behind: list[LeftOnLineDocument]
 
 
 class ProfileTold(DocumentTold, kw_only=True):

@@ -14,6 +14,17 @@ class PartTold(msgspec.Struct, forbid_unknown_fields=True):
     """Something whose every field is told here."""
 
 
+class LeftBehindDocument(PartTold):
+    """A motor whose program has exited, or does not answer, and that no program commands."""
+
+    program: str
+    pid: int
+    exited: bool
+    left_running: bool
+    since: str
+    text: str
+
+
 class ValueTold(PartTold):
     """One value; `raw` and `value` are null where there is none."""
 
@@ -153,6 +164,7 @@ class FaultTold(PartTold):
     name: str | None
     causes: list[str]
     checks: list[str]
+    ruled_out: list[ExcludedPart]
     look_at: list[LookTold]
     confidence: str | None
     source: str | None
@@ -165,9 +177,18 @@ class AlarmTold(PartTold):
     name: str
     causes: list[str]
     checks: list[str]
+    ruled_out: list[ExcludedPart]
     look_at: list[LookTold]
     confidence: str | None
     source: str | None
+
+
+class ExcludedPart(PartTold):
+    """A cause or a check that the value of a parameter rules out."""
+
+    text: str
+    code: str
+    reason: str
 
 
 class LookTold(PartTold):
@@ -186,6 +207,7 @@ class ResetTold(PartTold):
     confidence: str
     possible_now: bool | None
     wait_s: float | None
+    follows: str
 
 
 class ControlTold(PartTold):

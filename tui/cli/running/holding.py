@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import signal
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..commands.orders import complain
+from ..shared.signals import BY_SIGNAL
 from .ending import Ending
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ Tell = Callable[[str, int, str], None]
 """Is given an event, a device and a sentence."""
 
 HOLD_POLL_INTERVAL = 0.2
-BY_SIGNAL = 128
-"""The exit status of a command that a signal ended, less the signal's number."""
 
 
 @dataclass(slots=True)
@@ -134,9 +132,8 @@ def _asked_by(opened: OpenLine, tell: Tell) -> Iterator[Holding]:
 
 
 def _exit_by_signal(ending: Ending) -> None:
-    name = ending.why.removeprefix("ended by ")
-    if name in signal.Signals.__members__:
-        raise click.exceptions.Exit(BY_SIGNAL + signal.Signals[name])
+    if ending.number:
+        raise click.exceptions.Exit(BY_SIGNAL + ending.number)
 
 
 def _complain(line_name: str, _event: str, _device: int, text: str) -> None:

@@ -23,7 +23,7 @@ from ..commands.orders import (
 )
 from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
 from ..shared.drive_status import fault_text
-from ..shared.errors import DRIVE_REFUSED, REFUSED_HERE, Failure
+from ..shared.errors import DRIVE_REFUSED, ENDED_AFTER_WRITING, REFUSED_HERE, Failure
 from ..shared.options import Target
 from .ending import Ending
 from .telling import RunTelling
@@ -104,16 +104,14 @@ class Run:
     async def _start(self) -> None:
         commander, wish = self.console.commander, self.wish
         arm_drive(self.console)
+        self.watch = await watch_of(self.fleet, self.console)
         if wish.take_control:
             await self._take_control()
-        if wish.reference is not None:
-            text = wish.reference
-            outcome = await carried_out(commander, lambda: commander.refer(text))
-            self.telling.tell("reference", outcome.text)
-        self.watch = await watch_of(self.fleet, self.console)
         self.ordering = True
         try:
-            outcome = await carried_out(commander, lambda: commander.order(wish.order))
+            outcome = await carried_out(
+                commander, lambda: commander.run(wish.order, wish.reference)
+            )
         except Failure as failure:
             self.ordering = False
             way = way_to_take(self.console.session)
@@ -122,6 +120,8 @@ class Run:
             self.ordering = False
             raise
         self.ordering = False
+        if wish.reference is not None:
+            self.telling.tell("reference", commander.given.reference_text)
         self.telling.tell("order", outcome.text)
 
     async def _take_control(self) -> None:
@@ -133,7 +133,8 @@ class Run:
             raise Failure(f"{name} has no control to take: run without that option.", REFUSED_HERE)
         if found.taken:
             return
-        commander = self.console.commander
+        commander, wish = self.console.commander, self.wish
+        await carried_out(commander, lambda: commander.check_run(wish.order, wish.reference))
         outcome = await carried_out(commander, lambda: commander.order("take-control"))
         text = (
             f"{outcome.text}. It stays with the line after this: {GIVE_BACK_OPTION} gives it back."
@@ -176,7 +177,7 @@ class Run:
         return reading.number if reading is not None else None
 
     def _stopped_by_itself(self, latest: Snapshot) -> tuple[str, int]:
-        """Why the motor no longer runs, and the status: 4 after a trip, 5 where it was stopped."""
+        """Why the motor no longer runs, and the status: 4 after a trip, 6 if it was stopped."""
         session = self.console.session
         who = f"Device {session.device}"
         if fault := fault_text(latest.state):
@@ -189,7 +190,8 @@ class Run:
             by = f"by another program or master on the line: {lost}"
         elif latest.state.local:
             by = "at its terminals or keypad"
-        return f"{who} no longer runs: {latest.state.headline}. It was stopped {by}.", REFUSED_HERE
+        text = f"{who} no longer runs: {latest.state.headline}. It was stopped {by}."
+        return text, ENDED_AFTER_WRITING
 
     async def _bring_to_rest(self) -> None:
         """Stop the motor and see it stand; on a lost line as soon as that is back.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from ..shared.errors import LINE_TROUBLE, Failure
 from ..shared.host_port import why_not_served, written_host_port
 from ..shared.left_alone import say_farewells
 from ..shared.line_argument import mind_the_drive
+from ..shared.numbers import check_rate
 from ..shared.options import Target
 from ..shared.say import say
 from .ending import Ending
@@ -86,7 +86,7 @@ async def served_until_signal(
         finally:
             watch.cancel()
     await asyncio.to_thread(close_journal, journal)
-    return int(signal.Signals[ending.why.removeprefix("ended by ")])
+    return ending.number
 
 
 async def _served(
@@ -121,6 +121,8 @@ async def _published(
 
     places, changes = ServedAt(), Changes()
     signs: list[Sign] = [gate.sign for gate in gates] or [no_sign for _ in lines]
+    for one in lines:
+        check_rate(one.opened.line.link, plant.every, len(one.drives))
     read = [
         PlantLine(
             one.name,

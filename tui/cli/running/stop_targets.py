@@ -37,6 +37,8 @@ class StoppableDrive:
 
     session: DriveSession
     name: str
+    proved: bool = True
+    """True if the user, a recorded start or the drive itself named its family."""
 
 
 async def first_stopped(
@@ -45,6 +47,7 @@ async def first_stopped(
     """Send the first word, then find out what the drive is; both are told."""
     from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import ExchangeError, NoAnswer
+    from tui.drive.first_stop import families_beside
     from tui.drive.profile import library
     from tui.drive.profile.stop_facts import stop_facts
     from tui.session.command.first_stop import stop_first
@@ -53,6 +56,8 @@ async def first_stopped(
     device = target.device
     typed = library.load(target.profile_id).id if target.profile_id is not None else None
     families = await asyncio.to_thread(stop_facts)
+    if typed is not None:
+        families = families_beside(families, typed)
     before = (await remembered(opened)).get(device)
     known = {typed, *(one.id for one in families)}
     named = [one for one in (typed, before) if one is not None and one in known]
@@ -96,25 +101,31 @@ def _by_what_is_known(
     named: Sequence[str],
     first: FirstStop,
 ) -> StoppableDrive | None:
-    """The drive by what it says of itself, else as it was named, else by the word that it took."""
+    """The drive by the user's profile, else by its own words, else by the word that it took.
+
+    The user's profile is final unless the drive identifies itself as one of another family.
+    """
     from tui.drive.profile import library
     from tui.session.connect.contradiction import contradiction
 
+    if typed is not None:
+        own = identity.profile or typed
+        if wrong := contradiction(identity, library.load(typed)):
+            complain(f"{wrong} It is stopped as {library.load(own).name}.")
+            return _stoppable(opened, identity, [library.load(own)])
+        return _stoppable(opened, identity, [library.load(typed)])
     for one in named:
         profile = library.load(one)
-        wrong = contradiction(identity, profile)
-        if wrong and one == typed:
-            own = identity.profile and f"as {library.load(identity.profile).name}"
-            complain(f"{wrong} It is stopped {own or 'by the word that it took'}.")
         unsaid = identity.profile is None and first.may_be(one)
-        if not wrong and (one in identity.candidates or unsaid):
+        if not contradiction(identity, profile) and (one in identity.candidates or unsaid):
             return _stoppable(opened, identity, [profile])
     if identity.profile or identity.candidates:
         return _session(opened, identity, None)
     if first.taken is None or not first.followers:
         return None
     found = _stoppable(opened, identity, [library.load(first.followers[0])])
-    return StoppableDrive(found.session, " or ".join(one.name for one in first.taken.families))
+    name = " or ".join(one.name for one in first.taken.families)
+    return StoppableDrive(found.session, name, proved=False)
 
 
 async def remembered(opened: OpenLine) -> dict[int, str]:

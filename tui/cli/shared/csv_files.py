@@ -18,7 +18,7 @@ from tui.drive.plain import plain_cells
 
 from .errors import USAGE, Failure
 
-_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|M|G)i?B?", re.IGNORECASE)
+_SIZE = re.compile(r"(\d{1,9}(?:\.\d{1,9})?)\s*(k|M|G)i?B?", re.IGNORECASE)
 _FACTORS = {"k": 1_000, "m": 1_000_000, "g": 1_000_000_000}
 DAY = "day"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,7 +11,10 @@ from typing import TYPE_CHECKING, Any
 from tui.drive.values import NOT_AVAILABLE
 
 from .control import control_json, control_row
+from .errors import DONE, LINE_TROUBLE, Failure
 from .fault_output import FaultFinding, alarm_json, fault_json, fault_rows, find_out
+from .left_behind import LeftBehind, left_behind
+from .patience import patience, read_until
 from .watch_rows import watch_json, watch_text
 
 if TYPE_CHECKING:
@@ -20,6 +25,14 @@ if TYPE_CHECKING:
     from tui.session.drive_state import DriveState
     from tui.session.reading import Reading
     from tui.session.timeout_told import TimeoutWatch
+
+log = logging.getLogger(__name__)
+
+STATUS_WITHIN = 6.0
+"""Seconds in which the words of a drive are read; more on a slow line. With the time to open the
+line and to identify the drive, `status` ends within 10 s."""
+FINDING_WITHIN = 1.0
+"""Seconds more in which the words are read to which a fault points."""
 
 SHOWN_QUANTITIES: dict[Quantity, str] = {
     "output_frequency": "Output frequency",
@@ -48,8 +61,17 @@ class Status:
     refused: str
     """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
+    left: LeftBehind | None = None
+    """Its motor, if the program that started it has exited and no program commands it."""
     finding: FaultFinding | None = None
     """What its fault or its alarm points at; None where it has neither."""
+    unread: Sequence[str] = ()
+    """Codes of words that could not be read in time."""
+
+    @property
+    def status(self) -> int:
+        """The exit status: 3 if something could not be read."""
+        return LINE_TROUBLE if self.unread else DONE
 
 
 def shown_codes(profile: Profile) -> list[str]:
@@ -84,7 +106,11 @@ def fault_text(state: DriveState) -> str:
 
 
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
-    """Read all that `status` tells. Raises the line's errors."""
+    """Read all that `status` shows, and mark what does not come within `STATUS_WITHIN`.
+
+    Raises the line's errors if nothing of it comes.
+    """
+    from tui.bus.errors import ExchangeError
     from tui.drive.channel import switch_texts
     from tui.session.drive_state import drive_state
     from tui.session.fleet import Fleet
@@ -95,17 +121,31 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     profile = session.profile
     fleet = Fleet(opened.line, Journal())
     console = fleet.take(session)
+    rules = profile.data.communication_fault
+    end = asyncio.get_running_loop().time() + patience(opened.line, STATUS_WITHIN)
+    watch = finding = None
     try:
-        readings = await console.read(_codes(profile))
-        watch = await watch_of(fleet, console)
+        readings, unread = await read_until(console, _codes(profile), end)
+        try:
+            async with asyncio.timeout_at(end):
+                watch = await watch_of(fleet, console)
+        except (Failure, TimeoutError):
+            unread.append(rules.timeout if rules is not None else "")
         state = drive_state(profile, readings)
-        finding = await find_out(console, state, readings)
+        try:
+            async with asyncio.timeout_at(end + FINDING_WITHIN):
+                finding = await find_out(console, state, readings)
+        except (ExchangeError, TimeoutError) as error:
+            log.warning("advice on device %s was not read: %s", session.device, error)
     finally:
         fleet.forget()
     channels = _channels(profile, readings, state)
     switches = switch_texts(profile, session.image.raws)
     refused = _refused(session)
-    return Status(session, state, readings, channels, switches, refused, watch, finding)
+    left = await asyncio.to_thread(left_behind, session, state.motion)
+    return Status(
+        session, state, readings, channels, switches, refused, watch, left, finding, unread
+    )
 
 
 def _codes(profile: Profile) -> list[str]:
@@ -176,7 +216,9 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
         "why_not": status.refused or None,
         "control": control_json(status.session),
         "watch": watch_json(watch),
+        "left_behind": status.left.as_json() if status.left else None,
         "values": values_json(status.session.profile, status.readings),
+        "unread": list(status.unread),
     }
 
 
@@ -206,6 +248,7 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         ("Device", f"{status.session.device}, {profile.name}"),
         ("State", f"{state.headline} ({state.name})"),
         ("Direction", state.direction or ""),
+        *([("Left behind", status.left.sentence(status.session.line_text))] if status.left else []),
         ("Fault", fault_text(state) or "none"),
         *([] if of_alarm else found),
         ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
@@ -216,11 +259,14 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         ("Comm. time-out", _time_out_text(status)),
         *control_row(status.session),
         *shown_values(profile, status.readings).items(),
+        *([("Not read", ", ".join(status.unread))] if status.unread else []),
     ]
 
 
 def _time_out_text(status: Status) -> str:
-    told = status.session.timeout
+    told, rules = status.session.timeout, status.session.profile.data.communication_fault
+    if rules is not None and rules.timeout in status.unread:
+        return f"not known: {rules.timeout} was not read"
     if told is not None and not told.known:
         return "not told by this drive: it may act when nobody asks it"
     return watch_text(status.watch)

@@ -21,7 +21,7 @@ async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any
     done ends only what is said of the drives.
     """
     from .left_alone import say_farewells
-    from .signals import cancelled_by_signal
+    from .signals import BY_SIGNAL, cancelled_by_signal
 
     task = asyncio.current_task()
     assert task is not None
@@ -31,7 +31,7 @@ async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any
         except asyncio.CancelledError:
             if not came:
                 raise
-            raise click.exceptions.Exit(128 + came[0]) from None
+            raise click.exceptions.Exit(BY_SIGNAL + came[0]) from None
         finally:
             try:
                 await asyncio.gather(*(say_farewells(one) for one in lines))

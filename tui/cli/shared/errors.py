@@ -8,18 +8,27 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import click
 
 from .say import say
 
-DONE, DIFFERENT, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = range(6)
+if TYPE_CHECKING:
+    from tui.session.journal import Journal
+
+DONE, DIFFERENT, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE, ENDED_AFTER_WRITING = range(7)
 OWN_ERROR = 70
 INTERRUPTED = 130
+NOTHING_SENT = (USAGE, REFUSED_HERE)
+"""Statuses that promise that nothing was written."""
+WRITES_NAMED = 6
+_JOURNALS = "drivepanel.journals"
 
 P = ParamSpec("P")
 R = TypeVar("R")
+ClickError = click.ClickException | click.exceptions.Exit
+"""The two ways in which a command ends with a status of its own."""
 
 
 class Failure(click.ClickException):
@@ -65,7 +74,14 @@ def plain_errors(*, as_json: bool) -> Iterator[None]:
 def status_of(error: Exception) -> int | None:
     """The exit status of a known error, or None for one that nobody foresaw."""
     from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
-    from tui.drive.errors import DriveError, ProfileError, UnknownParameter, UnknownProfile
+    from tui.drive.errors import (
+        DriveError,
+        ProfileError,
+        UnitRefused,
+        UnknownParameter,
+        UnknownProfile,
+    )
+    from tui.session.command.access import NotFollowed
     from tui.session.settings.write import NotTaken
     from tui.simulator.errors import SimulatorError
 
@@ -74,9 +90,11 @@ def status_of(error: Exception) -> int | None:
         (UnknownProfile, USAGE),
         (UnknownParameter, USAGE),
         (ProfileError, USAGE),
+        (UnitRefused, USAGE),
         (SimulatorError, USAGE),
         (RequestRefused, REFUSED_HERE),
         (NotTaken, DRIVE_REFUSED),
+        (NotFollowed, DRIVE_REFUSED),
         (DriveError, REFUSED_HERE),
         (DeviceException, DRIVE_REFUSED),
         (LineError, LINE_TROUBLE),
@@ -105,6 +123,32 @@ def failure_of(error: Exception) -> Failure:
     return Failure(str(error), status)
 
 
+def note_journal(journal: Journal) -> None:
+    """Let the end of this command know of the writes in a journal."""
+    if (context := click.get_current_context(silent=True)) is not None:
+        context.meta.setdefault(_JOURNALS, []).append(journal)
+
+
+def _writes_text() -> str:
+    """A sentence with what this command has written so far; empty if it has written nothing."""
+    context = click.get_current_context(silent=True)
+    journals: list[Journal] = [] if context is None else context.meta.get(_JOURNALS, [])
+    written = [f"{one.code} = {one.new}" for journal in journals for one in journal.sent]
+    names = list(dict.fromkeys(written))
+    more = f" and {len(names) - WRITES_NAMED} more" if len(names) > WRITES_NAMED else ""
+    return f"Sent by this command: {', '.join(names[:WRITES_NAMED])}{more}." if names else ""
+
+
+def _with_writes(error: ClickError) -> ClickError:
+    """The same end, with a status that promises no less than is true if something was written."""
+    if error.exit_code not in NOTHING_SENT or not (text := _writes_text()):
+        return error
+    if isinstance(error, click.ClickException):
+        return Failure(f"{error.format_message()}\n{text}", ENDED_AFTER_WRITING)
+    say(f"drivepanel: {text}", err=True)
+    return click.exceptions.Exit(ENDED_AFTER_WRITING)
+
+
 def told(command: Callable[P, R]) -> Callable[P, R]:
     """Turn what a command raises into a message and an exit status; never a traceback."""
 
@@ -115,7 +159,11 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
             sys.stdout.flush()  # here, where a closed pipe can still be told from an error
             _tell_lost_output(command)
             return result
-        except (click.ClickException, click.exceptions.Exit, click.Abort):
+        except click.Abort:
+            raise
+        except (click.ClickException, click.exceptions.Exit) as error:
+            if (truly := _with_writes(error)) is not error:
+                raise truly from error
             raise
         except BrokenPipeError:
             # the reader of our output is gone: nothing is left to be said to it
@@ -133,6 +181,6 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
                     OWN_ERROR,
                 ) from error
             logging.getLogger(__name__).info("%s: %s", type(error).__name__, error)
-            raise Failure(str(error), status) from error
+            raise _with_writes(Failure(str(error), status)) from error
 
     return wrapped

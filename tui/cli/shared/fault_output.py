@@ -6,7 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tui.drive.hints import TRUST, ResetText, alarms_on, codes_to_read, reset_ready, reset_text
+from tui.drive.fault_reset import reset_codes, reset_follows
+from tui.drive.hints import (
+    TRUST,
+    FaultAdvice,
+    ResetText,
+    advice,
+    alarms_on,
+    codes_to_read,
+    reset_ready,
+    reset_text,
+)
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -29,6 +39,12 @@ class FaultFinding:
     """The name of the alarm that is told of, where there is no fault."""
 
     @property
+    def advice(self) -> FaultAdvice | None:
+        """The causes and checks that the values leave."""
+        raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
+        return advice(self.profile, self.hint, raws, latest=True) if self.hint else None
+
+    @property
     def ready(self) -> bool | None:
         """Whether the drive says that a reset can work now; None where it does not tell."""
         raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
@@ -39,7 +55,12 @@ class FaultFinding:
         from tui.drive.profile.schema import FaultHelp
 
         help_ = self.hint if isinstance(self.hint, FaultHelp) else None
-        return reset_text(help_, self.ready, RESET_BY)
+        return reset_text(help_, self.ready, RESET_BY, self.follows())
+
+    def follows(self) -> str:
+        """The motor's reaction to a reset now, with the inputs that are closed."""
+        raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
+        return reset_follows(self.profile, raws, raws)
 
 
 async def find_out(
@@ -52,12 +73,13 @@ async def find_out(
     profile = console.session.profile
     if state.kind == "fault" or state.fault is not None:
         help_ = profile.guide.fault(state.fault.raw if state.fault else None)
-        found = await console.read(codes_to_read(profile, help_))
+        codes = [*codes_to_read(profile, help_), *reset_codes(profile)]
+        found = await console.read(list(dict.fromkeys(codes)))
         return FaultFinding(profile, help_, found)
     raws = {code: r.raw for code, r in readings.items() if r.raw is not None}
     for word, bit, name in alarms_on(profile, raws):
         if (hint := profile.guide.alarm(word, bit)) is not None:
-            codes = [look.code for look in hint.look_at]
+            codes = codes_to_read(profile, hint)
             return FaultFinding(profile, hint, await console.read(codes) if codes else {}, name)
     return None
 
@@ -75,8 +97,7 @@ def fault_json(state: DriveState, found: FaultFinding | None) -> dict[str, Any] 
     hint = found.hint if found is not None and not found.alarm else None
     return {
         **told,
-        "causes": list(hint.probable) if hint else [],
-        "checks": list(hint.check) if hint else [],
+        **_advice_json(found if hint else None),
         "look_at": _look_at_json(found) if found and hint else [],
         "confidence": hint.confidence if hint else None,
         "source": hint.source if hint else None,
@@ -91,11 +112,23 @@ def alarm_json(found: FaultFinding | None) -> dict[str, Any] | None:
     hint = found.hint
     return {
         "name": found.alarm,
-        "causes": list(hint.probable) if hint else [],
-        "checks": list(hint.check) if hint else [],
+        **_advice_json(found),
         "look_at": _look_at_json(found) if hint else [],
         "confidence": hint.confidence if hint else None,
         "source": hint.source if hint else None,
+    }
+
+
+def _advice_json(found: FaultFinding | None) -> dict[str, Any]:
+    left = found.advice if found is not None else None
+    return {
+        "causes": list(left.probable) if left else [],
+        "checks": list(left.check) if left else [],
+        "ruled_out": [
+            {"text": one.text, "code": one.code, "reason": one.reason} for one in left.excluded
+        ]
+        if left
+        else [],
     }
 
 
@@ -120,6 +153,7 @@ def _reset_json(found: FaultFinding) -> dict[str, Any]:
         "confidence": "practice",
         "possible_now": found.ready,
         "wait_s": help_.wait_s if help_ else None,
+        "follows": found.follows(),
     }
 
 
@@ -128,12 +162,14 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
     if found is None:
         return []
     rows: list[tuple[str, str]] = []
-    hint = found.hint
-    if hint is not None:
-        probably = f"{'; '.join(hint.probable)} ({TRUST[hint.confidence]})"
+    hint, left = found.hint, found.advice
+    if hint is not None and left is not None:
+        causes = "; ".join(left.probable) or "no cause is left"
+        probably = f"{causes} ({TRUST[left.confidence]})"
         rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
-        if hint.check:
-            rows.append(("  check", f"{'; '.join(hint.check)} ({TRUST['practice']})"))
+        if left.check:
+            rows.append(("  check", f"{'; '.join(left.check)} ({TRUST['practice']})"))
+        rows += [("  ruled out", f"{one.text}: {one.reason}") for one in left.excluded]
         for look in hint.look_at:
             reading = found.readings.get(look.code)
             value = f"{reading.text} {reading.unit}".rstrip() if reading else "-----"

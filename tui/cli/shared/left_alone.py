@@ -15,7 +15,7 @@ from .say import say
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.timeout_told import Timeout, TimeoutWatch
+    from tui.session.timeout_told import Timeout
 
 TOLD_WITHIN = 3.0
 """Seconds in which a drive tells its time-out at the end of a command, on a quick line."""
@@ -79,7 +79,7 @@ def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
             f"\nTo ask it on: {hold_text(session, line_text)}."
         )
     watch = found.watch
-    if watch is None or not watch.active or not _acts(watch):
+    if watch is None or not watch.active:
         return ""
     does = watch.reaction.does.rstrip(".") if watch.reaction else "its own reaction follows"
     runs = "" if watch.sure else " (when it begins is in no document)"
@@ -96,11 +96,6 @@ def hold_text(session: DriveSession, line_text: str) -> str:
     if session.known_identity.profile != session.profile.id:
         words += ["-p", session.profile.id]
     return " ".join(words)
-
-
-def _acts(watch: TimeoutWatch) -> bool:
-    """Whether anything follows: a lost line may be set to go unnoticed."""
-    return watch.reaction is None or not watch.reaction.never_set
 
 
 def timeout_json(found: Timeout) -> dict[str, Any] | None:

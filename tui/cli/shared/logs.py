@@ -16,6 +16,8 @@ from tui.drive.plain import plain
 from tui.session.paths import state_folder
 from tui.session.stored import make_folder
 
+from .signals import take_no_signals
+
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
 LEVELS = (logging.INFO, logging.DEBUG)
@@ -41,6 +43,9 @@ class Later(QueueHandler):
         with suppress(Full):
             self._entries.put_nowait(record)
 
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Lose the entry: logging's own way is a traceback on standard error."""
+
     def close(self) -> None:
         """Wait a moment for what is not on the disk yet."""
         atexit.unregister(self.close)
@@ -50,6 +55,7 @@ class Later(QueueHandler):
         super().close()
 
     def _work(self) -> None:
+        take_no_signals()
         while (entry := self._entries.get()) is not None:
             self._to.handle(entry)
         self._to.close()

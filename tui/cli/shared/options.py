@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
@@ -14,7 +15,9 @@ from .devices import CommandFunction, Option, device_option, several_devices_opt
 from .ending import to_its_end
 from .line_argument import mind_the_drive, mind_the_line, takes_line
 from .looking_after import guard_motors
+from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
 from .say import say
+from .signals import never_suspended
 from .silence import about_silence
 
 if TYPE_CHECKING:
@@ -35,7 +38,7 @@ read_only_option = click.option("--read-only", is_flag=True, help="Write nothing
 
 every_option = click.option(
     "--every",
-    type=click.FloatRange(min=0.05),
+    type=seconds(SHORTEST_CYCLE),
     default=1.0,
     show_default=True,
     metavar="S",
@@ -59,7 +62,7 @@ profile_option = profile_of("Profile of the drive; it must match the drive's ide
 rated_current_option = click.option(
     "--rated-current",
     "rated_current",
-    type=float,
+    type=FiniteRange(0, 10000, min_open=True),
     metavar="A",
     help="Rated current of the drive in A, for families that tell currents in %.",
 )
@@ -94,7 +97,7 @@ force_profile_option = click.option(
 
 hold_option = click.option(
     "--hold",
-    type=click.FloatRange(min=0, min_open=True),
+    type=seconds(above=True),
     metavar="S",
     help="Then ask the drive on for S seconds, so that its communication time-out does not run"
     " out; its own protection against a lost line is off meanwhile.",
@@ -165,19 +168,24 @@ def on_line(
     text = where if isinstance(where, str) else where.line_text
     usual = None if isinstance(where, str) else usual_settings(where.profile_id)
     program = click.get_current_context().info_name or "drivepanel"
-    opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual, program=program)
-    if opened.line.facts.voice is not None and opened.line.facts.others:
-        say(f"drivepanel: {opened.line.state.reason}", err=True)
-    guard_motors(opened)
-    try:
-        mind_the_line(opened)
-        return asyncio.run(to_its_end([opened], lambda: work(opened)))
-    except NoAnswer as error:
-        if not (hint := about_silence(opened, text, by_profile=usual is not None)):
-            raise
-        raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
-    finally:
-        opened.close()
+    with ExitStack() as stack:
+        stack.enter_context(never_suspended())
+        opened = open_line(
+            text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual, program=program
+        )
+        stack.callback(opened.close)
+        if opened.line.facts.voice is not None and opened.line.facts.others:
+            say(f"drivepanel: {opened.line.state.reason}", err=True)
+        guard_motors(opened)
+        try:
+            mind_the_line(opened)
+            return asyncio.run(to_its_end([opened], lambda: work(opened)))
+        except NoAnswer as error:
+            hint = about_silence(opened, text, by_profile=usual is not None)
+            if not hint:
+                raise
+            text = f"{error} {hint}"
+            raise NoAnswer(error.device, error.function, error.address, text) from error
 
 
 def usual_settings(profile_id: str | None) -> UsualSettings | None:

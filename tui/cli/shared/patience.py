@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
+    from tui.session.console import DriveConsole
+    from tui.session.reading import Reading
 
 SLOW_CHARACTERS = 1200
 """Characters that others may say meanwhile: at 1200 baud 11 s, at 19200 0.7 s."""
@@ -16,3 +20,28 @@ def patience(line: ModbusLine, seconds: float) -> float:
     from tui.bus.link import character_time
 
     return seconds + SLOW_CHARACTERS * character_time(line.link)
+
+
+async def read_until(
+    console: DriveConsole, codes: Sequence[str], end: float
+) -> tuple[dict[str, Reading], list[str]]:
+    """Readings by code, those that tell the state first, and the codes that did not come in time.
+
+    `end` is a time of the loop. Raises the line's errors if nothing comes.
+    """
+    from tui.bus.errors import ExchangeError
+    from tui.session.read.reader import Reader
+
+    readings: dict[str, Reading] = {}
+    failure: Exception | None = None
+    for group in sorted(Reader(console.session).groups(codes), key=lambda g: codes.index(g[0])):
+        try:
+            async with asyncio.timeout_at(end):
+                readings |= await console.read(group)
+        except (ExchangeError, TimeoutError) as error:
+            if failure is not None and not readings:
+                raise failure from error
+            failure = error
+    if failure is not None and not readings:
+        raise failure
+    return readings, [code for code in codes if code not in readings]

@@ -23,6 +23,7 @@ from .lines import is_known_name, is_written_out
 from .looking_after import guard_motors
 from .options import CONNECT_WITHIN, Target, usual_settings
 from .say import say
+from .signals import never_suspended
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
@@ -171,6 +172,7 @@ def on_lines(
     None of them is waited for here: see connected().
     """
     with ExitStack() as stack:
+        stack.enter_context(never_suspended())
         opened = [stack.enter_context(_line_of(one, read_only=read_only)) for one in wishes]
         return asyncio.run(to_its_end(opened, lambda: work(opened)))
 

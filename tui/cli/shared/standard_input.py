@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import signal
 import time
 from collections.abc import Iterator
 
@@ -36,10 +34,3 @@ def _read(handle: int) -> bytes:
             if not os.isatty(handle):
                 return b""
             time.sleep(BACKGROUND_PAUSE)
-
-
-def stay_in_background() -> None:
-    """Let a read of the terminal fail in the background of a shell, not halt the program."""
-    if hasattr(signal, "SIGTTIN"):
-        with contextlib.suppress(ValueError):
-            signal.signal(signal.SIGTTIN, signal.SIG_IGN)

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from tui.drive.plain import plain
 
-from .drive_status import Status, drive_in_a_line, status_json, status_of_drive, status_table
+from .drive_status import (
+    Status,
+    drive_in_a_line,
+    status_json,
+    status_of_drive,
+    status_table,
+)
 from .drives import failed, failed_line
 from .errors import DONE, failure_of
 from .every_drive import every_drive
@@ -23,6 +29,7 @@ from .watch_outputs import Several
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
 
+LEFT_INDENT = 5
 STATUS_TITLES = 18
 """Width of the column of titles, with its gap."""
 
@@ -58,6 +65,14 @@ def say_status(status: Status) -> None:
         say_row(title, plain(text) or "-----", STATUS_TITLES)
 
 
+def say_in_a_line(status: Status, before: str = "") -> None:
+    """Tell a person of one drive in a line, and in another one of a motor left behind."""
+    say(f"{before}{plain(drive_in_a_line(status))}")
+    if status.left:
+        text = plain(status.left.sentence(status.session.line_text))
+        say(f"{'':{LEFT_INDENT}}{text}", indent=LEFT_INDENT)
+
+
 async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: StatusWish) -> int:
     """Tell the drives of several lines, in order; what is wrong with one is told as it is seen.
 
@@ -85,7 +100,7 @@ async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: St
 
 def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:
     if wanted.every:
-        say(f"{plain(name):<{width}}  {plain(drive_in_a_line(status))}")
+        say_in_a_line(status, f"{plain(name):<{width}}  ")
     else:
         several = Several(lines=True, drives=True)
         say(f"{several.named(name, status.session.device)}:")
@@ -126,4 +141,5 @@ async def _of_drive(opened: OpenLine, wish: LineWish, drive: Target, told: LineT
         told.worst = max(told.worst, failure.status)
         return
     told.found.append(status)
+    told.worst = max(told.worst, status.status)
     told.documents.append(status_json(wish.text, status))

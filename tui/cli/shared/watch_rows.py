@@ -24,6 +24,8 @@ def watch_text(watch: TimeoutWatch | None) -> str:
     """What a drive does on a loss of communication, for a person."""
     if watch is None:
         return "none: it goes on without communication"
+    if watch.reaction is not None and not watch.acts:
+        return f"off ({watch.reaction.name}): it goes on without communication"
     reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
     begins = "" if watch.active else " It begins with the first command or reference."
     return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"

@@ -202,7 +202,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
     "FactoryBy": {"raws": "The factory setting by the other parameter's raw value, in decimal."},
     "Multiple": {"times": "How many times that parameter, a decimal in quotes."},
     "Faults": {
-        "history": "Codes of the past faults, the latest first.",
+        "history": "Codes of the past faults, the latest first; the first may be `parameter`.",
         "codes": "What each raw fault code means.",
         "help": "What each fault points at.",
         "none": "Raw value that means no fault.",

@@ -6,6 +6,7 @@ of the user's own the whole is, so that a broken one is known for what it is.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -40,9 +41,10 @@ class ProfileFileHead(NamedTuple):
     def demo_hz(self) -> float | None:
         """Frequency of its motor in the demo."""
         try:
-            return float(self.text("demo_hz"))
+            hertz = float(self.text("demo_hz"))
         except ValueError:
             return None
+        return hertz if math.isfinite(hertz) else None
 
 
 class AskedOf(NamedTuple):

@@ -54,6 +54,12 @@ def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace
         for look in hint.look_at:
             if look.code not in codes:
                 yield place, f"{label}: there is no parameter {look.code!r} to look at."
+        for row in hint.ruled_out:
+            if row.text not in (*hint.probable, *hint.check):
+                yield place, f"{label}: {row.text!r} is neither a cause nor a check of it."
+            for code in (row.parameter, *(when.parameter for when in row.when)):
+                if code not in codes:
+                    yield place, f"{label}: there is no parameter {code!r} to rule out by."
     yield from _faults(data, told)
     yield from _alarms(data, told)
 

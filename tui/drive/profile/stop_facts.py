@@ -19,6 +19,7 @@ from ..small_file import read_small_text
 from . import library
 from .converting import converted
 from .heads import section, shared_texts
+from .profile import Profile
 from .schema import Chart
 
 _ROW = re.compile(r"^\[\[parameters\]\][ \t]*\n", re.MULTILINE)
@@ -61,13 +62,18 @@ def _facts(listing: library.Listing) -> StopFacts | None:
             profile = library.load_file(listing.path)
         except ProfileError:
             return None
-        charts = tuple(profile.data.charts)
-        places = {
-            one.code: one.address
-            for one in profile.parameters
-            if one.function == 3 and one.type.endswith("16") and one.mask == 0xFFFF
-        }
+        return stop_facts_of(profile, names_itself=names_itself)
     return StopFacts(listing.id, listing.name, charts, places, names_itself)
+
+
+def stop_facts_of(profile: Profile, *, names_itself: bool = True) -> StopFacts:
+    """Those of a family that is loaded."""
+    places = {
+        one.code: one.address
+        for one in profile.parameters
+        if one.function == 3 and one.type.endswith("16") and one.mask == 0xFFFF
+    }
+    return StopFacts(profile.id, profile.name, tuple(profile.data.charts), places, names_itself)
 
 
 def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 from ..errors import ValueRefused
 from ..profile.profile import Profile
-from ..shown import shown
-from ..values import check_raw, encode
+from ..shown import raw_of_text, shown
+from ..values import check_raw
 from .writable import never_set, warning
 
 
@@ -165,14 +165,13 @@ def _encoded(
     absent: Collection[str],
 ) -> Edit:
     parameter = profile[edit.code]
-    names = profile.names(parameter)
-    scale = profile.scale(parameter, after, absent)
     raw, rounded, lossy = edit.new, False, False
     if edit.typed:
-        conversion = encode(parameter, edit.typed, names, scale)
+        conversion = raw_of_text(profile, parameter, edit.typed, after, absent)
         raw, rounded, lossy = conversion.raw, conversion.rounded, conversion.lossy
     else:
-        check_raw(parameter, raw, names, scale)
+        scale = profile.scale(parameter, after, absent)
+        check_raw(parameter, raw, profile.names(parameter), scale)
     if raw != edit.old and (why := never_set(profile, parameter, raw)):
         raise ValueRefused(why)
     old = "" if edit.old is None else shown(profile, parameter, edit.old, raws, absent).display

@@ -9,7 +9,7 @@ from decimal import Decimal
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import number_of
-from ..values import is_enumeration, raw_range
+from ..values import engineering, is_enumeration, raw_range
 from .edits import Edits
 from .limits import edit_problems, limit_pairs, limits_are_sure
 from .multiple import value_of
@@ -55,8 +55,8 @@ def limits_in_force(
     if parameter.access == "r" or parameter.bits or is_enumeration(parameter) or scale is None:
         return None
     lowest, highest = raw_range(parameter)
-    low = None if parameter.min is None else lowest * scale
-    high = None if parameter.max is None else highest * scale
+    low = None if parameter.min is None else engineering(lowest, scale)
+    high = None if parameter.max is None else engineering(highest, scale)
     low_by = high_by = ""
     for under, over in limit_pairs(profile):
         other = over if parameter.code == under else under

@@ -8,6 +8,7 @@ from decimal import ROUND_FLOOR, Decimal
 from ..profile.profile import Profile
 from ..profile.schema import Multiple, Parameter
 from ..shown import number_of
+from ..values import engineering
 
 
 def counts_of(
@@ -39,7 +40,7 @@ def value_of(
     """It in the unit of the parameter, cut to a whole count; None while it is not known."""
     counts = counts_of(profile, parameter, of, raws, absent)
     scale = profile.scale(parameter, raws, absent)
-    return None if counts is None or scale is None else counts * scale
+    return None if counts is None or scale is None else engineering(counts, scale)
 
 
 def formula_of(of: Multiple) -> str:

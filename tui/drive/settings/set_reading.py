@@ -13,9 +13,9 @@ import tomli
 from ..errors import ValueRefused
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
-from ..shown import shown
+from ..shown import raw_of_text, shown
 from ..toml_text import toml_tables
-from ..values import encode, type_range
+from ..values import type_range
 from .parameter_set import (
     ABSENT,
     END_OF_SET,
@@ -247,16 +247,14 @@ class _Resolver:
             return None
 
     def _encoded(self, parameter: Parameter, entry: _Entry, raws: Mapping[str, int]) -> int:
-        names = self.profile.names(parameter)
-        scale = self.profile.scale(parameter, raws, lacking(self.profile, raws))
+        absent = lacking(self.profile, raws)
         try:
-            conversion = encode(parameter, entry.value or "", names, scale)
+            conversion = raw_of_text(self.profile, parameter, entry.value or "", raws, absent)
         except ValueRefused as error:
             raise self.fault(entry.line, str(error)) from error
         if conversion.rounded and entry.raw is not None:
             raise self.fault(entry.line, f"{entry.code}: {entry.value} cannot be held exactly.")
         if conversion.rounded:
-            absent = lacking(self.profile, raws)
             held = shown(self.profile, parameter, conversion.raw, raws, absent).display
             self.notes[entry.code] = f"{entry.code}: {entry.value} is held as {held}."
         if conversion.lossy:

@@ -40,8 +40,7 @@ class BlockKeys(ArmingKeys):
         from ..dialogs.ask import Ask
 
         block_editor = self.block_editor
-        if not self._armed():
-            self._refuse("Not armed: a arms this drive.")
+        if not self._armed_or_told():
             return
 
         try:

@@ -109,8 +109,23 @@ class BlocksScreen(BlockKeys):
         """How much is proposed and what becomes of it, or why nothing is read."""
         count = self.block_editor.proposals.count
         slots = "slot" if count == 1 else "slots"
-        told = f"{count} {slots} proposed otherwise: w writes, u drops" if count else ""
-        return told or self.block_editor.trouble
+        if not count:
+            return self.block_editor.trouble
+        return f"{count} {slots} proposed otherwise: {self._keys_now()}, u drops"
+
+    def _keys_now(self) -> str:
+        """Name the keys that write the proposal in the present state, in a few words."""
+        if self.session.arming.hindrance:
+            return "not to be written now"
+        if self._why_not_now():
+            return "w once the motor is stopped"
+        return "w writes" if self._armed() else "a arms, w writes"
+
+    def _why_not_now(self) -> str:
+        """Why what is proposed cannot be written in the present state; empty if it can."""
+        editor = self.block_editor
+        todo = [block for block in editor.proposals.blocks if editor.proposals.changes(block)]
+        return next((why for block in todo if (why := editor.not_now(block))), "")
 
     def _show_neighbours(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
@@ -181,8 +196,10 @@ class BlocksScreen(BlockKeys):
             before, after = found[0].before.microseconds, found[0].after.microseconds
             self.app.tell(
                 f"Proposed: Monitor's cycle takes {after / 1000:.1f} ms in place of"
-                f" {before / 1000:.1f} ms. w writes it, u drops it."
+                f" {before / 1000:.1f} ms."
             )
+            how = self._why_not_now() or self.how_to_write("it")
+            self.hint_keys(f"{how} Press u to drop it.")
         elif found:
             self.app.tell("Nothing to propose: no other slots make Monitor's cycle shorter.")
 
@@ -205,7 +222,8 @@ class BlocksScreen(BlockKeys):
         proposals = block_editor.proposals
         todo = [block for block in proposals.blocks if proposals.changes(block)]
         if not todo:
-            self._refuse("Nothing is proposed: Enter picks what the slot is mapped to.")
+            self._refuse("Nothing is proposed.")
+            self.hint_keys("Press Enter to pick what the slot is mapped to.")
             return
         wrong = [p.text for block in todo for p in refusing(proposals.problems(block))]
         wrong += [text for block in todo if (text := block_editor.not_now(block))]

@@ -16,6 +16,7 @@ from ..base import PanelScreen
 if TYPE_CHECKING:
     from tui.bus.program import Program
 
+    from ..dialogs.confirm import Confirm
     from ..dialogs.now import MotorsNow
 
 NOT_ARMED = "Not armed: a arms this drive."
@@ -56,7 +57,7 @@ class ArmingKeys(PanelScreen):
         refused: Callable[[], object] = lambda: None,
         *,
         by_itself: bool = False,
-    ) -> None:
+    ) -> Confirm:
         """Ask with `y` before something is written or moved; refusals are told on this screen.
 
         `work` gets the drive's count of stops of the moment of asking: a stop since voids it.
@@ -79,6 +80,7 @@ class ArmingKeys(PanelScreen):
         now = self.motor_now()
         asked = Confirm(question, follows, yes=yes, no=no, loses=True, now=now, by_itself=by_itself)
         self.app.push_screen(asked, told)
+        return asked
 
     def _armed(self) -> bool:
         return self.commander.armed_for is not None
@@ -86,8 +88,21 @@ class ArmingKeys(PanelScreen):
     def _armed_or_told(self) -> bool:
         """Whether the drive is armed; where it is not, that is told."""
         if not self._armed():
-            self._refuse(NOT_ARMED)
+            self._refuse(self.session.arming.hindrance or self._how_to_arm())
         return self._armed()
+
+    def _how_to_arm(self) -> str:
+        other = self.session.line.facts.commander(self.session.device)
+        if other is None:
+            return NOT_ARMED
+        return f"Not armed: {other.text} commands this drive. Press a to ask for it."
+
+    def how_to_write(self, what: str) -> str:
+        """The keys that write what is staged, as they work now; or why none does."""
+        if why := self.session.arming.hindrance:
+            return why
+        arm = "" if self._armed() else "a to arm, then "
+        return f"Press {arm}w to write {what}."
 
     def action_arm(self) -> None:
         """Let commands and writes to this drive through for a minute, or for a minute more.

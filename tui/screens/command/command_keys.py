@@ -6,7 +6,9 @@ from collections.abc import Callable
 from decimal import Decimal
 from functools import partial
 
-from tui.drive.orders import OrderRefused, chart_in_force, follows_from
+from tui.bus.errors import LineError
+from tui.drive.fault_reset import no_fault, reset_codes, reset_follows
+from tui.drive.orders import OrderRefused, chart_in_force
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 
@@ -52,16 +54,15 @@ class OrderKeys(TeachKeys):
             outcome=outcome,
             hindrance=hindrance(self.session.profile, raws),
             offer=self._offer(),
+            barred=self.session.arming.hindrance,
             lost=commander.given.lost_orders(),
         )
 
     def _offer(self) -> str:
-        """A motor that runs by a command of an earlier program, and the key that takes it over."""
-        starts, latest = self.session.starts, self.console.latest
-        if starts is None or latest is None or latest.error:
-            return ""
-        said = starts.offered(self.session, runs=latest.state.motion == "running")
-        return f"{said[0].upper()}{said[1:]}. T takes over." if said else ""
+        """A motor that an earlier program has started, and the keys that stop and take it over."""
+        fleet = self.app.fleet
+        text = fleet.left_behind(self.console) if fleet is not None else ""
+        return f"{text} Space stops it, T takes it over." if text else ""
 
     def action_take_over(self) -> None:
         """Look after a motor that an earlier program has started."""
@@ -94,14 +95,30 @@ class OrderKeys(TeachKeys):
         self.look()
 
     def action_reset(self) -> None:
-        """Reset a fault, after saying what that needs."""
-        if self._armed_or_told():
-            chart = chart_in_force(self.session.profile, self.session.image.raws)
-            besides = follows_from(chart, "reset") if chart is not None else ""
-            besides = besides or "Nothing runs by itself: command it anew afterwards."
-            follows = f"The cause must be gone. {besides}"
-            work = partial(self.commander.order, "reset")
-            self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
+        """Reset a fault, after saying what may start then; without a fault, say so."""
+        profile, raws = self.session.profile, self.session.image.raws
+        chart, latest = chart_in_force(profile, raws), self.console.latest
+        if chart is not None and latest is not None and not latest.error:
+            state = latest.state
+            if nothing := no_fault(chart, state.id, state.kind, state.name):
+                self._refuse(nothing)
+                return
+        if not self._armed_or_told():
+            return
+        follows = f"The cause must be gone. {reset_follows(profile, raws, {})}"
+        work = partial(self.commander.order, "reset")
+        question = self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
+
+        async def look_at_inputs() -> None:
+            try:
+                found = await self.console.read(reset_codes(profile))
+            except LineError:
+                return  # the text says that the inputs were not read
+            now = {code: r.raw for code, r in found.items() if r.raw is not None}
+            known = {**self.session.image.raws, **now}
+            question.tell_follows(f"The cause must be gone. {reset_follows(profile, known, now)}")
+
+        self.run_worker(look_at_inputs, exclusive=True, group="reset")  # type: ignore[arg-type]
 
     def action_take_control(self) -> None:
         """Take the control from the terminals, after saying what that means."""

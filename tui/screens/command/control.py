@@ -41,6 +41,8 @@ class Control:
     """Why a run command would have no effect now; None where it would."""
     offer: str = ""
     """What an earlier program has started and left, and how it is taken over."""
+    barred: str = ""
+    """Why the drive cannot be armed from this panel; empty if it can."""
     lost: str = ""
     """What the drive no longer holds of what was written from here."""
 

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich.text import Text
+
+from tui.drive.plain import plain
+from tui.widgets.drawing import wrapped
+from tui.widgets.palette import ATTENTION, FAINT
+
 if TYPE_CHECKING:
     from tui.session.fleet import FoundDrive
 
 WATCHED_ONLY = "It is watched by that profile, and not armed."
+
+ABOUT, LEFT_LINES = 2, 3
+"""Lines of a drive, and lines at most of a motor that no program commands."""
 
 
 def profile_text(drive: FoundDrive) -> str:
@@ -41,3 +50,17 @@ def next_step(drive: FoundDrive) -> str:
     if drive.guessed and others:
         return f"A guess: if it is {' or '.join(others)}, type that beside Profile, then s."
     return ""
+
+
+def about_lines(drive: FoundDrive | None, left: str, width: int) -> list[Text]:
+    """All that a drive says of itself, and what to do about one that does not.
+
+    First of all a motor that no program commands: `left` says who started it.
+    """
+    parts = [about_drive(drive), next_step(drive)] if drive else []
+    lines = [Text(f" {plain(part)}", FAINT) for part in parts]
+    if left:
+        del lines[1:]
+        text = f"{left} Press Enter: then Space stops it, T takes it over."
+        lines[:0] = [Text(f" {row}", ATTENTION) for row in wrapped(text, width - 2, LEFT_LINES)]
+    return lines + [Text("")] * (ABOUT - len(lines))

@@ -6,7 +6,7 @@ import asyncio
 from contextlib import suppress
 
 from textual import work
-from textual.worker import WorkerError
+from textual.worker import WorkerError, get_current_worker
 
 from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
@@ -22,8 +22,6 @@ from .scanning import Scanning
 class LineKeys(Scanning):
     """A line that was opened is searched for drives at once."""
 
-    _opening = ""
-    """The line that is being opened, or nothing."""
     refused: tuple[str, LineError] | None = None
     """The line that could not be opened when that was tried last, and why."""
 
@@ -51,14 +49,25 @@ class LineKeys(Scanning):
         )
         self.app.push_screen(dialog, typed)
 
-    @work(exclusive=True, group="ask", exit_on_error=False)
-    async def open_line(self, text: str, device: int | None = None) -> None:
+    def open_line(self, text: str, device: int | None = None) -> None:
         """Open a line and ask for its drives; a good one is not left for it without asking.
 
         With `device` that drive alone is asked for.
         """
-        if self._opening and same_line(text, self._opening):
-            return
+        opening = self.app.opening
+        if opening.goes_on:  # by the mouse: keys do not get here
+            self.app.tell(f"{opening.text} is being opened. Press Esc to cancel.")
+        else:
+            opening.begin(text, self._ask_to_open(text, device))
+
+    @work(exclusive=True, group="ask", exit_on_error=False)
+    async def _ask_to_open(self, text: str, device: int | None) -> None:
+        try:
+            await self._open_or_show(text, device)
+        finally:
+            self.app.opening.end(get_current_worker())
+
+    async def _open_or_show(self, text: str, device: int | None) -> None:
         here = self.app.open_line_of(text)
         if here is not None and same_line(text, here.opened.text):
             self._show(here, device)
@@ -67,12 +76,14 @@ class LineKeys(Scanning):
             self.app.show_line(here)  # with other settings: it is closed for them
             self.look()
         if here is None and self.found:
-            self._open_beside(text, device)  # a line with drives goes on below
+            self._open_next(text, device, beside=True)  # a line with drives goes on below
             return
-        always = f"{self._what_is_here()} It is closed, and {text} is opened." if here else ""
+        asks = here is not None or self.scanning
+        always = f"{self._what_is_here()} It is closed, and {text} is opened." if asks else ""
         question = "Close the line for another?"
         if await self.app.may_let_go(question, yes="closes it", no="keeps it", always=always):
-            self._open_in_its_place(text, device)
+            # drives may have answered while that was asked
+            self._open_next(text, device, beside=here is None and bool(self.found))
 
     def _show(self, here: PanelLine, device: int | None) -> None:
         """Show a line that is open, and look for its drives again where it was shown already."""
@@ -80,7 +91,7 @@ class LineKeys(Scanning):
             if self._is_good():
                 self._tell_open()
             else:
-                self._open_in_its_place(here.opened.text, device)
+                self._open_next(here.opened.text, device, beside=False)
             return
         self.end_search()
         self.app.show_line(here)
@@ -88,19 +99,22 @@ class LineKeys(Scanning):
         self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.look()
 
-    @work(exclusive=True, group="line", exit_on_error=False)
-    async def _open_beside(self, text: str, device: int | None) -> None:
-        """Open one more line; those that are open go on below."""
-        self.end_search()
-        self.warned.clear()
-        if await self._opens(text):
-            self._search_for(device)
+    def _open_next(self, text: str, device: int | None, *, beside: bool) -> None:
+        """Open a line `beside` those that are open, which go on below, or instead of this one."""
+        self.app.opening.begin(text, self._open_now(text, device, beside=beside))
 
     @work(exclusive=True, group="line", exit_on_error=False)
-    async def _open_in_its_place(self, text: str, device: int | None) -> None:
-        self.forget_drives()
-        if await self._opens(text):
-            self._search_for(device)
+    async def _open_now(self, text: str, device: int | None, *, beside: bool) -> None:
+        try:
+            if beside:
+                self.end_search()
+                self.warned.clear()
+            else:
+                self.forget_drives()
+            if await self._opens(text):
+                self._search_for(device)
+        finally:
+            self.app.opening.end(get_current_worker())
 
     def _search_for(self, device: int | None) -> None:
         """Search the line that was opened for its drives, or for one."""
@@ -112,7 +126,8 @@ class LineKeys(Scanning):
 
     def tell_opening(self, text: str) -> None:
         """What there is to see until the line is there."""
-        self.advise(f"Opening {text}", "It is given up after a few seconds.")
+        self.advise(f"Opening {text}", "Press Esc to cancel. Other keys are ignored.")
+        self.draw_stop_keys()
 
     def _is_good(self) -> bool:
         """Whether the open line is one with drives, or one on which they are searched for."""
@@ -125,7 +140,8 @@ class LineKeys(Scanning):
 
     def _what_is_here(self) -> str:
         count = len(self.found)
-        drives = f"{count} drive{'s' if count > 1 else ''} found" if count else "a search going on"
+        search = "a search going on" if self.scanning else "no drive found"
+        drives = f"{count} drive{'s' if count > 1 else ''} found" if count else search
         return f"{self.app.line_label} is open, with {drives}."
 
     def _tell_open(self) -> None:
@@ -135,9 +151,13 @@ class LineKeys(Scanning):
         else:
             self.action_scan()
 
-    @work(exclusive=True, group="line", exit_on_error=False)
-    async def start(self, text: str, device: int | None) -> None:
+    def start(self, text: str, device: int | None) -> None:
         """Open a line; with a device, watch that drive as soon as it is known."""
+        self.app.opening.begin(text, self._start(text, device))
+
+    @work(exclusive=True, group="line", exit_on_error=False)
+    async def _start(self, text: str, device: int | None) -> None:
+        work = get_current_worker()
         self._point_at(text)
         try:
             if not await self._opens(text):
@@ -145,16 +165,18 @@ class LineKeys(Scanning):
             if device is None:
                 self.action_scan()
                 return
+            search = self.scan([device])
+            self.app.opening.end(work)
             with suppress(WorkerError):  # ended by a key, or told where it failed
-                await self.scan([device]).wait()
+                await search.wait()
                 if device in self.found:
                     await self.open_drive(device).wait()
         finally:
+            self.app.opening.end(work)
             leave_opening(self.app)
 
     async def _opens(self, text: str) -> bool:
-        """Whether the line could be opened; if not, why is shown."""
-        self._opening = text
+        """Open a line; False if it cannot be opened, with the reason shown."""
         self.end_search()
         self.tell_opening(text)
         try:
@@ -168,8 +190,6 @@ class LineKeys(Scanning):
             self.fail(error)
             self._point_at(text)
             return False
-        finally:
-            self._opening = ""
         self.refused = None
         self._led = False
         self.action_refresh_lines()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from textual import work
-from textual.worker import WorkerError
+from textual.worker import WorkerError, get_current_worker
 
 from tui.bus.errors import LineError, LinkSyntaxError, PortRefused
 
@@ -125,7 +125,11 @@ class OtherSettings(LineKeys):
             self.later = costs.seconds(one for one in later if setting.slow or not one.slow)
             self.advise(f"Drives are searched for at {far}.", "Esc ends it.")
             try:
-                await self.app.connect(text, remember=False)
+                self.app.opening.begin(text, get_current_worker())
+                try:
+                    await self.app.connect(text, remember=False)
+                finally:
+                    self.app.opening.end()
                 await self.scan(devices, once=True).wait()
             except WorkerError:
                 self.say(f"The search is ended at {far}.", "")

@@ -44,6 +44,8 @@ def _row(
     kind, words = said_state(console, state, report, at[0], readings)
     if kind not in ("stop", "stop failed"):
         words = _called(state, words)
+    if kind == "running" and fleet.left_behind(console):
+        words = f"no commander, {words}"
     if not connected:
         kind, words, old = "none", "not known", True
     elif vain:

@@ -156,7 +156,9 @@ class Scanning(LineView):
     async def _take(self, result: ScanResult) -> None:
         """Keep a drive that answered, with its profile and state."""
         if result.identity is None:
-            self.say(f"{result.error} The address is taken; s searches again.", "", ALARM_KIND)
+            self.say(
+                f"{result.error} The address is taken.", "Press s to search again.", ALARM_KIND
+            )
             return
         await self._equip(result.identity)
         self.look()

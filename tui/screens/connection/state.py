@@ -15,17 +15,16 @@ from textual.events import Key, Resize, ScreenResume
 from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
-from tui.drive.plain import plain
 from tui.session.connect.named_lines import line_settings
 from tui.widgets.drawing import pair, rule
 from tui.widgets.lines import Lines
-from tui.widgets.palette import FAINT, PLAIN
+from tui.widgets.palette import PLAIN
 
 from ..base import PanelScreen
 from ..frame import SELDOM
 from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines
 from .drive_list import DriveList
-from .found import about_drive, next_step
+from .found import about_lines
 from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
@@ -44,8 +43,6 @@ STATES = 0.5
 """Seconds between two looks at the drives and at the line."""
 QUIET = 1.0
 """Seconds without a key after which drives go to their places in the list."""
-ABOUT = 2
-"""Lines that tell all of the drive under the cursor."""
 SEARCH_LABEL = 11
 SEARCH_TEXT = 18
 """Cells that tell how far a search is."""
@@ -197,10 +194,9 @@ class LineView(PanelScreen):
 
     def show_about(self) -> None:
         """All that the drive under the cursor says of itself, and what to do about one that not."""
-        drive = self.found.get(self.drives.chosen or 0)
-        parts = [about_drive(drive), next_step(drive)] if drive else []
-        lines = [Text(f" {plain(part)}", FAINT) for part in parts]
-        self.put("about", lines + [Text("")] * (ABOUT - len(lines)))
+        drive, fleet = self.found.get(self.drives.chosen or 0), self.app.fleet
+        left = fleet.left_behind(drive.console) if drive and drive.console and fleet else ""
+        self.put_all("about", about_lines(drive, left, self.size.width))
 
     def on_key(self, event: Key) -> None:
         """While keys come, nothing changes its place under them."""
@@ -241,9 +237,9 @@ class LineView(PanelScreen):
 
     def fail(self, error: Exception) -> None:
         """Tell an error with what to do next."""
-        hint = hint_for(error)
-        self.app.events.add(ERROR_KIND, f"{error} {hint}" if self.found else str(error))
-        self.advise(str(error), hint, ERROR_KIND)
+        self.app.events.add(ERROR_KIND, str(error))
+        self.hint_keys(hint_for(error) if self.found else "")
+        self.advise(str(error), hint_for(error), ERROR_KIND)
 
     def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
         """An error that nobody foresaw: all of it to the log, one line to the person."""
@@ -297,11 +293,12 @@ class LineView(PanelScreen):
             return  # all of them at once
         self.warned |= new.keys()
         which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in sorted(new.items()))
-        self.app.events.add(
-            "told",
-            f"Kept asking: {which}. Drives trip at the end of their communication time-out;"
-            " it cannot run out while this line is open.",
+        watches = [self.app.fleet.line_watch.watch(device) for device in new]
+        act = "trip" if all(watch and watch.trips for watch in watches) else "act"
+        text = (
+            f"Kept asking: {which}. Otherwise they {act} at the end of their communication timeout"
         )
+        self.app.events.add("told", f"{text}; it cannot run out while this line is open.")
 
 
 def _lines_title(width: int) -> list[Text]:

@@ -70,7 +70,7 @@ def warning_lines(session: DriveSession, width: int) -> list[Text]:
 
 
 def ask_to_prove(
-    ask: Callable[[str, str, str, str, Callable[[int], object]], None],
+    ask: Callable[[str, str, str, str, Callable[[int], object]], object],
     session: DriveSession,
     watch: TimeoutWatch | None,
     *,

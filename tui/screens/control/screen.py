@@ -25,7 +25,7 @@ from tui.widgets.plain import entry
 from ..command.command_keys import OrderKeys
 from ..keys.table import SOURCES, bindings
 from .proving import ask_to_prove, begin_proof, silence_line, warning_lines
-from .view import change_lines, diagram, note_lines, now_lines
+from .view import change_lines, diagram, left_lines, note_lines, now_lines
 
 
 class ControlSourceScreen(OrderKeys):
@@ -109,7 +109,7 @@ class ControlSourceScreen(OrderKeys):
         if warnings := warning_lines(self.session, width):
             lines += [Text(""), rule("When the line falls silent", width), *warnings]
         self.put("detail", lines)
-        self.put("now", self._now(width))
+        self.put_all("now", self._now(width))
         outcome = self.commander.outcome
         if outcome is not None and outcome is not self._seen and outcome.kind != "working":
             self._seen = outcome
@@ -120,7 +120,9 @@ class ControlSourceScreen(OrderKeys):
         switches = switch_texts(profile, self._raws)
         lines = now_lines(profile, self._today(), latest, self._trouble, switches, width)
         silence = silence_line(self.session, self._watch(), self.console.proved, width)
-        return [lines[1], silence, *lines[2:]]
+        fleet = self.app.fleet
+        left = fleet.left_behind(self.console) if fleet is not None else ""
+        return [lines[1], *left_lines(left, width), silence, *lines[2:]]
 
     def _watch(self) -> TimeoutWatch | None:
         """The drive's watch over the line, once it was read."""

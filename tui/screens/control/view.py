@@ -18,6 +18,7 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
 
 SOURCE_WIDTH = 16
 WIRE = 18
+LEFT_ROWS = 3
 
 
 def now_lines(
@@ -49,6 +50,12 @@ def now_lines(
         else "".join(switches)
     )
     return [*lines, text, Text(cut(f"  {told}", width).rstrip(), ATTENTION, no_wrap=True)]
+
+
+def left_lines(left: str, width: int) -> list[Text]:
+    """A motor that no program commands, who started it, and what to do; none without one."""
+    text = f"{left} Space stops it; T on Monitor takes it over." if left else ""
+    return [Text(f"  {line}", ATTENTION) for line in wrapped(text, width - 4, LEFT_ROWS)]
 
 
 def _channel(profile: Profile, latest: Snapshot | None) -> str:

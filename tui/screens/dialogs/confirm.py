@@ -68,6 +68,12 @@ class Confirm(KeyQuestion[bool]):
             self._keys.append("   ").append_text(hint(("Up, Down", "scroll")))
             self.tell_keys(self._keys)
 
+    def tell_follows(self, follows: str) -> None:
+        """Replace the text of what follows, once more is known."""
+        if self.is_attached and self.query("#follows"):
+            self.query_one("#follows", Plain).update(follows)
+            self._fit_list()
+
     def action_yes(self) -> None:
         """Go on."""
         self.answer(True)

@@ -42,6 +42,8 @@ NOT_TYPING = 1.0
 """Seconds without a key after which a question that comes by itself takes an answer."""
 TYPED_ON = "A question came meanwhile: after a second without a key it takes an answer."
 
+TOO_EARLY = "Key ignored: it came before this could be read. Press it again."
+
 NOW_EVERY = 0.5
 """Seconds between two looks at what the motor does."""
 
@@ -104,7 +106,8 @@ class Question(Framed, ModalScreen[T]):
 
     def on_resize(self, event: Resize) -> None:
         """More room, or less."""
-        self._fit_list()
+        if not self.is_too_small:
+            self._fit_list()
 
     def _fit_list(self) -> None:
         """Give a list, or what can be scrolled, the rows that the rest of the dialog leaves."""
@@ -159,14 +162,13 @@ class Question(Framed, ModalScreen[T]):
         return super().check_action(action, parameters)
 
     def on_key(self, event: Key) -> None:
-        """Somebody types."""
+        """Note when the last key came."""
         self._typed_at = self.app.clock.monotonic()
 
     def action_swallow(self, of_no: bool = False) -> None:
-        """Nothing is done; who types on is told why. A no waits only where nobody asked."""
+        """Ignore a key and report why. A no waits only if no key asked the question."""
         self._typed_at = self.app.clock.monotonic()
-        if self.by_itself:
-            self.app.tell(TYPED_ON)
+        self.app.tell(TYPED_ON if self.by_itself else TOO_EARLY)
 
     def action_no(self) -> None:
         """Change nothing."""

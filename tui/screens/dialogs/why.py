@@ -67,7 +67,8 @@ class WhyScreen(Framed, ModalScreen[None]):
 
     def on_resize(self, _: Resize) -> None:
         """Break the lines anew."""
-        self._show()
+        if not self.is_too_small:
+            self._show()
 
     def action_again(self) -> None:
         """Look once more."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.hints import reset_text
+from tui.drive.hints import FaultAdvice, reset_text
 from tui.drive.plain import plain
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import FaultHelp, Quantity
@@ -33,6 +33,8 @@ LABEL = 13
 """Columns of the headings at the left."""
 TRUST_WIDTH = 11
 """Columns at the right that say how surely a thing is known."""
+RESET_LINES = 8
+"""Lines of how a fault ends at most, at 60 columns."""
 CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
 OPENS = "Enter opens "
 TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
@@ -44,6 +46,9 @@ TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
 }
 CONTACTS = ("digital_inputs", "digital_outputs")
 """Words that are told by the names of what is closed, not in hexadecimal."""
+STORED_MARK = " stored"
+STORED_WIDTH = len(STORED_MARK) + 28
+"""Columns of what the drive stored; the mark keeps it apart from what was last read here."""
 STORED_UNITS = ("Hz", "A", "h")
 """What is told of a fault of the history, where the drive stores it."""
 
@@ -119,10 +124,16 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
 
 
 def _tripped(view: DoctorView) -> str:
-    """When it tripped, and what the motor did then, as far as this panel saw it."""
+    """When it tripped, or since when it is seen, and what was last read of the motor before."""
     record = view.record
-    if record is None:
+    if view.since is not None:
+        when = view.since.when
+    elif record is not None:
+        when = f"tripped {time.strftime('%H:%M:%S', time.localtime(record.wall))}"
+    else:
         return "tripped before it was watched"
+    if record is None:
+        return when if view.since and view.since.tripped else f"{when}, tripped before"
     before = [moment for moment in record.moments if moment.wall < record.wall]
     texts = before[-1].texts if before else ()  # at the trip itself the motor is free already
     values = dict(zip(record.codes, texts, strict=False))
@@ -132,8 +143,7 @@ def _tripped(view: DoctorView) -> str:
         value = values.get(parameter.code, "") if parameter else ""
         if parameter and value not in ("", NOT_AVAILABLE):
             parts.append(f"{name}{value} {parameter.unit}".rstrip())
-    when = time.strftime("%H:%M:%S", time.localtime(record.wall))
-    return f"tripped {when}" + (f" at {', '.join(parts)}" if parts else "")
+    return f"{when}, last read {', '.join(parts)}" if parts else when
 
 
 def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
@@ -150,6 +160,16 @@ def _told_in(texts: Sequence[str], width: int) -> list[Text]:
     return [Text(cut(text, room), PLAIN) for text, room in zip(texts, rooms, strict=True)]
 
 
+def _excluded(left: FaultAdvice, texts: Sequence[str], width: int) -> list[Text]:
+    """Those of the texts that a value rules out, behind the reason."""
+    room = max(10, width - LABEL - 1)
+    return [
+        Text(cut_at_word(f"({one.reason}) {one.text}", room), FAINT)
+        for one in left.excluded
+        if one.text in texts
+    ]
+
+
 def _probable(view: DoctorView, width: int) -> list[Text]:
     fault, help_ = view.fault, view.hint
     room = max(10, width - LABEL - TRUST_WIDTH)
@@ -159,8 +179,12 @@ def _probable(view: DoctorView, width: int) -> list[Text]:
         cause = fault.cause if fault else ""
         cause = cause or view.profile.guide.trouble or "The manual in hand gives no cause."
         return _labelled("Probably", [Text(part, PLAIN) for part in wrapped(cause, room, 3)])
-    lines = _told_in(help_.probable, width)
-    lines[0].append(f" {TRUST_MARKS[help_.confidence]:>8}", FAINT)
+    left = view.advice
+    assert left is not None
+    lines = _told_in(left.probable, width)
+    if lines:
+        lines[0].append(f" {TRUST_MARKS[left.confidence]:>8}", FAINT)
+    lines += _excluded(left, help_.probable, width)
     if isinstance(help_, FaultHelp) and help_.name:
         lines.insert(0, Text(cut(help_.name, width - LABEL), PLAIN))
     return _labelled("Probably", lines)
@@ -213,10 +237,12 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
     fault, help_ = view.fault, view.hint
     room = max(10, width - LABEL - TRUST_WIDTH)
     if help_ is not None and help_.check:
-        lines = _told_in(help_.check, width)
-        if help_.confidence != "practice":  # checks are practice whatever the cause rests on
+        left = view.advice
+        assert left is not None
+        lines = _told_in(left.check, width)
+        if lines and help_.confidence != "practice":  # checks are practice whatever the cause is
             lines[0].append(f" {TRUST_MARKS['practice']:>8}", FAINT)
-        return _labelled("Check", lines)
+        return _labelled("Check", lines + _excluded(left, help_.check, width))
     if fault is not None and fault.remedy:
         return _labelled("Check", [Text(part, PLAIN) for part in wrapped(fault.remedy, room, 3)])
     return []
@@ -225,10 +251,10 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
 def _reset(view: DoctorView, width: int) -> list[Text]:
     if not view.present:
         return []
-    said = reset_text(view.help, view.ready, "x")
+    said = reset_text(view.help, view.ready, "x", view.follows)
     room = max(10, width - LABEL - TRUST_WIDTH)
     # in as many lines as it takes: what may start the motor is never cut off
-    lines = [Text(cut(part, room), PLAIN) for part in wrapped(said.text, room, 4)]
+    lines = [Text(cut(part, room), PLAIN) for part in wrapped(said.text, room, RESET_LINES)]
     if lines[0].plain.startswith("x "):
         lines[0].stylize(KEY, 0, 1)
     lines[0].append("" if said.told_by_drive else f" {TRUST_MARKS['practice']:>8}", FAINT)
@@ -254,7 +280,7 @@ def _past(view: DoctorView, number: int, code: str, width: int) -> Text:
     text = Text(no_wrap=True)
     text.append(f"{number + 1 if number else 'last':<5}", FAINT)
     stored = _stored(view, faults.stored[number]) if number < len(faults.stored) else ""
-    room = max(8, width - LABEL - 5 - 28)
+    room = max(8, width - LABEL - 5 - STORED_WIDTH)
     if reading is None or reading.raw is None:
         text.append(cut(NOT_AVAILABLE, room), FAINT)
     else:
@@ -262,7 +288,7 @@ def _past(view: DoctorView, number: int, code: str, width: int) -> Text:
         name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
         text.append(cut(name, room), FAINT if none else PLAIN)
         stored = "" if none else stored
-    text.append(f"{stored:<28}", FAINT)
+    text.append(f"{stored:<{STORED_WIDTH}}", FAINT)
     if chosen:
         text.stylize(CURSOR)
     text.truncate(max(1, width - LABEL))
@@ -270,10 +296,11 @@ def _past(view: DoctorView, number: int, code: str, width: int) -> Text:
 
 
 def _stored(view: DoctorView, codes: Sequence[str]) -> str:
-    """Frequency, current and hours of a fault, each at its place."""
+    """Frequency, current and hours that the drive stored of a fault, each at its place."""
     found = dict.fromkeys(STORED_UNITS, "")
     for code in codes:
         reading = view.readings.get(code)
         if reading is not None and reading.unit in found and not found[reading.unit]:
             found[reading.unit] = f"{reading.text} {reading.unit}"
-    return "".join(f"{text:>9}" for text in found.values())
+    cells = "".join(f"{text:>9}" for text in found.values())
+    return f"{STORED_MARK}{cells}" if any(found.values()) else ""

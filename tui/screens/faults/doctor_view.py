@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from tui.drive.hints import reset_ready
+from tui.drive.fault_reset import reset_follows
+from tui.drive.hints import FaultAdvice, advice, reset_ready
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import FaultCode, FaultHelp, Hint, LookAt
+from tui.session.monitor.alarms import PresentFault
 from tui.session.monitor.fault_record import FaultRecord
 from tui.session.reading import Reading
 
@@ -23,10 +25,14 @@ class DoctorView:
     record: FaultRecord | None
     """The trip as the panel saw it, where it did and this is the fault."""
     readings: Mapping[str, Reading]
+    since: PresentFault | None = None
+    """The one record of when it tripped, or was first seen; that of the line."""
     at: int = 0
     """The row of the cursor: parameters to look at first, then the history."""
     unread: bool = False
     """Whether the history is being read yet."""
+    raws: Mapping[str, int] = field(default_factory=dict)
+    """All raw values that the drive was last seen to hold."""
     alarms: Sequence[tuple[str, int, str]] = ()
     """Alarms that are on: word, bit and name; told where there is no fault to tell of."""
 
@@ -52,6 +58,14 @@ class DoctorView:
         return self.profile.guide.alarm(alarm[0], alarm[1]) if alarm else self.help
 
     @property
+    def advice(self) -> FaultAdvice | None:
+        """The causes and checks that the present values leave."""
+        if self.hint is None:
+            return None
+        latest = self.present or self.record is not None
+        return advice(self.profile, self.hint, self._good(), latest=latest)
+
+    @property
     def look_at(self) -> Sequence[LookAt]:
         """The parameters to look at."""
         return self.hint.look_at if self.hint else ()
@@ -59,12 +73,20 @@ class DoctorView:
     @property
     def ready(self) -> bool | None:
         """Whether the drive says that a reset can work now; None where it does not tell."""
-        good = {
-            c: r.raw for c, r in self.readings.items() if r.quality == "good" and r.raw is not None
-        }
-        return reset_ready(self.profile, good)
+        return reset_ready(self.profile, self._good())
+
+    @property
+    def follows(self) -> str:
+        """The motor's reaction to a reset now, with the inputs that are closed."""
+        good = self._good()
+        return reset_follows(self.profile, {**self.raws, **good}, good)
 
     @property
     def history(self) -> list[str]:
         """The codes of the drive's history, the newest first."""
         return self.profile.data.faults.history
+
+    def _good(self) -> dict[str, int]:
+        """Present raw values."""
+        readings = self.readings.items()
+        return {c: r.raw for c, r in readings if r.quality == "good" and r.raw is not None}

@@ -9,6 +9,7 @@ from rich.text import Text
 from textual.app import ComposeResult
 
 from tui.bus.errors import LineError
+from tui.drive.fault_reset import reset_codes
 from tui.drive.hints import alarms_on, codes_to_read
 from tui.drive.profile.schema import FaultCode
 from tui.session.console import DriveConsole
@@ -92,6 +93,8 @@ class FaultsScreen(OrderKeys):
         codes = []
         if view.present or view.hint is not None:
             codes = codes_to_read(self.session.profile, view.hint)
+        if view.present:
+            codes += reset_codes(self.session.profile)
         if self._unread:
             codes += [*faults.history, *(code for stored in faults.stored for code in stored)]
         if not codes:
@@ -122,14 +125,18 @@ class FaultsScreen(OrderKeys):
         now = self.app.clock.monotonic()
         if record is not None and (record.fault != fault or not (fault or present)):
             record = None
+        active = self.app.fleet.alarms.active if self.app.fleet is not None else ()
+        ours = (one for one in active if one.device == self.session.device)
         return DoctorView(
             profile=self.session.profile,
             fault=fault,
             present=present,
             record=record,
+            since=next(ours, None) if present else None,
             readings={code: one.aged(now, OLD) for code, one in self._readings.items()},
             at=self._at,
             unread=self._unread,
+            raws=self.session.image.raws,
             alarms=alarms,
         )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tui.drive.reset_text import MAY_START
+
 from .action import FAULTS, MONITOR, PARAMETERS, on
 
 RUN = "Run forward: opens a line with the reference, Enter runs."
@@ -18,7 +20,7 @@ TEACH = "Teach the scale of a raw value by the drive's own display."
 GIVE_BY = "Give the reference by a taught preset, or no more; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
 
-RESET_HELP = "Reset a fault; armed, asks. A waiting run command then runs."
+RESET_HELP = f"Reset the fault. Needs arming; asks first. {MAY_START}"
 INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V."
 
 COMMAND_ACTIONS = (

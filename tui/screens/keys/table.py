@@ -42,6 +42,8 @@ PROVE = "Prove that the drive reacts to a silent line as it is set to; armed, as
 GIVE_DRIVE = "Answer a program that asks to command this drive; asks."
 ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
 OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
+WHILE_OPENING: tuple[KeyLabel, ...] = (("leave", "Esc", "cancel"), ("help", "?", "help"))
+"""Keys that mean something while a line is being opened, besides those that stop."""
 NEVER_DROPPED = ("stop_by_space", "help")
 """Actions that stand in the line of keys however narrow the terminal is."""
 WHILE_TYPING: tuple[KeyLabel, ...] = (
@@ -136,7 +138,7 @@ ACTIONS: tuple[Action, ...] = (
         ("scroll(10)", "pagedown", "", "Ten lines older."),
         ("leave", "escape", "back", "Go back."),
     ),
-    *on((OPENING,), ("leave", "escape", "Line", "Go to Line; the drive is asked on.")),
+    *on((OPENING,), ("leave", "escape", "Line", "Cancel the opening, or go to Line.")),
     *on(
         (WIRING,),
         ("scroll(-1)", "up", "", "One line up."),
@@ -214,6 +216,11 @@ def typing_line(
     return fitting(keys, width, NEVER_DROPPED)
 
 
+def opening_line(width: int, stops: str) -> list[KeyLabel]:
+    """The line of keys while a line is being opened: any other key is ignored."""
+    return fitting([*stop_keys(stops, typing=False), *WHILE_OPENING], width, NEVER_DROPPED)
+
+
 def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
     """The keys that stop now, as a line of keys names them: whom that key `stops`, then all.
 
@@ -223,11 +230,17 @@ def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
     return keys if stops in (STOPS_ALL, STOPS_NOBODY) else [*keys, ("stop_all", "F9", STOPS_ALL)]
 
 
+SHELL_KEYS = {"ctrl+z": "Ctrl+Z", "ctrl+backslash": "Ctrl+\\"}
+"""Keys by which a shell suspends or ends a program; Ctrl+C has an action of its own."""
+
+
 def elsewhere(screen: str, key: str, character: str | None = None) -> str:
     """Where a key that a screen does not know has a meaning, in a sentence; empty if nowhere.
 
     Of a key with a sign the table has the `character`, as `*`, and not its name.
     """
+    if shell_key := SHELL_KEYS.get(key):
+        return f"{shell_key} ends nothing here: q leaves the panel."
     keys = {key, character}
     found = [a for a in ACTIONS if keys & {*a.keys.split(",")} and screen not in a.screens]
     if not found:
@@ -239,6 +252,15 @@ def elsewhere(screen: str, key: str, character: str | None = None) -> str:
         return f"{first.shown} has a meaning on {where[0]}: {first.help}"
     *most, last = sorted(set(where), key=lambda name: name[-2])
     return f"{first.shown} has a meaning on {', '.join(most)} and {last}."
+
+
+def once_closed(screen: str, key: str, character: str | None = None) -> str:
+    """Report where a key works that the dialog over a screen does not know; empty if nowhere."""
+    keys = {key, character}
+    here = next((a for a in of_screen(screen) if keys & {*a.keys.split(",")}), None)
+    if here is not None:
+        return f"{here.shown} works once this is closed (Esc): {here.help}"
+    return elsewhere(screen, key, character)
 
 
 __all__ = [
@@ -261,6 +283,8 @@ __all__ = [
     "bindings",
     "keys_line",
     "of_screen",
+    "once_closed",
+    "opening_line",
     "stop_keys",
     "typing_line",
 ]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+
 from rich.style import Style
 from rich.text import Text
 
 from tui.drive.profile.profile import mark_of
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.drive.values import NOT_AVAILABLE
+from tui.drive.values import NOT_AVAILABLE, decimals_of
 from tui.session.reading import Quality, Reading
 from tui.widgets.drawing import cut, short
 from tui.widgets.drive_signs import age_text
@@ -91,7 +93,9 @@ def _field(parameter: Parameter | None, quantity: Quantity) -> int:
     """The width of the digits: the same for every value of a parameter."""
     if parameter is None or not parameter.unit:
         return readout_cells(0, signed=quantity == "output_frequency", whole=5)
-    decimals = len(str(parameter.scale or "1").partition(".")[2])
+    follows = parameter.scale_by
+    scales = [parameter.scale, *(follows.scales.values() if follows is not None else ())]
+    decimals = max(decimals_of(Decimal(scale)) for scale in scales)
     return readout_cells(decimals, signed=quantity == "output_frequency")
 
 

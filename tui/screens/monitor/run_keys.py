@@ -10,7 +10,6 @@ from rich.text import Text
 from textual.events import Key
 
 from tui.bus.errors import LineError
-from tui.drive.shown import number_of
 from tui.session.command.reference import reference_codes
 from tui.session.drive_state import with_direction
 from tui.session.reading import Reading
@@ -21,10 +20,12 @@ from tui.widgets.palette import FAINT
 from ..command.command_keys import OrderKeys
 from ..command.control import hindrance
 from ..keys.monitor_actions import COMMAND_ACTIONS
-from .run_line import GIVEN, STEPS, Purpose, RunLine, limits, proposed, run_lines
+from .run_line import STEPS, Purpose, RunLine, limits, proposed, run_lines
 
 OTHER_STOP_KEYS = frozenset(one.keys for one in COMMAND_ACTIONS if one.id.startswith("stop_as("))
 """Keys that stop in a way of their own, at once."""
+
+ENTER_TOO_EARLY = "Enter ignored: it came before the line could be read. Press it again."
 
 
 class RunKeys(OrderKeys):
@@ -38,17 +39,9 @@ class RunKeys(OrderKeys):
         """Open the line, where the drive is armed and a command can have an effect."""
         if not self._armed_or_told():
             return
-        profile, raws = self.session.profile, self.session.image.raws
-        held = {}
-        for quantity in (one for given, before_ramp, _ in GIVEN for one in (given, before_ramp)):
-            parameter = profile.quantity(quantity)
-            if parameter is None or parameter.code not in raws:
-                continue
-            number = number_of(profile, parameter, raws[parameter.code], raws)
-            if number is not None:
-                held[parameter.code] = number
+        profile, image = self.session.profile, self.session.image
         wanted = self.commander.given.wanted
-        text, unit = proposed(profile, purpose, wanted.text if wanted else "", held)
+        text, unit = proposed(profile, wanted.text if wanted else "", image.raws, image.lacking)
         if purpose == "reference" and not unit:
             self._refuse(f"Where {profile.name} takes its reference is not known.")
             return
@@ -122,8 +115,7 @@ class RunKeys(OrderKeys):
                 self._line = line
                 return
             low, high, _ = limits(self.session.profile, self._around or {})
-            hertz = line.unit == "Hz"
-            self._line = line.stepped(key, low if hertz else None, high if hertz else None)
+            self._line = line.stepped(key, low, high)
         elif key == "backspace":
             self._line = line.erased()
         elif key == "enter":
@@ -135,6 +127,7 @@ class RunKeys(OrderKeys):
     def _entered(self, line: RunLine, event: Key) -> RunLine | None:
         """Do what the line says; it stays where that cannot be meant, or is wrong."""
         if not line.counts(self.app.clock.monotonic()) or not _alone(event):
+            self.app.tell(ENTER_TOO_EARLY)
             return line
         checked = line.checked(self.session.profile, self._around or {})
         if checked.fault:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from typing import Literal
@@ -13,7 +13,13 @@ from rich.text import Text
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
-from tui.session.command.reference import LIMITS, parse_reference
+from tui.drive.shown import number_of
+from tui.session.command.reference import (
+    parse_reference,
+    reference_limits,
+    reference_parameters,
+    step_in,
+)
 from tui.session.reading import Reading
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import (
@@ -37,16 +43,15 @@ STEPS: Mapping[str, Decimal] = {
     "pageup": Decimal(5),
     "pagedown": Decimal(-5),
 }
-"""By key, the step of a reference in Hz, or in tens of rpm."""
+"""By key, the step of a reference: in its unit, rpm in tens."""
 DIGITS_MOST = 7
 AT_ZERO = "At 0 the motor would not turn: type a reference, then Enter."
 GROUND_OF_LINE = Style(bgcolor=SURFACE)
-GIVEN: tuple[tuple[Quantity, Quantity, str], ...] = (
-    ("command_frequency", "frequency_reference", "Hz"),
-    ("command_speed", "speed_reference", "rpm"),
-)
-"""Where a reference is given, where it stands before the ramp, and in which unit; the first that a
-family has."""
+BEFORE_RAMP: Mapping[str, Quantity] = {
+    "command_frequency": "frequency_reference",
+    "command_speed": "speed_reference",
+}
+"""By where a reference is given, where it shows before the ramp."""
 RUN_HEADINGS: Mapping[Purpose, str] = {
     "forward": "RUN FORWARD",
     "reverse": "RUN REVERSE",
@@ -62,7 +67,7 @@ class RunLine:
     text: str
     """The reference as typed, without unit; empty where the drive takes none from here."""
     unit: str
-    """Hz or rpm; empty where the drive takes no reference from here."""
+    """That of the drive's reference; empty where the drive takes none from here."""
     opened: float
     """When it was drawn first, on the monotonic clock."""
     stamp: int
@@ -91,7 +96,7 @@ class RunLine:
 
     def stepped(self, key: str, low: Decimal | None, high: Decimal | None) -> RunLine:
         """A step up or down, at most to the limits."""
-        step = STEPS[key] * (1 if self.unit == "Hz" else 10)
+        step = STEPS[key] * step_in(self.unit)
         try:
             number = Decimal(self.text or "0") + step
         except InvalidOperation:
@@ -132,36 +137,35 @@ class RunLine:
 
 
 def proposed(
-    profile: Profile, purpose: Purpose, wanted: str, raws: Mapping[str, Decimal]
+    profile: Profile, wanted: str, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> tuple[str, str]:
     """Text and unit that a line begins with: the last reference given, else the drive's own.
 
-    Where that was not read yet it is what the drive goes by now: 0 would stop the motor. `raws` are
-    engineering values by code. Both empty where the drive takes none from here.
+    Where that was not read yet it is what the drive goes by now: 0 would stop the motor. Both
+    empty where the drive takes none from here.
     """
-    for quantity, before_ramp, unit in GIVEN:
-        parameter = profile.quantity(quantity)
-        if parameter is None:
+    parameter = next(iter(reference_parameters(profile)), None)
+    if parameter is None:
+        return "", ""
+    unit = profile.unit(parameter, raws)
+    if wanted.endswith(f" {unit}"):
+        return wanted.removesuffix(unit).strip(), unit
+    now = profile.quantity(BEFORE_RAMP.get(parameter.quantity or "", "frequency_reference"))
+    for one in (parameter, now):
+        if one is None or one.code not in raws or profile.unit(one, raws) != unit:
             continue
-        if wanted.endswith(unit):
-            return wanted.removesuffix(unit).strip(), unit
-        held = raws.get(parameter.code)
-        if held is None and (now := profile.quantity(before_ramp)) is not None:
-            held = raws.get(now.code)
-        return (f"{abs(held):f}" if held is not None else "0"), unit
-    return "", ""
+        held = number_of(profile, one, raws[one.code], raws, absent)
+        if held is not None:
+            return f"{abs(held):f}", unit
+    return "0", unit
 
 
 def limits(
     profile: Profile, readings: Mapping[str, Reading]
 ) -> tuple[Decimal | None, Decimal | None, str]:
-    """The lowest and the highest reference in Hz, as far as known, and the code of the highest."""
-    low = _number(profile, LIMITS[0], readings)
-    for quantity in LIMITS[1:]:
-        if high := _number(profile, quantity, readings):
-            parameter = profile.quantity(quantity)
-            return low, high, parameter.code if parameter else ""
-    return low, None, ""
+    """Lowest and highest reference in its unit, as far as known, and the code of the highest."""
+    parameter = next(iter(reference_parameters(profile)), None)
+    return (None, None, "") if parameter is None else reference_limits(profile, readings, parameter)
 
 
 def _number(
@@ -230,7 +234,7 @@ def _second(line: RunLine, now: float) -> Text:
     second.append(" gives it   " if line.purpose == "reference" else " runs   ", FAINT)
     if line.unit:
         second.append("↑ ↓", KEY)
-        second.append(f" {1 if line.unit == 'Hz' else 10} {line.unit}   ", FAINT)
+        second.append(f" {step_in(line.unit)} {line.unit}   ", FAINT)
     second.append("Esc", KEY)
     second.append(" no   ", FAINT)
     second.append("Space", STOP_KEY)
@@ -243,7 +247,7 @@ def _around(
     """The limits and the ramp, as far as they are known."""
     parts = []
     low, high, code = limits(profile, readings)
-    if line.unit == "Hz" and high is not None:
+    if high is not None:
         parts.append(f"{low or Decimal(0):f} .. {code} {high:f}")
     ramp = _number(profile, "acceleration", readings)
     if ramp is not None:

@@ -107,7 +107,8 @@ class MonitorScreen(InputKeys):
 
     def on_resize(self, event: Resize) -> None:
         """More room, more of everything."""
-        self._place(self._room())
+        if not self.is_too_small:
+            self._place(self._room())
 
     def on_screen_suspend(self) -> None:
         """Stand still while another screen is on top.
@@ -136,7 +137,8 @@ class MonitorScreen(InputKeys):
     def draw_frame(self, view: FrameView) -> None:
         """A message of several lines moves what stands above it, and hides none of it."""
         super().draw_frame(view)
-        self._place(self._room())
+        if not self.is_too_small:
+            self._place(self._room())
 
     def _room(self) -> Arrangement:
         """How many rows each part has."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 from tui.session.command.stop_report import Phase, StopReport
@@ -58,11 +57,10 @@ class ViewSource:
         )
 
     def _fault_at(self) -> str:
-        """When the fault of this drive was seen first."""
+        """The time of this drive's trip, or since when its fault was seen."""
         fleet, device = self._app.fleet, self._console.session.device
         active = fleet.alarms.active if fleet else ()
-        walls = [fault.wall for fault in active if fault.device == device]
-        return time.strftime("%H:%M:%S", time.localtime(walls[0])) if walls else ""
+        return next((fault.when for fault in active if fault.device == device), "")
 
     def _stop(self, now: float) -> StopReport | None:
         """What a stop of this drive has come to; a good end is told for a while only."""

@@ -8,7 +8,7 @@ from rich.text import Text
 from tui.bus.api import LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.command.stop_report import Phase, StopReport
+from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.monitor.timeout import TOLD_SHARE
 from tui.session.reading import Quality
@@ -31,7 +31,8 @@ STATE_LABEL_CELLS = 11
 STANDSTILL = 0.05
 """Hz below which a motor stands."""
 HEADS = {
-    Phase.SENDING: ("STOPPING", ATTENTION),
+    Phase.SENDING: ("STOP WAITS", ATTENTION),
+    Phase.UNHEEDED: (" NOT STOPPED ", FAULT_BLOCK),
     Phase.STOPPING: ("STOPPING", ATTENTION),
     Phase.STOPPED: ("STOPPED", STRONG),
     Phase.FAILED: (" NOT STOPPED ", FAULT_BLOCK),
@@ -59,7 +60,7 @@ def state_lines(view: View, width: int) -> list[Text]:
 def _head(view: View, width: int) -> tuple[Text, list[Text]]:
     """The state in words, and what must be said beside it."""
     snapshot = view.snapshot
-    if view.stop is not None and view.stop.phase is Phase.FAILED:
+    if view.stop is not None and view.stop.phase in NOT_STOPPING:
         return _stop(view.stop, width)
     if view.line.status is not LineStatus.CONNECTED and snapshot is not None:
         lost = "LINE LOST" if view.line.status is LineStatus.LOST else "LINE NOT OPEN"
@@ -76,10 +77,10 @@ def _head(view: View, width: int) -> tuple[Text, list[Text]]:
 
 def _stop(report: StopReport, width: int) -> tuple[Text, list[Text]]:
     words, style = HEADS[report.phase]
-    text = report.text.removeprefix("NOT STOPPED: ")
+    text = report.text.removeprefix(NOT_STOPPED)
     if report.phase is Phase.STOPPED:
         text = "by the stop key"
-    most = 4 if report.phase is Phase.FAILED else 2
+    most = 4 if report.phase in NOT_STOPPING else 2
     return Text(words, style), [Text(line, PLAIN) for line in wrapped(text, width, most)]
 
 
@@ -106,8 +107,8 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
         return Text("stopped", STRONG), [Text(short(state.name, width), FAINT)]
     hindrance = view.control.hindrance
     if view.stands_by and hindrance is None:
-        if view.read_only:
-            return Text("stands by", STRONG), [Text("read-only: runs nothing", FAINT)]
+        if why := "read-only: runs nothing" if view.read_only else view.control.barred:
+            return Text("stands by", STRONG), [Text(line, FAINT) for line in wrapped(why, width, 2)]
         armed = view.control.armed_for is not None
         return Text("r runs it" if armed else "a arms, r runs", STRONG), []
     if hindrance is None:
@@ -148,7 +149,7 @@ def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]
     code = fault.code if fault else "code not read"
     name = wrapped(fault.name if fault else "", width, 2)
     lines = [Text(line, STRONG) for line in name]
-    lines.append(Text(f"since {view.fault_at}" if view.fault_at else "", FAINT))
+    lines.append(Text(view.fault_at, FAINT))
     lines += [Text("")] * (3 - len(lines))
     lines.append(Text.assemble(("5", "bold #7fb0dc"), (" says what to do", PLAIN)))
     return Text(f" FAULT {code} ", FAULT_BLOCK), lines
@@ -189,6 +190,8 @@ def _timeout(view: View, width: int) -> tuple[str, Style]:
     text = f"{watch.timeout:g} s"
     if watch.active:
         return text, PLAIN
+    if not watch.acts:
+        return "off", FAINT
     begins = ", once commanded"
     return (
         text + begins if width >= STATE_LABEL_CELLS + len(text + begins) else f"{text}, idle"

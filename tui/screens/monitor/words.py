@@ -39,6 +39,8 @@ PLAIN_ANSWERS = frozenset(
     {"", "yes", "no", "on", "off", "none", "normal", "0", "1", "in force", "in progress"}
 )
 """What a bit says that is no more than yes or no: alone it would not tell of what."""
+DENIALS = frozenset({"no", "off", "none", "normal", "0"})
+"""Words of a bit that deny its name."""
 GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
 """What a bit that is 1 says without more than its name does."""
 ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
@@ -169,7 +171,17 @@ def _heading(view: View, page: WordPage, width: int) -> Text:
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
     """A bit in exactly so many cells; whoever takes it copies it before changing it."""
+    counts = bit.counts
+    if raw is not None and counts is not None and raw & counts.mask != counts.value:
+        return _dim_bit(bit, width)
     return _drawn_bit(bit, None if raw is None else bool(raw >> bit.bit & 1), width)
+
+
+@lru_cache(maxsize=128)
+def _dim_bit(bit: Bit, width: int) -> Text:
+    """A bit that means nothing in this state: its name, and no words of its value."""
+    text = Text(f" {bit.bit:>2} ", LINE, no_wrap=True).append("·", FAINT)
+    return text.append(f" {cut(bit.name, width - 7)} ", FAINT)
 
 
 @lru_cache(maxsize=1024)
@@ -179,16 +191,30 @@ def _drawn_bit(bit: Bit, on: bool | None, width: int) -> Text:
     room = width - 7
     if on is None:
         return text.append(f"  {cut(bit.name, room)} ", FAINT)
-    text.append("●" if on else "·", ALARM if on and bit.alarm else STRONG if on else FAINT)
-    return text.append(f" {cut(_bit_words(bit, on, room), room)} ", PLAIN if on else FAINT)
+    true = _holds(bit, on)
+    alarm = on and bit.alarm
+    text.append("●" if true else "·", ALARM if alarm else STRONG if true else FAINT)
+    return text.append(f" {cut(_bit_words(bit, on, room), room)} ", PLAIN if true else FAINT)
+
+
+def _holds(bit: Bit, on: bool) -> bool:
+    """True if the words that are drawn hold now; a bit at 0 may state a thing too."""
+    if (bit.on if on else bit.off).casefold() not in PLAIN_ANSWERS:
+        return True
+    return on or _denied_at_1(bit)
+
+
+def _denied_at_1(bit: Bit) -> bool:
+    """True if the name alone would be wrong at 1 and right at 0."""
+    on, off = bit.on.casefold(), bit.off.casefold()
+    return on in DENIALS or (off in PLAIN_ANSWERS - DENIALS and off != "")
 
 
 def _bit_words(bit: Bit, on: bool, room: int) -> str:
     """The name of a bit; what it says as well, where that is more than yes or no and fits."""
     said = bit.on if on else bit.off
-    if said.lower() in PLAIN_ANSWERS:
-        return bit.name
-    if said.casefold() in bit.name.casefold():
+    plain = said.casefold() in PLAIN_ANSWERS
+    if not _denied_at_1(bit) and (plain or (on and said.casefold() in bit.name.casefold())):
         return bit.name
     alone = said[:1].upper() + said[1:]
     if bit.name.casefold() in said.casefold():

@@ -168,7 +168,8 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     if edit is not None and locked:
         return Text(f"→ {edit.text} is staged. {locked}", ALARM)
     if edit is not None:
-        said = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; w writes it."
+        keys = _keys_to_write(editor, "it")
+        said = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; {keys}."
         return Text(f"{said} {edit.remark}".strip(), ALARM if edit.remark else ATTENTION)
     if code in editor.waits_for_reset:
         return Text("In force only after a reset of the drive.", ALARM)
@@ -186,6 +187,14 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     return Text("")
 
 
+def _keys_to_write(editor: Editor, what: str) -> str:
+    """The keys that write what is staged, in a few words; or that none does now."""
+    arming = editor.session.arming
+    if arming.hindrance:
+        return "not to be written now"
+    return f"w writes {what}" if arming.armed else f"a arms, w writes {what}"
+
+
 def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
     """What a changed setting was, and how surely that is known."""
     said = f"Not the factory value, {factory_text(editor, parameter)}"
@@ -200,8 +209,7 @@ def status_line(editor: Editor, where: str, width: int) -> Text:
     text, count = Text("─ ", LINE, no_wrap=True), len(editor.staging.edits)
     text.append(f"{count} staged", ATTENTION if count else FAINT)
     if count:
-        text.append(": w writes ", FAINT)
-        text.append("it" if count == 1 else "them", FAINT)
+        text.append(f": {_keys_to_write(editor, 'it' if count == 1 else 'them')}", FAINT)
     if editor.unsaved:
         text.append(" · ", LINE)
         text.append(f"{len(editor.unsaved)} not saved", ALARM)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
@@ -16,7 +15,7 @@ from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure, factory_raw
 from tui.drive.settings.in_force import limit_passed
-from tui.drive.values import encode
+from tui.drive.shown import number_of, raw_of_text
 from tui.session.settings.editor import Editor
 from tui.widgets.fields import NumberInput
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
@@ -108,13 +107,13 @@ class EditNumber(Question[str | None]):
         """The next value that the drive can hold."""
         editor, parameter = self._editor, self._parameter
         profile, field = editor.session.profile, self.query_one(Input)
-        scale = profile.scale(parameter, editor.values.raws, editor.values.lacking)
-        if scale is None:
-            return
+        raws, lacking = editor.values.raws, editor.values.lacking
         try:
-            raw = encode(parameter, field.value, profile.names(parameter), scale).raw
-            number = Decimal(raw + steps) * scale
-        except (DriveError, InvalidOperation):
+            raw = raw_of_text(profile, parameter, field.value, raws, lacking).raw
+        except DriveError:
+            return
+        number = number_of(profile, parameter, raw + steps, raws, lacking)
+        if number is None:
             return
         field.value = f"{number:f}"
         field.cursor_position = len(field.value)
@@ -219,7 +218,7 @@ class EditBits(KeyQuestion[int | None]):
         for bit in self._parameter.bits:
             on, was = self._word >> bit.bit & 1, self._held >> bit.bit & 1
             text = Text(no_wrap=True)
-            text.append(f" {bit.bit:>2} {'●' if on else '·'} ", STRONG if on else FAINT)
+            text.append(f" {bit.bit:>2} {on} ", STRONG if on else FAINT)
             text.append(f"{bit.name}", STRONG if on != was else PLAIN)
             words = bit.on if on else bit.off
             text.append(f": {words}" if words else "", FAINT)

@@ -40,9 +40,11 @@ class ParameterKeys(TeachKeys):
                 search.value = ""
         self.list_again()
 
-    def note(self, text: str) -> None:
-        """Say what a key has come to."""
+    def note(self, text: str, keys: str = "") -> None:
+        """Report the result of a key, and which `keys` of this screen go on from there."""
         self._add("told", text)
+        if keys:
+            self.hint_keys(keys)
 
     def _refuse(self, text: str) -> None:
         """Say why something was not done."""

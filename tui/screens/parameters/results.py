@@ -31,10 +31,13 @@ OUTCOME_WORDS = {
 """What became of an edit, in a word; else it was not written."""
 
 
-class Results(KeyQuestion[None]):
-    """A list to read through; scrolls."""
+class Results(KeyQuestion[bool | None]):
+    """A list to read through; scrolls. True if what was written is to be saved next."""
 
-    BINDINGS: ClassVar = [Binding("enter", "no", show=False)]
+    BINDINGS: ClassVar = [
+        Binding("enter", "no", show=False),
+        Binding("S", "save", show=False),
+    ]
 
     def __init__(self, applied: Applied, *, staged: bool = False) -> None:
         """`staged` says whether edits are left: u takes those back first."""
@@ -48,9 +51,15 @@ class Results(KeyQuestion[None]):
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
             keys = [("Enter or Esc", "closes")]
+            if self._applied.unsaved:
+                keys.append(("S", "saves to EEPROM, asks"))
             if self._applied.written and not self._staged:
                 keys.append(("u", "afterwards stages the old values"))
             yield Plain(hint(*keys), id="hint")
+
+    def action_save(self) -> None:
+        """Close, and ask whether to save to EEPROM."""
+        self.answer(True)
 
 
 class RestQuestion(KeyQuestion[bool]):

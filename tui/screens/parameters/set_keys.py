@@ -194,8 +194,9 @@ class SetKeys(ParameterKeys):
         writes, skips = plan.count("write"), plan.count("skip")
         differ = "differs" if writes == 1 else "differ"
         self.note(
-            f"{editor.other_label}: {writes} {differ} and can be staged (i), {plan.count('equal')}"
-            f" are equal, {skips} left out."
+            f"{editor.other_label}: {writes} {differ} and can be staged, {plan.count('equal')}"
+            f" are equal, {skips} left out.",
+            "Press i to stage." if writes else "",
         )
         self.listed.choose(Choice("differs"))
         self.clear_search()
@@ -203,7 +204,7 @@ class SetKeys(ParameterKeys):
     def action_stage_set(self) -> None:
         """Stage what the set has otherwise; nothing is written."""
         if self.editor.source is None:
-            self.note("Nothing to stage from: Ctrl+O chooses a file or another drive.")
+            self.note("Nothing to stage from.", "Press Ctrl+O to choose a file or another drive.")
             return
         self.run_worker(self._stage_set(), exclusive=True, group="sets")
 
@@ -218,7 +219,9 @@ class SetKeys(ParameterKeys):
             return
         editor.staging.take_plan(plan)
         left = [item for item in plan.of_kind("skip") if item.reason != "no setting"]
-        self.note(f"{len(plan.edits)} staged from {editor.other_label}; w writes all.")
+        count = len(plan.edits)
+        keys = self.how_to_write("all" if count > 1 else "it") if count else ""
+        self.note(f"{count} staged from {editor.other_label}.", keys)
         if left:
             self.app.push_screen(Skipped(len(plan.edits), editor.other_label, left))
 

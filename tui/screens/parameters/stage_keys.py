@@ -74,8 +74,32 @@ class StageKeys(ParameterKeys):
         except DriveError as refused:
             self._refuse(str(refused))
         else:
-            self.note(remark or _staged_text(editor, code))
+            if remark:
+                self.note(remark)
+            else:
+                self._tell_staged(code)
             self.list_again()
+
+    def _tell_staged(self, code: str) -> None:
+        """Report what is staged, and how it is written in the present state."""
+        edit, count = self.editor.staging.edits.get(code), len(self.editor.staging.edits)
+        if edit is None:
+            self.note(f"{code} holds that already: not staged.")
+            return
+        text = f"{code} → {edit.text}: {count} staged."
+        if waits := [e.code for e in self.editor.staging.edits if self._waits_for_rest(e.code)]:
+            which = ", ".join(waits) if len(waits) <= WAITING_NAMED else f"{len(waits)} of them"
+            wait = "waits" if len(waits) == 1 else "wait"
+            self.note(f"{text} {which} {wait} until the motor stands.")
+            return
+        them = "it" if count == 1 else "both" if count == 2 else f"all {count}"
+        running = self.editor.state == "running" and not self.session.arming.hindrance
+        how = self.how_to_write(them)
+        self.note(text, f"{how.removesuffix('.')}, with the motor running." if running else how)
+
+    def _waits_for_rest(self, code: str) -> bool:
+        refused = self.editor.refusal(code)
+        return refused is not None and refused.reason == "running"
 
     def action_step_value(self, steps: int) -> None:
         """Stage the next value that the drive can hold."""
@@ -126,6 +150,8 @@ class StageKeys(ParameterKeys):
             self._take_back(staged[-1].code)
         else:
             self.note(staging.stage_old())
+            if count := len(staging.edits):
+                self.hint_keys(self.how_to_write("it" if count == 1 else "them"))
         self.list_again()
 
     def _take_back(self, code: str) -> None:
@@ -185,21 +211,3 @@ def limit_of_edit(editor: Editor, code: str, answer: str | int) -> str:
     else:
         after = edits.stage_raw(profile, code, answer, raws, editor.values.lacking)
     return limit_passed(profile, edits, after, raws)
-
-
-def _staged_text(editor: Editor, code: str) -> str:
-    edit, count = editor.staging.edits.get(code), len(editor.staging.edits)
-    if edit is None:
-        return f"{code} holds that already: not staged."
-    if waits := [e.code for e in editor.staging.edits if _waits_for_rest(editor, e.code)]:
-        which = ", ".join(waits) if len(waits) <= WAITING_NAMED else f"{len(waits)} of them"
-        wait = "waits" if len(waits) == 1 else "wait"
-        return f"{code} → {edit.text}: {count} staged. {which} {wait} until the motor stands."
-    them = "it" if count == 1 else "both" if count == 2 else f"all {count}"
-    running = ", with the motor running" if editor.state == "running" else ""
-    return f"{code} → {edit.text}: {count} staged. w writes {them}{running}."
-
-
-def _waits_for_rest(editor: Editor, code: str) -> bool:
-    refused = editor.refusal(code)
-    return refused is not None and refused.reason == "running"

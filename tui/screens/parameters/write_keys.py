@@ -23,7 +23,7 @@ class WriteKeys(ParameterKeys):
 
         edits = [e for e in self.editor.staging.edits if not only or e.code == only]
         if not edits:
-            self.note("Nothing is staged: Enter edits the parameter under the cursor.")
+            self.note("Nothing is staged.", "Press Enter to edit the parameter under the cursor.")
             return
         if not self._armed_or_told():
             return
@@ -81,7 +81,8 @@ class WriteKeys(ParameterKeys):
         self.list_again()
         stamp = applied.stamp
         if not applied.waits or applied.stopped or stamp != self.session.work.stops:
-            self.app.push_screen(Results(applied, staged=len(self.editor.staging.edits) > 0))
+            results = Results(applied, staged=len(self.editor.staging.edits) > 0)
+            self.app.push_screen(results, lambda save: self.action_save_eeprom() if save else None)
             return
 
         def told(sure: bool | None) -> None:

@@ -28,6 +28,8 @@ from .work import LOOK_WHETHER_OPEN, waited
 
 STANDS_WITHIN = 120.0
 """Seconds in which a motor is to stand after a stop."""
+SHORTEST_CYCLE, LONGEST_CYCLE = 0.05, 86400.0
+"""Seconds of a cycle of `Drive.watch`."""
 SAMPLES_WAITING = 64
 """Cycles kept for a script that is slower than the line; older ones are dropped."""
 
@@ -63,8 +65,11 @@ class Drive:
     def watch(self, *codes: str, every: float = 1.0) -> Iterator[Sample]:
         """Cycle after cycle, `every` so many seconds, until the script takes no more.
 
-        A value is good if it was read in that very cycle.
+        A value is good if it was read in that very cycle. Raises DriveError for a cycle time that
+        is not a number from 0.05 s to a day.
         """
+        if not SHORTEST_CYCLE <= every <= LONGEST_CYCLE:
+            raise DriveError(f"every={every} is not a cycle time. Use 0.05 to 86400 seconds.")
         named = self._named(codes)
         waiting: queue.Queue[Snapshot] = queue.Queue(SAMPLES_WAITING)
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from tui.bus.api import LineWorker
 from tui.bus.errors import LineError
-from tui.drive.blocks.assignment import Assignment, MappingError, SlotChange
+from tui.drive.blocks.assignment import Assignment, MappingError
 from tui.drive.blocks.user_words import UserWords
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
@@ -158,7 +158,6 @@ class BlockEditor:
                     plan,
                     permit=permit,
                     expected=proposals.seen.get(plan.block.id),
-                    sent=self._sent,
                 )
                 self.views = {
                     **self.views,
@@ -169,11 +168,6 @@ class BlockEditor:
             return " ".join(dict.fromkeys(texts))
 
         self._run(work, "Writing, each slot read back", stamp)
-
-    def _sent(self, change: SlotChange, held: bool) -> None:
-        """What the drive holds from now on is on the list of what is to be saved."""
-        if held and self.session.profile[change.slot].storage == "ram-until-saved":
-            self.session.unsaved |= {change.slot}
 
     def example(self) -> str:
         """What may be typed to write through the outputs. Raises MappingError."""

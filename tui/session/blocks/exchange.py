@@ -141,7 +141,7 @@ class _Exchange:
     ) -> tuple[tuple[int, ...], dict[str, int]]:
         """The words that came back, and what the drive holds then; all into the journal."""
         words = [to_words(parameter, raws[parameter.code])[0] for parameter in self.targets]
-        answer, back, lost = "ok", dict[str, int](), False
+        answer, back, lost, sent = "ok", dict[str, int](), False, True
         image = self.session.image
         before = {p.code: image.get(p.code) for p in self.targets}
         for code in before:
@@ -150,7 +150,7 @@ class _Exchange:
             reply = await self._transmit(words)
             back = await self._held()
         except RequestRefused as error:
-            answer = str(error)
+            answer, sent = str(error), False
             for code, held_before in before.items():
                 image.believe(code, held_before)
             raise
@@ -164,6 +164,7 @@ class _Exchange:
             self.session.note_command()
             for parameter in self.targets:
                 entry = self._record(parameter, held, raws, answer, back)
+                self.writer.journal.add(entry, sent=sent)
                 if lost:
                     self.writer.complete_later(entry, parameter)
         return reply, back
@@ -224,7 +225,7 @@ class _Exchange:
         code = parameter.code
         if code in self._not_held(raws, back):
             answer = "holds another value"
-        entry = parameter_entry(
+        return parameter_entry(
             self.session,
             parameter,
             old=held.get(code),
@@ -233,8 +234,6 @@ class _Exchange:
             why=f"through {self.outputs.block.name.lower()}",
             read_back=back.get(code),
         )
-        self.writer.journal.add(entry)
-        return entry
 
     def _text(self, parameter: Parameter, raw: int | None) -> str:
         return raw_text(self.session, parameter, raw)

@@ -10,8 +10,8 @@ from tui.drive.blocks.wire_cost import block_request, reach, together
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.drive.shown import shown_text, typed_text
-from tui.drive.values import encode, to_words
+from tui.drive.shown import raw_of_text, shown_text, typed_text
+from tui.drive.values import to_words
 from tui.wire.frames import hex_text
 
 REFERENCE_QUANTITIES = frozenset({"command_frequency", "command_speed"})
@@ -69,8 +69,7 @@ def meant(
         parameter = profile.find(code)
         if not sign or parameter.code not in stand:
             raise ValueRefused(f"{part!r}: write CODE=VALUE with one of {', '.join(stand)}.")
-        scale = profile.scale(parameter, raws, absent)
-        wanted[parameter.code] = encode(parameter, value, profile.names(parameter), scale).raw
+        wanted[parameter.code] = raw_of_text(profile, parameter, value, raws, absent).raw
     if not wanted:
         raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
     places = reach(profile, outputs, wanted)

@@ -122,9 +122,7 @@ class _Writing:
         for slot, raw in self.plan.slots.items():
             if held[slot] != raw:
                 raise self._changed(slot, raw, held[slot])
-        unsaved = any(
-            self.session.profile[slot].storage == "ram-until-saved" for slot in block.slots
-        )
+        unsaved = any(slot in self.session.unsaved for slot in block.slots)
         return Written(self.done, block.effective == "after-reset", unsaved)
 
     async def _held(self) -> dict[str, int]:

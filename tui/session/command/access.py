@@ -33,6 +33,10 @@ STEP_TIME = 2.0
 STATE_POLL_INTERVAL = 0.05
 
 
+class NotFollowed(OrderRefused):
+    """A command that was sent, and whose state the drive did not reach."""
+
+
 @dataclass(frozen=True, slots=True)
 class CommandAccess:
     """Reads and writes of one command, under its permit."""

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from tui.drive.channel import channel_codes, reference_channel
+from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, state_of
-from tui.drive.orders import STOP_ORDERS, OrderRefused, choose
+from tui.drive.fault_reset import no_fault, not_in_command
+from tui.drive.held_back import held_back, state_refusal
+from tui.drive.orders import STOP_ORDERS, OrderRefused, chart_in_force, choose, order_target
 from tui.drive.profile.schema import CommandOption, Order, OrderId
 from tui.drive.values import from_words
 
 from .access import CommandAccess
-from .motor_start import MotorStart
-from .reference import Reference, parse_reference, reference_codes, within_limits
+from .motor_start import MotorStart, without_effect, write_reference
+from .reference import (
+    Reference,
+    parse_reference,
+    reference_codes,
+    reference_parameters,
+    step_in,
+    within_limits,
+)
+from .way_out import told_anywhere
 
 STILL_IN_FAULT = "sent, but the drive is still in fault, as long as its cause is there"
 
@@ -23,11 +33,15 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
     if id in ("forward", "reverse"):
         return await MotorStart(access).carry_out(chart, id)
     state = await access.state(chart)
+    if id == "reset" and (nothing := no_fault(chart, state.id, state.kind, state.name)):
+        raise OrderRefused(nothing)
     # a fault holds no stop back: its word follows the status word alone
     order = choose(chart, id, access.raws, None if id in STOP_ORDERS else state)
     await access.send(chart, order)
     now = await access.state(chart)
-    name = STILL_IN_FAULT if id == "reset" and now.kind == "fault" else now.name
+    name = now.name
+    if id == "reset" and now.kind == "fault":
+        name = not_in_command(access.session.profile, access.raws) or STILL_IN_FAULT
     return f"{order.name}: {name}{await _cleared(access, order)}"
 
 
@@ -48,51 +62,61 @@ async def _cleared(access: CommandAccess, order: Order) -> str:
     return f"; the reference is {reading.value.display} now"
 
 
-async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | None) -> str:
-    """Reference and run command in one, once nothing speaks against the command."""
-    chart = await access.chart(id)
+async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -> str:
+    """Check all that a run depends on, as if the line had taken the control; write nothing."""
+    profile, chart = access.session.profile, await access.chart()
+    await access.state(chart)
+    taken = {
+        order_target(profile, chart, order).code: order.words[-1]
+        for order in chart.orders
+        if order.id == "take-control"
+    }
+    raws = {**access.raws, **taken}
+    if (then := chart_in_force(profile, raws)) is None:
+        then = chart
+    if (held := held_back(profile, then, id, raws)) is not None:
+        raise OrderRefused(told_anywhere(held))
+    if refusal := state_refusal(profile, then, id, raws):
+        raise OrderRefused(refusal)
     if reference is not None:
-        await give_reference(access, reference)
-    done = await MotorStart(access).carry_out(chart, id)
-    return done if reference is None else f"{done}{_without_effect(access)}"
+        await _typed_reference(access, reference)
+    return "Nothing speaks against the run."
+
+
+async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | None) -> str:
+    """Reference and run command in one, once nothing speaks against either."""
+    chart = await access.chart(id)
+    wanted = None if reference is None else await _typed_reference(access, reference)
+    done = await MotorStart(access).carry_out(chart, id, wanted)
+    return done if reference is None else f"{done}{without_effect(access)}"
 
 
 async def give_reference(access: CommandAccess, text: str) -> str:
     """Write a reference as typed."""
-    profile = access.session.profile
-    readings = await access.read([*reference_codes(profile), *channel_codes(profile)])
-    return await _write_reference(access, parse_reference(profile, text, readings))
+    wanted = await _typed_reference(access, text)
+    return await write_reference(access, wanted, replaceable=True)
 
 
 async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
-    """The reference so many Hz higher or lower."""
+    """The reference so many Hz higher or lower; % and V in steps of one, rpm of ten."""
     profile = access.session.profile
     readings = await access.read(reference_codes(profile))
-    parameter = profile.quantity("command_frequency")
+    parameter = next(iter(reference_parameters(profile)), None)
     reading = readings.get(parameter.code) if parameter else None
-    if reading is None or reading.value is None or reading.value.number is None:
+    value = reading.value if reading is not None else None
+    if parameter is None or value is None or value.number is None or value.unit == "raw":
         raise OrderRefused(f"Where {profile.name} takes its reference is not known.")
-    number = within_limits(profile, reading.value.number + hertz, readings)
-    return await _write_reference(access, parse_reference(profile, f"{number:f}Hz", readings))
+    number = value.number + hertz * step_in(value.unit)
+    number = within_limits(profile, number, readings, parameter)
+    wanted = parse_reference(profile, f"{number:f}{value.unit}", readings)
+    return await write_reference(access, wanted, replaceable=True)
 
 
-async def _write_reference(access: CommandAccess, reference: Reference) -> str:
-    await access.writer.write_parameter(
-        reference.parameter, reference.raw, why="reference", replaceable=True
-    )
-    access.session.note_command()
-    access.given.note_reference(reference)
-    rounded = ", rounded to what the drive can hold" if reference.rounded else ""
-    without = _without_effect(access)
-    return f"Reference {reference.text} ({reference.parameter.code}){rounded}{without}"
-
-
-def _without_effect(access: CommandAccess) -> str:
-    """That a reference given from here changes nothing, where somebody else surely gives it."""
-    found = reference_channel(access.session.profile, access.raws)
-    if found is None or found.by_line is not False:
-        return ""
-    return f"; no effect from here: the reference comes from {found.text}"
+async def _typed_reference(access: CommandAccess, text: str) -> Reference:
+    """A reference as typed, checked against what the drive holds now."""
+    profile = access.session.profile
+    readings = await access.read([*reference_codes(profile), *channel_codes(profile)])
+    return parse_reference(profile, text, readings)
 
 
 async def set_option(access: CommandAccess, option: CommandOption, bits: int) -> str:

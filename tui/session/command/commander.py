@@ -23,7 +23,14 @@ from ..read.reader import Reader
 from ..starts.keeper import NothingToTakeOver
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .access import CommandAccess
-from .carry_out import give_order, give_reference, run_at_reference, set_option, step_reference
+from .carry_out import (
+    check_run,
+    give_order,
+    give_reference,
+    run_at_reference,
+    set_option,
+    step_reference,
+)
 from .control_source import configure
 from .given import GivenCommands
 
@@ -99,8 +106,15 @@ class Commander:
         self.last_run = (id, reference)
         self._begin(lambda access: run_at_reference(access, id, reference), stamp)
 
+    def check_run(self, id: OrderId, reference: str | None = None) -> None:
+        """Check all that a run depends on, as if the line had the control; write nothing.
+
+        Raises OrderRefused when the drive is not armed.
+        """
+        self._begin(lambda access: check_run(access, id, reference), None)
+
     def refer(self, text: str, stamp: int | None = None) -> None:
-        """Give a reference as typed: 30, 30Hz, 900rpm. Raises OrderRefused when not armed."""
+        """Give a reference as typed: 30, 30Hz, 900rpm, 40%. Raises OrderRefused when not armed."""
         self._begin(lambda access: give_reference(access, text), stamp)
 
     def step(self, hertz: Decimal, stamp: int | None = None) -> None:

@@ -12,6 +12,8 @@ class GivenCommands:
     def __init__(self, session: DriveSession) -> None:
         self._session = session
         self._wanted: Reference | None = None
+        self.reference_text = ""
+        """The result of the last reference that was given, for a person."""
         self._written: dict[str, int] = {}
         self._written_under = 0
         """The count of stops under which they were written."""
@@ -21,9 +23,9 @@ class GivenCommands:
         """The reference that was given last."""
         return self._wanted
 
-    def note_reference(self, reference: Reference) -> None:
-        """A reference was given."""
-        self._wanted = reference
+    def note_reference(self, reference: Reference, text: str) -> None:
+        """A reference was given; `text` is the result, for a person."""
+        self._wanted, self.reference_text = reference, text
 
     def forget_reference(self) -> None:
         """The drive has put it back: nothing may bring it anew."""

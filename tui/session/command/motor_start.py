@@ -4,17 +4,47 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tui.drive.channel import reference_channel
 from tui.drive.chart import ENABLED_KINDS, read_chart
-from tui.drive.held_back import IN_FAULT
+from tui.drive.held_back import state_refusal
 from tui.drive.orders import OrderRefused, choose, walk
-from tui.drive.profile.schema import Chart, Order, OrderId
+from tui.drive.profile.schema import Chart, Order, OrderId, Parameter
 
 from ..drive import DriveSession
 from ..starts.keeper import record_start
-from .access import STATE_POLL_INTERVAL, CommandAccess
+from .access import STATE_POLL_INTERVAL, CommandAccess, NotFollowed
+from .reference import Reference, read_back_differs, reference_codes
 
 LOOKS = 10
 """Looks within which the direction of a start must be the ordered one."""
+
+
+class WrongReference(OrderRefused):
+    """The drive holds another reference than was requested; nothing was started."""
+
+
+async def write_reference(
+    access: CommandAccess, reference: Reference, *, replaceable: bool = False
+) -> str:
+    """Write a reference; the result, for a person."""
+    await access.writer.write_parameter(
+        reference.parameter, reference.raw, why="reference", replaceable=replaceable
+    )
+    access.session.note_command()
+    converted = f" for {reference.requested}" if reference.is_converted else ""
+    rounded = ", rounded to what the drive can hold" if reference.rounded else ""
+    text = f"Reference {reference.text} ({reference.parameter.code}){converted}{rounded}"
+    text += without_effect(access)
+    access.given.note_reference(reference, text)
+    return text
+
+
+def without_effect(access: CommandAccess) -> str:
+    """A clause that a reference given here changes nothing, if another source surely gives it."""
+    found = reference_channel(access.session.profile, access.raws)
+    if found is None or found.by_line is not False:
+        return ""
+    return f"; no effect from here: the reference comes from {found.text}"
 
 
 @dataclass(slots=True)
@@ -30,19 +60,22 @@ class MotorStart:
         """The drive whose motor is started."""
         return self.access.session
 
-    async def carry_out(self, chart: Chart, id: OrderId) -> str:
-        """Reference first, then the way through the chart to the running state."""
+    async def carry_out(self, chart: Chart, id: OrderId, reference: Reference | None = None) -> str:
+        """Reference first, then the way through the chart to the running state.
+
+        All that can be checked is checked before the first frame that writes.
+        """
         same = [order for order in chart.orders if order.id == id]
         if not same:
             raise OrderRefused(f"The {chart.name} has no command {id!r}.")
         access = self.access
         state = await access.state(chart)
-        if state.kind == "fault":
-            raise OrderRefused(IN_FAULT)
+        if refusal := state_refusal(self.session.profile, chart, id, access.raws):
+            raise OrderRefused(refusal)
         at_rest = state.kind not in ENABLED_KINDS
         await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
         try:
-            await self._write_reference_again()
+            await self._give_reference(reference)
             if chart.runs_in is not None:
                 await self._walk(chart, same[0], chart.runs_in)
             else:
@@ -75,21 +108,32 @@ class MotorStart:
             " assigned to something else."
         )
 
-    async def _write_reference_again(self) -> None:
-        """Some drives run only once their reference was written, too: it is, as it stands."""
-        access, wanted = self.access, self.access.given.wanted
-        parameter = self.session.profile.quantity("command_frequency")
-        if wanted is not None:
-            parameter = wanted.parameter
-        if parameter is None:
+    async def _give_reference(self, reference: Reference | None) -> None:
+        """Write the reference, read it back as a value, and compare it with the request.
+
+        Without one the present reference is written: some drives run only once theirs was.
+        """
+        access, wanted = self.access, reference or self.access.given.wanted
+        if reference is not None:
+            await write_reference(access, reference)
+        elif wanted is not None:
+            await self._write_again(wanted.parameter, wanted.raw)
+        elif (parameter := self.session.profile.quantity("command_frequency")) is not None:
+            raw = (await access.read([parameter.code]))[parameter.code].raw
+            if raw is not None:
+                await self._write_again(parameter, raw)
+        if wanted is None or wanted.parameter.access == "w":
             return
-        reading = (await access.read([parameter.code]))[parameter.code]
-        raw = wanted.raw if wanted is not None else reading.raw
-        if raw is not None:
-            await access.writer.write_parameter(
-                parameter, raw, why="reference before the run order"
-            )
-            self.session.note_command()
+        profile = self.session.profile
+        readings = await access.read(reference_codes(profile))
+        if differs := read_back_differs(profile, wanted, readings):
+            raise WrongReference(f"Not started: {differs}. Give the reference again.")
+
+    async def _write_again(self, parameter: Parameter, raw: int) -> None:
+        await self.access.writer.write_parameter(
+            parameter, raw, why="reference before the run order"
+        )
+        self.session.note_command()
 
     def _is_over(self) -> None:
         """From here on a standstill says that the motor was stopped.
@@ -113,7 +157,7 @@ class MotorStart:
             reached = await access.wait_for(chart, {goal, enabled})
             if reached.id not in (goal, enabled):
                 names = {s.id: s.name for s in chart.states}
-                raise OrderRefused(
+                raise NotFollowed(
                     f"The drive stays in {reached.name} and does not go to {names[goal]}"
                     f" on 16#{word:04X}."
                 )
@@ -125,5 +169,5 @@ class MotorStart:
         running = {s.id for s in chart.states if s.kind == "running"}
         state = await self.access.wait_for(chart, running)
         if state.kind != "running":
-            raise OrderRefused(f"The drive does not run; it is in the state {state.name}.")
+            raise NotFollowed(f"The drive does not run; it is in the state {state.name}.")
         return state.name

@@ -10,6 +10,7 @@ from tui.bus.api import Priority
 from tui.bus.errors import ExchangeError
 from tui.drive.chart import state_of
 from tui.drive.orders import (
+    OrderRefused,
     chart_in_force,
     choose,
     last_word,
@@ -27,7 +28,9 @@ from ..drive_state import STATE_FRESH
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
-from .stop_report import Phase
+from .last_known import last_known_stop, run_by_others
+from .stop_report import Phase, not_stopped
+from .wave import FirstWave
 
 log = logging.getLogger(__name__)
 
@@ -39,6 +42,9 @@ SEEN_FOR = 60.0
 STANDSTILL_POLL_INTERVAL = 0.15
 TAKES_EFFECT = 1.5
 """Seconds within which a drive must show that it obeys."""
+
+SILENT_WAIT = 0.1
+"""Seconds in which a drive that was silent before has to answer the first of several stops."""
 
 TellStop = Callable[[DriveSession, Phase, str, float], None]
 
@@ -54,11 +60,21 @@ class MotorStop:
     say: TellStop
     wanted: OrderId = field(init=False)
     """The way to stop that was asked for."""
+    wave: FirstWave | None = None
+    """Several drives are stopped: each is sent a word before anything is read of any."""
+    begun: bool = False
     sent: bool = False
     """Whether its words have gone out."""
+    taken: bool = False
+    """True if the drive has answered them well."""
+    over: bool = False
+    """True if nothing more is done about it."""
+    answered: tuple[str, list[int]] | None = None
+    """Register and words that the drive has answered well."""
     reader: Reader = field(init=False)
     held: dict[str, Reading] = field(default_factory=dict)
     """What command words held before they were written here: option bits are kept from it."""
+    _unheeded: bool = False
 
     def __post_init__(self) -> None:
         self.reader = Reader(self.session)
@@ -66,9 +82,42 @@ class MotorStop:
 
     async def carry_out(self) -> str | None:
         """Choose, send and follow; returns why the motor does not stop, or nothing."""
+        self.begun = True
+        if self.wave is not None and not self.sent:
+            try:
+                await self._send_at_once()
+            finally:
+                self.wave.passed(self.session.device)
+            await self.wave.over()
         chart, chosen = await self._chosen()
-        await self._send(chart, chosen)
+        if self.answered != self._target(chart, chosen):
+            await self._send(chart, chosen)
+        self.answered = None  # should it be tried again
         return await self._follow(chart, chosen)
+
+    async def follow(self) -> str | None:
+        """See a motor stop whose stop was sent another way; returns why it does not, or nothing."""
+        self.begun = self.sent = True
+        return await self._follow(*await self._chosen())
+
+    async def _send_at_once(self) -> None:
+        """Send the word by what was seen last; a drive that is silent now is not waited for.
+
+        What is read afterwards decides whether another one follows.
+        """
+        session = self.session
+        try:
+            chart, order = last_known_stop(session, self.order)
+        except OrderRefused:
+            return  # by what is read next
+        silent = session.line.device_state(session.device).answers is False
+        try:
+            await self._send(chart, order, within=SILENT_WAIT if silent else None)
+        except ExchangeError as failure:
+            log.warning("first stop frame of device %s: %s", session.device, failure)
+
+    def _target(self, chart: Chart, order: Order) -> tuple[str, list[int]]:
+        return order_target(self.session.profile, chart, order).code, list(order.words)
 
     async def _chosen(self) -> tuple[Chart, Order]:
         """The words that stop this drive now; what decides is read anew where it may differ."""
@@ -112,8 +161,10 @@ class MotorStop:
                 found[code] = trusted[code]
         return found
 
-    async def _send(self, chart: Chart, order: Order) -> None:
+    async def _send(self, chart: Chart, order: Order, within: float | None = None) -> None:
         session = self.session
+        if why := run_by_others(session):
+            self._tell_unheeded(why)
         parameter = order_target(session.profile, chart, order)
         if (held := session.image.get(parameter.code)) is not None:
             self.held[parameter.code] = held
@@ -122,10 +173,25 @@ class MotorStop:
         for word in with_options(chart, order, kept):
             raw = from_words(parameter, [word])
             why = f"stopped: {order.name}"
-            await self.writer.write_parameter(
-                parameter, raw, why=why, priority=Priority.STOP, read_back=False
-            )
+            try:
+                await self.writer.write_parameter(
+                    parameter, raw, why=why, priority=Priority.STOP, read_back=False, within=within
+                )
+            except ExchangeError:
+                self._tell_sent(order)
+                raise
+        self.answered, self.taken = self._target(chart, order), True
+        self._tell_sent(order)
+
+    def _tell_sent(self, order: Order) -> None:
+        """The words have gone out: it stops, unless something else is known to run the motor."""
         self.sent = True
+        if not self._unheeded:
+            self.say(self.session, Phase.STOPPING, order.name, self.ordered)
+
+    def _tell_unheeded(self, why: str) -> None:
+        self._unheeded = True
+        self.say(self.session, Phase.UNHEEDED, not_stopped(why), self.ordered)
 
     async def _follow(self, chart: Chart, order: Order) -> str | None:
         """See the motor stop; returns why it does not, or nothing."""
@@ -142,11 +208,19 @@ class MotorStop:
                 await self._send(chart, ending)
                 progress, ending = self.session.clock.monotonic(), None
                 continue
-            if kind != "running" or (None not in (hertz, before) and (hertz or 0) < (before or 0)):
+            slows = None not in (hertz, before) and (hertz or 0) < (before or 0)
+            if kind != "running" or slows:
                 progress = now
             if now - progress > TAKES_EFFECT:
                 return self._why_not(hertz)
+            # slower by another's reference is not stopped: only a state that says so ends it
+            why = run_by_others(self.session) if kind == "running" else ""
             before = hertz
+            if why:
+                self._tell_unheeded(why)
+                await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
+                continue
+            self._unheeded = False
             speed = f", {hertz:g} Hz" if hertz else ""
             text = f"{order.name}{speed}{self._instead()}"
             self.say(self.session, Phase.STOPPING, text, self.ordered)
@@ -167,6 +241,8 @@ class MotorStop:
         if hertz == 0:
             by = who or "from elsewhere"
             return f"it stands at 0 Hz and is still enabled {by}: a reference turns it at once."
+        if why := run_by_others(self.session):
+            return why
         return f"it answers and runs on; it is commanded {who or 'from elsewhere'}."
 
     async def _motion(self, chart: Chart) -> tuple[str, float | None]:

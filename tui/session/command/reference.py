@@ -1,23 +1,34 @@
-"""What a person may give as a reference: a number with Hz or rpm, between the drive's limits."""
+"""References as a person types them: a number, in a unit that leads to the drive's own.
+
+It is converted as every other value is, and compared with the limits in their units. What a drive
+reads back is compared with the request, by the way back.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 
-from tui.drive.errors import ValueRefused
+from tui.drive.errors import UnitRefused, ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.shown import depends_on, number_of, raw_of_text
 from tui.drive.taught_profile import reference_of
-from tui.drive.values import encode
+from tui.drive.units import factor_between, spelled
 
 from ..reading import Reading
+from .reference_units import MOTOR_DATA, ReferenceUnits
 
-_TYPED = re.compile(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(hz|rpm|1/min)?\s*", re.IGNORECASE)
+_TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(1/min|[^\s\d.,+\-/][^\d.,+\-]*)?")
 LIMITS: tuple[Quantity, ...] = ("low_speed", "high_speed", "max_frequency")
-SPEED_SOURCES: tuple[Quantity, ...] = ("rated_frequency", "rated_speed")
+REFERENCES: tuple[Quantity, ...] = ("command_frequency", "command_speed")
+"""The words that take a reference; the first that a drive has takes a number without a unit."""
+EXAMPLES: Mapping[str, str] = {"Hz": "30Hz", "rpm": "900rpm", "%": "40%"}
+"""By unit, a reference as it is typed."""
+DECIMALS_CONVERTED = 3
+"""Decimals of a converted number in a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,15 +38,43 @@ class Reference:
     parameter: Parameter
     raw: int
     text: str
+    """The value that the drive is to hold, in its own unit."""
     rounded: bool
+    requested: str
+    """The number and the unit that were requested."""
+    number: Decimal
+    """The same in the unit of the drive, not rounded."""
+    unit: str
+    step: Decimal
+    """The worth of one count in that unit."""
+
+    @property
+    def is_converted(self) -> bool:
+        """True if it was requested in another unit than that of the drive."""
+        return factor_between(self.requested.rpartition(" ")[2], self.unit) is None
+
+
+def reference_parameters(profile: Profile) -> list[Parameter]:
+    """The words that take a drive's reference, that of a number without a unit first."""
+    found = (profile.quantity(quantity) for quantity in REFERENCES)
+    return [parameter for parameter in found if parameter is not None]
+
+
+def step_in(unit: str) -> int:
+    """The size of a step in a unit, for one of 1 Hz."""
+    return 10 if factor_between(unit, "rpm") is not None else 1
 
 
 def reference_codes(profile: Profile) -> list[str]:
-    """Codes of the words that a reference is checked against, and of the references."""
-    wanted: tuple[Quantity, ...] = (*LIMITS, *SPEED_SOURCES, "command_frequency", "command_speed")
+    """Codes of the words that a reference is converted by and checked against, and of itself."""
+    wanted: tuple[Quantity, ...] = (*LIMITS, *MOTOR_DATA, *REFERENCES)
     found = (profile.quantity(quantity) for quantity in wanted)
     codes = [parameter.code for parameter in found if parameter is not None]
-    return [*codes, *(limit.code for code in codes if (limit := taught_limit(profile, code)))]
+    for parameter in reference_parameters(profile):
+        codes += [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]
+        limit = taught_limit(profile, parameter.code)
+        codes += [limit.code] if limit is not None else []
+    return list(dict.fromkeys(codes))
 
 
 def taught_limit(profile: Profile, code: str) -> Parameter | None:
@@ -52,10 +91,6 @@ def taught_limit(profile: Profile, code: str) -> Parameter | None:
 
 def no_place(profile: Profile, unit: str) -> str:
     """Why a drive takes no reference in a unit from here, with the way out of that."""
-    other = "Hz" if unit == "rpm" else "rpm"
-    taken = profile.quantity("command_frequency" if unit == "rpm" else "command_speed")
-    if taken is not None and taken.code in profile.taught:
-        return f"{taken.code} was taught in {other}: write the reference like 900{other}."
     text = f"Where {profile.name} takes a reference in {unit} is in no manual at hand"
     ways = [one.parameter for one in profile.data.teachable_references]
     if not ways:
@@ -72,59 +107,154 @@ def no_place(profile: Profile, unit: str) -> str:
 
 
 def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]) -> Reference:
-    """The reference that a person typed; Hz unless told otherwise.
+    """The reference that a person typed, within the drive's limits as far as these are known.
 
-    Raises ValueRefused for what is no reference, has no place on this drive, or lies outside
-    the lowest and the highest speed, as far as these are known.
+    Raises what `convert_reference` raises, and ValueRefused for one outside the limits.
     """
-    match = _TYPED.fullmatch(text)
+    found = convert_reference(profile, text, readings)
+    _check_limits(ReferenceUnits(profile, readings), found)
+    if (limit := taught_limit(profile, found.parameter.code)) is not None:
+        _check_taught_limit(found.number, limit, readings)
+    return found
+
+
+def convert_reference(profile: Profile, text: str, readings: Mapping[str, Reading]) -> Reference:
+    """The reference that a person typed, as a raw value; the drive's own unit without one.
+
+    Another unit is converted by what the drive holds: pairs of poles, what 100 % is. Raises
+    UnitRefused where nothing leads from one to the other, ValueRefused for what is no reference,
+    has no place on this drive, or follows a scale that was not read.
+    """
+    match = _TYPED.fullmatch(text.strip())
     if match is None:
         raise ValueRefused(f"{text!r} is no reference. Write it like 30, 30.5Hz or 900rpm.")
-    number = Decimal(match[1].replace(",", "."))
-    speed = (match[2] or "hz").casefold() != "hz"
-    parameter = profile.quantity("command_speed" if speed else "command_frequency")
-    if parameter is None:
-        raise ValueRefused(no_place(profile, "rpm" if speed else "Hz"))
-    if number < 0:
+    typed, unit = Decimal(match[1].replace(",", ".")), spelled((match[2] or "").strip())
+    known = ReferenceUnits(profile, readings)
+    if not reference_parameters(profile):
+        raise ValueRefused(no_place(profile, unit or "Hz"))
+    if typed < 0:
         raise ValueRefused("A reference is not negative; run reverse instead.")
-    hertz = _hertz_of(profile, number, readings) if speed else number
-    if hertz is not None:
-        _check_limits(profile, hertz, readings)
-    if (limit := taught_limit(profile, parameter.code)) is not None:
-        _check_taught_limit(number, limit, readings)
-    conversion = encode(parameter, str(number), profile.names(parameter), Decimal(parameter.scale))
-    shown = conversion.raw * Decimal(parameter.scale)
-    taught = profile.taught.get(parameter.code)
-    if taught is not None and taught.number(conversion.raw) != shown:
-        raise ValueRefused(
-            f"{number:f} is past what is known of {parameter.code}: its sign is open."
-        )
-    return Reference(parameter, conversion.raw, f"{shown:f} {parameter.unit}", conversion.rounded)
-
-
-def within_limits(profile: Profile, hertz: Decimal, readings: Mapping[str, Reading]) -> Decimal:
-    """A stepped reference in Hz, at most to the limits that are known."""
-    low, high, most = (_number(profile, quantity, readings) for quantity in LIMITS)
-    for limit in (high, most):
-        if limit:
-            hertz = min(hertz, limit)
-    return max(hertz, low or Decimal(0))
-
-
-def _check_limits(profile: Profile, hertz: Decimal, readings: Mapping[str, Reading]) -> None:
-    low, high, most = (_number(profile, quantity, readings) for quantity in LIMITS)
-    upper: tuple[tuple[Quantity, Decimal | None], ...] = (
-        ("high_speed", high),
-        ("max_frequency", most),
+    parameter, number = _placed(known, text, typed, unit)
+    raws, absent = known.raws, known.absent
+    conversion = raw_of_text(profile, parameter, f"{number:f}", raws, absent)
+    held = number_of(profile, parameter, conversion.raw, raws, absent)
+    scale = profile.scale(parameter, raws, absent)
+    assert held is not None, "it was converted: its scale is known"
+    assert scale is not None
+    own = known.unit(parameter)
+    return Reference(
+        parameter,
+        conversion.raw,
+        f"{held:f} {own}".rstrip(),
+        conversion.rounded,
+        f"{typed:f} {unit or own}".rstrip(),
+        number,
+        own,
+        scale,
     )
-    for quantity, limit in upper:
-        if limit and hertz > limit:
-            raise ValueRefused(f"{hertz:f} Hz is above {_code(profile, quantity)} = {limit:f} Hz.")
-    if low and hertz < low:
-        raise ValueRefused(
-            f"{hertz:f} Hz is below {_code(profile, 'low_speed')} = {low:f} Hz: the drive would"
-            " run at that."
-        )
+
+
+def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str, Reading]) -> str:
+    """The difference between the value read back and the one requested; empty if there is none.
+
+    The request is converted once more, what the drive holds is read as a value of its own:
+    a scale, a unit or a rating that changed since shows. Raises what `convert_reference` raises.
+    """
+    code = wanted.parameter.code
+    now, reading = convert_reference(profile, wanted.requested, readings), readings.get(code)
+    value = reading.value if reading is not None else None
+    if value is None or value.number is None:
+        return f"{code} could not be read back{f': {reading.error}' if reading else ''}"
+    same = now.parameter.code == code and value.unit == now.unit
+    if same and abs(value.number - now.number) <= min(now.step, wanted.step):
+        return ""
+    held = value.display
+    if same and wanted.is_converted:
+        known, unit = ReferenceUnits(profile, readings), wanted.requested.rpartition(" ")[2]
+        number = known.converted(value.number, value.unit, unit, known.whole(wanted.parameter))
+        held += f" ({_tidy(number)} {unit})" if number is not None else ""
+    return f"{code} holds {held}, {wanted.requested} was requested"
+
+
+def reference_limits(
+    profile: Profile, readings: Mapping[str, Reading], parameter: Parameter
+) -> tuple[Decimal | None, Decimal | None, str]:
+    """Lowest and highest reference in its own unit, as far as known; the code of the highest."""
+    known = ReferenceUnits(profile, readings)
+    low, high, code = None, None, ""
+    for quantity in LIMITS:
+        limit = known.quantity(quantity)
+        if limit is None:
+            continue
+        number = known.converted(*limit, known.unit(parameter), known.whole(parameter))
+        if quantity == "low_speed":
+            low = None if number is None else _shortened(number, ROUND_CEILING)
+        elif number and (high is None or number < high):
+            high, code = _shortened(number, ROUND_FLOOR), _code(profile, quantity)
+    return low, high, code
+
+
+def within_limits(
+    profile: Profile, number: Decimal, readings: Mapping[str, Reading], parameter: Parameter
+) -> Decimal:
+    """A stepped reference in its own unit, at most to the limits that are known."""
+    low, high, _ = reference_limits(profile, readings, parameter)
+    if high is not None:
+        number = min(number, high)
+    return max(number, low or Decimal(0))
+
+
+def _placed(
+    known: ReferenceUnits, text: str, typed: Decimal, unit: str
+) -> tuple[Parameter, Decimal]:
+    """The word that takes a reference in this unit, and the number there; raises UnitRefused."""
+    places = reference_parameters(known.profile)
+    if not unit:
+        return places[0], typed
+    for one in places:
+        if (factor := factor_between(unit, known.unit(one))) is not None:
+            return one, typed * factor
+    for one in places:
+        number = known.converted(typed, unit, known.unit(one), known.whole(one))
+        if number is not None:
+            return one, number
+    own = known.unit(places[0])
+    raise UnitRefused(
+        f"{text!r} cannot be converted: {places[0].code} takes its reference in"
+        f" {' or '.join(_accepted(known))}. Type it like {EXAMPLES.get(own, f'5{own}')}."
+    )
+
+
+def _accepted(known: ReferenceUnits) -> list[str]:
+    """The units in which a reference can be given now, the drive's own first."""
+    places = reference_parameters(known.profile)
+    own = [known.unit(one) or "counts" for one in places]
+    more = [
+        unit
+        for unit in ("Hz", "rpm", "%")
+        for one in places
+        if known.converted(Decimal(1), unit, known.unit(one), known.whole(one)) is not None
+    ]
+    return list(dict.fromkeys((*own, *more)))
+
+
+def _check_limits(known: ReferenceUnits, wanted: Reference) -> None:
+    whole = known.whole(wanted.parameter)
+    for quantity in (*LIMITS[1:], LIMITS[0]):
+        limit = known.quantity(quantity)
+        if limit is None or not limit[0]:
+            continue
+        most, unit = limit
+        number = known.converted(wanted.number, wanted.unit, unit, whole)
+        if number is None:
+            continue
+        code, given = _code(known.profile, quantity), f"{_tidy(number)} {unit}"
+        if quantity != "low_speed" and number > most:
+            raise ValueRefused(f"{given} is above {code} = {most:f} {unit}.")
+        if quantity == "low_speed" and number < most:
+            raise ValueRefused(
+                f"{given} is below {code} = {most:f} {unit}: the drive would run at that."
+            )
 
 
 def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str, Reading]) -> None:
@@ -139,21 +269,17 @@ def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str
         )
 
 
-def _hertz_of(profile: Profile, rpm: Decimal, readings: Mapping[str, Reading]) -> Decimal | None:
-    """The frequency of a synchronous speed; None while the motor's poles are not known."""
-    frequency, speed = (_number(profile, quantity, readings) for quantity in SPEED_SOURCES)
-    if not frequency or not speed:
-        return None
-    pairs = max(1, int(60 * frequency / speed))
-    return rpm * pairs / 60
+def _tidy(number: Decimal) -> str:
+    """A number for a sentence: no more decimals than it needs, and at most a few."""
+    return f"{_shortened(number, ROUND_HALF_UP):f}"
 
 
-def _number(
-    profile: Profile, quantity: Quantity, readings: Mapping[str, Reading]
-) -> Decimal | None:
-    parameter = profile.quantity(quantity)
-    reading = readings.get(parameter.code) if parameter else None
-    return reading.value.number if reading is not None and reading.value is not None else None
+def _shortened(number: Decimal, rounding: str) -> Decimal:
+    """A converted number with at most a few decimals; one with few anyway stays."""
+    if -int(number.as_tuple().exponent) <= DECIMALS_CONVERTED:
+        return number
+    short = number.quantize(Decimal(1).scaleb(-DECIMALS_CONVERTED), rounding).normalize()
+    return short if int(short.as_tuple().exponent) <= 0 else short.quantize(Decimal(1))
 
 
 def _code(profile: Profile, quantity: Quantity) -> str:

@@ -1,7 +1,10 @@
 """Stopping motors: from any thread, before everything else on the line, seen to its end.
 
 The first frame goes out behind at most the one exchange in flight. What became of it is then
-read from the drive: an answer alone stops no motor.
+read from the drive: an answer alone stops no motor. Several drives are stopped in two waves: the
+word by what was seen last of each, to all of them; then what has to be read, repeated, verified.
+
+An internal error anywhere on that way costs no stop: see `LastStop`.
 """
 
 from __future__ import annotations
@@ -10,11 +13,17 @@ import logging
 import threading
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 
-from tui.bus.api import LineWorker, ModbusLine, Priority
-from tui.bus.errors import DeviceException, ExchangeError, LineError, RequestRefused
+from tui.bus.api import ModbusLine, Priority
+from tui.bus.errors import (
+    DeviceException,
+    ExchangeError,
+    LineClosed,
+    LineError,
+    LineLost,
+    RequestRefused,
+)
 from tui.drive.errors import DriveError
 from tui.drive.orders import (
     OrderRefused,
@@ -25,17 +34,49 @@ from tui.drive.orders import (
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 
+from ..carry_on import carried_on
 from ..connect.limits import limits_of
 from ..drive import DriveSession
 from ..events import EventLog
 from ..journal import Journal
 from ..settings.write import Writer
+from .last_known import is_likely_to_run
+from .last_stop import LastStop, end_work
 from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
-from .stop_report import Phase, StopReport, StopSummary
+from .stop_report import (
+    NOT_STOPPING,
+    Phase,
+    StopReport,
+    StopSummary,
+    not_stopped,
+)
+from .under_way import UnderWay, watch_first_frames
+from .wave import FirstWave
 
 log = logging.getLogger(__name__)
 
 STOP_TRIES = 5
+NO_ANSWER_NOW = 2
+"""The urgency of a drive that answers nothing."""
+
+
+def _now(session: DriveSession) -> float:
+    """The time of a stop by the clock of its drive; by the machine's should that have failed."""
+    try:
+        return session.clock.monotonic()
+    except Exception:
+        return time.monotonic()
+
+
+def _urgency(session: DriveSession) -> int:
+    """Motors that run or were commanded first; drives that answer nothing last."""
+    try:
+        if session.line.device_state(session.device).answers is False:
+            return NO_ANSWER_NOW
+        return 0 if is_likely_to_run(session) else 1
+    except Exception:
+        log.exception("device %s has no place among the stops", session.device)
+        return 1
 
 
 class Stopper:
@@ -46,7 +87,8 @@ class Stopper:
         self._events = events
         self._journal = journal
         self._reports: dict[int, StopReport] = {}
-        self._under_way: dict[int, _UnderWay] = {}
+        self._under_way: dict[int, UnderWay] = {}
+        self._last = LastStop(line, journal, self._say)
         self._own: dict[int, tuple[DriveSession, DriveSession]] = {}
         """By device, a session that its drive contradicts, and one by the drive's own family."""
         self._lock = threading.Lock()
@@ -65,19 +107,43 @@ class Stopper:
         keep every one of them from going out.
         """
         wanted = list(sessions)
+        ordered = _now(wanted[0]) if wanted else 0.0
         # first: what other programs meant for them before is void from here on
-        self._line.facts.give_stop([session.device for session in wanted], by)
-        ordered = wanted[0].clock.monotonic() if wanted else 0.0
+        carried_on(lambda: self._line.facts.give_stop([one.device for one in wanted], by))
         for session in wanted:
-            session.work.stop(by)
-            if session.starts is not None:
-                session.starts.withdraw(session)
-        wanted = [self._by_its_own(session) for session in wanted]
+            carried_on(partial(end_work, session, by))
+        wave = None
         if len(wanted) > 1:
-            self._line.spawn(lambda: self._broadcast(wanted, order), "stop all")
-        with self._lock:
-            for session in wanted:
-                self._begin(session, order, ordered)
+            wanted.sort(key=_urgency)
+            wave = FirstWave(one.device for one in wanted if _urgency(one) < NO_ANSWER_NOW)
+        closed: LineClosed | None = None
+        begun: list[UnderWay] = []
+        for session in wanted:
+            try:
+                own = self._by_its_own(session)
+                with self._lock:
+                    begun += self._begin(own, order, ordered, wave)
+            except LineClosed as error:
+                closed = error
+            except Exception as error:
+                self._last.send(session, ordered, error)
+        if closed is not None:
+            raise closed
+        carried_on(partial(watch_first_frames, begun, self._line.timing, self._last.send))
+        if wave is not None:
+            with_wave = [one.stop.session for one in begun]
+            rest = {one.device for one in wanted} - {one.device for one in with_wave}
+            behind = partial(self._behind_wave, wave, rest, with_wave, order)
+            carried_on(lambda: self._line.spawn(behind, "stop all"))
+
+    def send_prepared(self, session: DriveSession, error: Exception) -> None:
+        """Stop a drive by its prepared frames, after an internal error before `stop`."""
+        try:
+            end_work(session, "the stop key")
+        except Exception:
+            log.exception("the work on device %s", session.device)
+            session.work.stops += 1
+        self._last.send(session, time.monotonic(), error)
 
     def _by_its_own(self, session: DriveSession) -> DriveSession:
         """The session by which a drive is stopped: that of the family which it says it is of.
@@ -97,19 +163,23 @@ class Stopper:
                 self._own[session.device] = (session, found)
             return found
 
-    def _begin(self, session: DriveSession, order: OrderId, ordered: float) -> None:
+    def _begin(
+        self, session: DriveSession, order: OrderId, ordered: float, wave: FirstWave | None
+    ) -> list[UnderWay]:
         """Begin a stop of one drive, unless the same one goes out yet."""
         device = session.device
         before = self._under_way.get(device)
         if before is not None:
             if before.goes_out(session, order):
-                return
+                return []
+            before.stop.over = True  # this one sends what that one has not
             before.worker.cancel()
-        self._say(session, Phase.SENDING, "stop is being sent", ordered)
+        self._say(session, Phase.SENDING, "stop waits for the line", ordered)
         writer = Writer(session, self._journal, None)
-        one = MotorStop(session, writer, order, ordered, self._say)
+        one = MotorStop(session, writer, order, ordered, self._say, wave=wave)
         worker = self._line.spawn(partial(self._stop, one), f"stop {device}")
-        self._under_way[device] = _UnderWay(one, worker, session.arming.times)
+        begun = self._under_way[device] = UnderWay(one, worker, session.arming.times)
+        return [begun]
 
     def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
         """Wait from another thread until these stops have ended, or the time is up."""
@@ -124,18 +194,31 @@ class Stopper:
             time.sleep(STANDSTILL_POLL_INTERVAL)
 
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
+        """Report how far a stop has come; an error in doing so costs no stop."""
+        carried_on(lambda: self._report(session, phase, text, ordered))
+
+    def _report(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
         before = self._reports.get(session.device)
         same = before is not None and (before.phase, before.time) == (phase, ordered)
-        since = before.since if same and before is not None else session.clock.monotonic()
+        since = before.since if same and before is not None else _now(session)
         report = StopReport(session.device, phase, text, ordered, since)
         self._reports = {**self._reports, session.device: report}
         if not same:
             if self._events is not None:
-                kind = "failed" if phase is Phase.FAILED else "stop"
+                kind = "failed" if phase in NOT_STOPPING else "stop"
                 head = "Stopping: " if phase is Phase.STOPPING else ""
                 said = f"{head}{text}" if head else f"{text[:1].upper()}{text[1:]}"
                 self._events.add(kind, said, session.device)
             log.info("stop of device %s: %s, %s", session.device, phase, text)
+
+    async def _behind_wave(
+        self, wave: FirstWave, rest: set[int], sessions: list[DriveSession], order: OrderId
+    ) -> None:
+        """Reach all by a broadcast once the wave is over; no frame of the `rest` belongs to it."""
+        for device in rest:
+            wave.passed(device)
+        await wave.over()
+        await self._broadcast(sessions, order)
 
     async def _broadcast(self, sessions: list[DriveSession], order: OrderId) -> None:
         """Reach at once all drives of families whose word can start none that hears it."""
@@ -159,10 +242,20 @@ class Stopper:
                     )
 
     async def _stop(self, one: MotorStop) -> None:
+        try:
+            await self._carry_out(one)
+        except Exception as error:
+            self._last.send(one.session, one.ordered, error, taken=one.taken)
+        finally:
+            one.over = True
+
+    async def _carry_out(self, one: MotorStop) -> None:
         error = "it did not answer"
         for _ in range(STOP_TRIES):
             try:
                 text = await one.carry_out()
+            except LineLost:
+                raise
             except RequestRefused as refused:
                 error = str(refused)
                 break
@@ -178,24 +271,4 @@ class Stopper:
                 if text is None:
                     return
                 error = text
-        told = f"NOT STOPPED: {error} Stop it at the machine."
-        self._say(one.session, Phase.FAILED, told, one.ordered)
-
-
-@dataclass(frozen=True, slots=True)
-class _UnderWay:
-    """A stop that was begun."""
-
-    stop: MotorStop
-    worker: LineWorker
-    times: int
-    """How often the drive had been armed then."""
-
-    def goes_out(self, session: DriveSession, order: OrderId) -> bool:
-        """Whether it does all that another stop of the drive would do now.
-
-        Its words are on their way still, and nothing was written since: that needs arming.
-        """
-        same = self.stop.session is session and self.stop.wanted == order
-        waits = not self.worker.done() and not self.stop.sent
-        return same and waits and self.times == session.arming.times
+        self._say(one.session, Phase.FAILED, not_stopped(error), one.ordered)

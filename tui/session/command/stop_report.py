@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
+
+NOT_STOPPED = "NOT STOPPED: "
+"""The beginning of every text of a stop that does not stop its motor."""
+AT_THE_MACHINE = "Stop it at the machine."
+
+
+def not_stopped(why: str) -> str:
+    """The text of a stop that does not stop its motor: why, and what to do."""
+    where = "" if why.endswith("at the machine.") else f" {AT_THE_MACHINE}"
+    return f"{NOT_STOPPED}{why}{where}"
 
 
 class Phase(StrEnum):
     """How far a stop has come."""
 
     SENDING = "sending"
+    """Its frame waits for the line."""
     STOPPING = "stopping"
+    """Its frame was sent."""
+    UNHEEDED = "unheeded"
+    """Its frame was sent, or waits, and something else than the line runs the motor."""
     STOPPED = "stopped"
     FAILED = "failed"
 
 
-@dataclass(frozen=True, slots=True)
-class StopReport:
+NOT_STOPPING = frozenset({Phase.UNHEEDED, Phase.FAILED})
+"""Phases in which a person must stop the motor at the machine."""
+OVER = frozenset({Phase.STOPPED, Phase.FAILED})
+"""Phases after which nothing more is awaited."""
+
+
+class StopReport(NamedTuple):
     """What became of a stop so far; ordered at `time`, and so since `since` (monotonic)."""
 
     device: int
@@ -26,8 +45,7 @@ class StopReport:
     since: float
 
 
-@dataclass(frozen=True, slots=True)
-class StopSummary:
+class StopSummary(NamedTuple):
     """One stop of one or more drives, for a person."""
 
     reports: list[StopReport]
@@ -35,23 +53,23 @@ class StopSummary:
     @property
     def ended(self) -> bool:
         """Whether nothing more is awaited."""
-        return all(one.phase in (Phase.STOPPED, Phase.FAILED) for one in self.reports)
+        return all(one.phase in OVER for one in self.reports)
 
     @property
     def failed(self) -> bool:
         """Whether some drive could not be stopped from here."""
-        return any(one.phase is Phase.FAILED for one in self.reports)
+        return any(one.phase in NOT_STOPPING for one in self.reports)
 
     @property
     def head(self) -> str:
         """What it has come to."""
         if self.failed:
-            which = ", ".join(str(r.device) for r in self.reports if r.phase is Phase.FAILED)
+            which = ", ".join(str(r.device) for r in self.reports if r.phase in NOT_STOPPING)
             return f"NOT STOPPED from here: device {which}. Stop it at the machine."
         return "STOPPED by the stop key." if self.ended else "STOP is being carried out."
 
     @property
     def text(self) -> str:
         """Each drive's part."""
-        ordered = sorted(self.reports, key=lambda one: (one.phase is not Phase.FAILED, one.device))
+        ordered = sorted(self.reports, key=lambda one: (one.phase not in NOT_STOPPING, one.device))
         return " · ".join(f"{one.device}: {one.text}" for one in ordered)

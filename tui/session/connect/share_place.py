@@ -83,7 +83,10 @@ def group_number(group: str, folder: Path) -> int:
 def this_program(name: str) -> Program:
     """This program as others on the line are told of it."""
     user = os.environ.get("USER") or os.environ.get("LOGNAME") or ""
-    return Program(uuid.uuid4().hex, name, os.getpid(), user, _terminal())
+    # as others take it: the environment holds any bytes
+    texts = (text.encode(errors="replace").decode()[:200] for text in (name, user, _terminal()))
+    shown, user, terminal = texts
+    return Program(uuid.uuid4().hex, shown, os.getpid(), user, terminal)
 
 
 def _terminal() -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tui.bus.api import ModbusLine
 from tui.bus.gateway.server import TcpClient
+from tui.bus.stop_counts import next_count
 
 
 @dataclass(slots=True, eq=False)
@@ -43,7 +44,7 @@ class PendingWrites:
         at = self._pending.index(write)
         for one in self._pending[at:]:
             if one.client is write.client and one.device == write.device:
-                one.stops += 1
+                one.stops = next_count(one.stops)
 
     def void(self, write: PendingWrite) -> bool:
         """Whether its drive was stopped since it came."""

@@ -6,22 +6,68 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from ..clock import REAL_CLOCK
 from ..drive_state import DriveState
 from ..events import EventLog
 
 
 @dataclass(frozen=True, slots=True)
+class FaultOnset:
+    """The first sight of the fault that a drive is in; `wall` in seconds since 1970."""
+
+    wall: float
+    tripped: bool
+    """True if the drive was seen without this fault right before: then it is the trip's time."""
+    code: str = ""
+
+
+class FaultOnsets:
+    """Keeps the onset of each drive's fault; written in the line's loop, read in any thread."""
+
+    def __init__(self) -> None:
+        self._free: frozenset[int] = frozenset()
+        """Drives that were seen without a fault last."""
+        self.by_device: Mapping[int, FaultOnset] = {}
+
+    def note(self, device: int, state: DriveState, wall: float) -> None:
+        """Take a state that was read just now; an unknown one changes nothing."""
+        if state.kind == "unknown":
+            return
+        onset = self.by_device.get(device)
+        if state.kind != "fault":
+            self._free |= {device}
+            self.by_device = {d: one for d, one in self.by_device.items() if d != device}
+            return
+        code = state.fault.code if state.fault else ""
+        if onset is not None and (onset.code == code or not code):
+            return
+        if onset is not None and not onset.code:
+            now = replace(onset, code=code)  # its code comes a moment after the state
+        else:
+            now = FaultOnset(wall, onset is not None or device in self._free, code)
+        self._free -= {device}
+        self.by_device = {**self.by_device, device: now}
+
+
+@dataclass(frozen=True, slots=True)
 class PresentFault:
-    """A fault that a drive is in now; `wall` is when it was first seen, in seconds since 1970."""
+    """The one record of a fault that a drive is in; `wall` in seconds since 1970."""
 
     device: int
     code: str
     """As the drive's keypad writes it; empty where its code was not read."""
     name: str
     wall: float
+    """The time of the trip if `tripped`, else of the first sight."""
+    tripped: bool = False
+    """True if the trip itself was seen; else the drive was in this fault when first seen."""
     seen: bool = False
     """Whether a person has looked at it."""
+
+    @property
+    def when(self) -> str:
+        """The time of day, named for what it is."""
+        at = time.strftime("%H:%M:%S", time.localtime(self.wall))
+        return f"tripped {at}" if self.tripped else f"seen since {at}"
 
 
 class LineAlarms:
@@ -35,12 +81,12 @@ class LineAlarms:
         self,
         events: EventLog,
         record: Callable[[PresentFault, str], None],
-        wall: Callable[[], float] = REAL_CLOCK.wall,
     ) -> None:
         self._events = events
         self._record = record
-        self._wall = wall
         self._active: dict[int, PresentFault] = {}
+        self._recorded: dict[int, float] = {}
+        """By device, the time of the last onset that is in the journal."""
 
     @property
     def active(self) -> tuple[PresentFault, ...]:
@@ -52,22 +98,23 @@ class LineAlarms:
         """Whether there is a fault that nobody has looked at."""
         return any(not fault.seen for fault in self._active.values())
 
-    def take(self, states: Mapping[int, DriveState]) -> bool:
-        """Take the newest state of each drive; whether a fault is new.
+    def take(self, states: Mapping[int, DriveState], onsets: Mapping[int, FaultOnset]) -> bool:
+        """Take the newest state of each drive, and the onset of its fault; True if one is new.
 
         A drive whose state is not known now keeps what was known; one that is no longer there has
         no fault any more.
         """
         for device in self._active.keys() - states.keys():
             del self._active[device]
-        new = [self._take_one(device, state) for device, state in states.items()]
+        new = [self._take_one(device, state, onsets) for device, state in states.items()]
         return any(new)  # each is looked at, whatever the one before brought
 
-    def _take_one(self, device: int, state: DriveState) -> bool:
+    def _take_one(self, device: int, state: DriveState, onsets: Mapping[int, FaultOnset]) -> bool:
         was = self._active.get(device)
         if state.kind == "unknown":
             return False
         if state.kind != "fault":
+            self._recorded.pop(device, None)
             if was is not None:
                 del self._active[device]
                 self._events.add("done", f"{_called(was)} is reset.", device)
@@ -83,10 +130,18 @@ class LineAlarms:
             self._events.add("fault", f"the fault is {_called(self._active[device])}.", device)
             return False
         first = next(iter(self._active.values()), None)
-        now = PresentFault(device, code, name, self._wall())
+        onset = onsets.get(device)
+        if onset is None or (code and onset.code not in ("", code)):
+            return False  # the line's loop has not noted it yet: at the next look
+        now = PresentFault(device, code, name, onset.wall, onset.tripped)
         self._active[device] = now
-        self._events.add("fault", f"tripped: {_called(now)}{_behind(first, device)}.", device)
-        self._record(now, "tripped")
+        if was is None and self._recorded.get(device) == onset.wall:
+            return False  # the same trip of a drive that was not seen for a while
+        self._recorded[device] = onset.wall
+        what = "tripped" if now.tripped else "in fault when first seen"
+        text = f"{what}: {_called(now)}{_behind(first, now)}."
+        self._events.add("fault", text, device, now.wall)
+        self._record(now, "tripped" if now.tripped else "seen")
         return True
 
     def acknowledge(self, device: int) -> None:
@@ -100,8 +155,11 @@ def _called(fault: PresentFault) -> str:
     return f"{fault.code} {fault.name}".strip() or "a fault whose code was not read"
 
 
-def _behind(first: PresentFault | None, device: int) -> str:
-    if first is None or first.device == device:
+def _behind(first: PresentFault | None, now: PresentFault) -> str:
+    """A clause for a fault that is not the first of its line."""
+    if first is None or first.device == now.device or not now.tripped:
         return ""
+    if not first.tripped:
+        return f"; drive {first.device} was in fault before"
     at = time.strftime("%H:%M:%S", time.localtime(first.wall))
     return f"; drive {first.device} tripped first, {at}"

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
-from tui.drive.hints import hint_markdown, reset_text
+from tui.drive.hints import advice, hint_markdown, reset_text
 from tui.drive.plain import plain
 from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
@@ -170,6 +170,7 @@ def _pointed_at(
     told = hint_markdown(
         session.profile,
         help_,
+        advice(session.profile, help_, session.image.trusted, latest=True),
         lambda code: values.get(code, NOT_AVAILABLE),
         reset_text(help_, None, "a fault reset").text,
     )

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from tui.bus.api import LineWorker, ModbusLine, Priority
 from tui.bus.errors import LineError
 from tui.drive.channel import channel_codes
-from tui.drive.chart import watched_codes
+from tui.drive.chart import ENABLED_KINDS, watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
@@ -25,6 +25,7 @@ from ..read.presence import presence_read
 from ..read.reader import Reader
 from ..reading import Reading
 from ..timeout_told import TimeoutWatch
+from .alarms import FaultOnsets
 from .load import unread_limit
 from .monitor import Monitor
 from .timeout import TOLD_SHARE, TimeoutWarning, has_begun, read_timeout
@@ -85,6 +86,7 @@ class LineWatch:
         self._line = line
         self._kept: dict[int, _Kept] = {}
         self._looks: dict[int, Look] = {}
+        self.onsets = FaultOnsets()
 
     @property
     def looks(self) -> Mapping[int, Look]:
@@ -97,11 +99,10 @@ class LineWatch:
         return self._watch(kept) if kept else None
 
     def _watch(self, kept: _Kept) -> TimeoutWatch | None:
-        rules, watch = kept.session.profile.data.communication_fault, kept.watch
-        if watch is None or rules is None:
+        if (watch := kept.watch) is None:
             return None
         begun = has_begun(kept.session) or self._runs_by_the_line(kept)
-        return replace(watch, active=begun)
+        return replace(watch, active=watch.acts and begun)
 
     def _runs_by_the_line(self, kept: _Kept) -> bool:
         """Whether the motor runs by somebody's command over the line, whoever gave it."""
@@ -137,6 +138,13 @@ class LineWatch:
         """Whether a motor runs, as far as anybody saw it last."""
         state, _ = self._last_seen(self._kept[device])
         return state is not None and state.motion == "running"
+
+    def turns(self, device: int) -> bool | None:
+        """Return True if a drive may turn its motor, by its newest state; None if not known."""
+        kept = self._kept.get(device)
+        state = self._last_seen(kept)[0] if kept is not None else None
+        kind = state.motion if state is not None else "unknown"
+        return None if kind == "unknown" else kind in ENABLED_KINDS
 
     def _may_turn(self, kept: _Kept) -> bool:
         """Whether a motor runs, or may: not seen since the last order, or not understood."""
@@ -258,10 +266,10 @@ class LineWatch:
             # settings are read with the time-out: another channel is set up at rest only
             settings = {c: one for c in told if (one := kept.session.image.get(c)) is not None}
             state = drive_state(profile, settings | readings)
+            self.onsets.note(device, state, kept.session.clock.wall())
         except LineError as fault:
             error = str(fault)
-        watch = self._watch(kept)
-        timeout = watch.timeout if watch and watch.active else None
+        timeout = watch.timeout if (watch := self._watch(kept)) and watch.active else None
         if self._kept.get(device) is kept:
             before = _last_that_brought(self._looks.get(device)) if error else None
             look = Look(state, error, kept.session.clock.monotonic(), timeout, readings, before)
@@ -278,8 +286,7 @@ class LineWatch:
 
     async def _learn(self, kept: _Kept) -> float:
         """Read the drive's time-out and its reaction."""
-        deciding = deciding_codes(kept.session.profile)
-        found = await read_timeout(kept.reader, Priority.POLL, deciding)
+        found = await read_timeout(kept.reader, Priority.POLL, deciding_codes(kept.session.profile))
         kept.session.timeout = found
         kept.watch, kept.unknown = found.watch, not found.known
         kept.learned = kept.session.clock.monotonic()

@@ -40,6 +40,11 @@ def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
     it = "it" if len(sessions) == 1 else "each"
     if watch is None:
         return f"{names_of(sessions)}: without communication {it} goes on: it has no time-out."
+    if watch.reaction is not None and not watch.acts:
+        reaction = watch.reaction.name
+        return (
+            f"{names_of(sessions)}: without communication {it} goes on: its reaction is {reaction}."
+        )
     does = watch.reaction.does if watch.reaction else "its own reaction follows"
     after = f"acts {watch.timeout:g} s after the last request"
     lost = f"{names_of(sessions)}: on loss of communication {it} {after}"
@@ -73,8 +78,9 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
     faults = {one.raw: one.code for one in session.profile.data.faults.codes}
     trips = reaction is None or reaction.trips
     fault = faults.get(rules.fault, "") if trips and rules.fault is not None else ""
-    begun, sure = has_begun(session), rules.starts_confidence != "unverified"
-    return Timeout(True, TimeoutWatch(shortest[0], reaction, begun, shortest[1], fault, sure))
+    sure = rules.starts_confidence != "unverified"
+    watch = TimeoutWatch(shortest[0], reaction, True, shortest[1], fault, sure)
+    return Timeout(True, replace(watch, active=watch.acts and has_begun(session)))
 
 
 async def timeouts_of_ports(
@@ -114,7 +120,7 @@ def _told_with_it(session: DriveSession, rules: CommunicationFault) -> list[str]
 def timeout_now(session: DriveSession) -> Timeout:
     """What a drive has told of its time-out, and whether that has begun by now."""
     found = session.timeout or Timeout(known=False)
-    if found.watch is not None and has_begun(session):
+    if found.watch is not None and found.watch.acts and has_begun(session):
         return replace(found, watch=replace(found.watch, active=True))
     return found
 

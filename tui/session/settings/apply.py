@@ -176,6 +176,10 @@ class _Work:
                 f"{edit.code} cannot be read, so it is not written: {said}",
             )
         if held == edit.new and self._means(edit):
+            unsaved = self.session.unsaved
+            if profile[edit.code].storage == "ram-until-saved" and edit.code not in unsaved:
+                # written by another source: whether it is saved is not known
+                self.session.unsaved_settings.note_write(edit.code, None, held)
             return Result(edit, EditOutcome.DONE, f"{edit.code} holds {edit.text} already.", held)
         if not self._means(edit) or (edit.old is not None and held != edit.old):
             return Result(edit, EditOutcome.CHANGED, self._changed_text(edit, held), held)
@@ -239,6 +243,8 @@ class _Work:
         except LineError as later:
             self.stopped = str(later)
             return Result(edit, EditOutcome.UNKNOWN, f"Whether {edit.code} was written: {later}")
+        if held is not None:
+            self.session.unsaved_settings.note_value(edit.code, held)
         if held == edit.new:
             text = f"{edit.code}: {edit.old_text} -> {edit.text} (its answer was lost)"
             return Result(edit, EditOutcome.DONE, text, held)
@@ -264,7 +270,7 @@ class _Work:
             left=self._left(set(done)),
             links=tuple(self.links),
             after_reset=tuple(p.code for p in parameters if waits_for_reset(profile, p)),
-            unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
+            unsaved=tuple(code for code in done if code in self.session.unsaved),
             stopped=self.stopped,
             stamp=self.writer.permit.stamp if self.writer.permit is not None else 0,
             waits=tuple(r.edit.code for r in self.results if r.outcome is EditOutcome.WAITS),

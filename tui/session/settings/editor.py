@@ -162,7 +162,6 @@ class Editor:
 
     def _applied(self, applied: Applied) -> None:
         self._mark(self.marks.edited([result.edit.code for result in applied.written]))
-        self.session.unsaved |= set(applied.unsaved)
         self.waits_for_reset |= set(applied.after_reset)
         self.moved = next((link for link in applied.links if link.at_once), None)
 
@@ -170,8 +169,6 @@ class Editor:
         """A stop came: what the drive has is no longer staged, the rest is."""
         done = self.staging.drop_written()
         self._mark(self.marks.edited(done))
-        profile = self.session.profile
-        self.session.unsaved |= {c for c in done if profile[c].storage == "ram-until-saved"}
         with suppress(LineError):
             self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
         left = len(self.staging.edits)
@@ -190,14 +187,15 @@ class Editor:
             lost = ", ".join(sorted(self.unsaved))
             gone = f" Not saved before, so look at: {lost}." if lost else ""
             self._say(f"The drive was reset or switched off.{gone}", OutcomeKind.DONE)
-        self.waits_for_reset, self.session.unsaved = set(), frozenset()
+        self.waits_for_reset = set()
+        self.session.unsaved_settings.clear()
 
     def save(self, stamp: int | None = None) -> None:
         """Copy the settings to EEPROM, where the family needs that."""
 
         async def work(permit: Permit) -> str:
             done = await save_to_eeprom(self.session, self.journal, permit)
-            self.session.unsaved = frozenset()
+            self.session.unsaved_settings.clear()
             return done
 
         self._run(work, stamp)
@@ -207,6 +205,7 @@ class Editor:
 
         async def work(permit: Permit) -> str:
             confirmed = self.marks.confirmed
+            self.session.unsaved_settings.forget_values()
             done = await factory_reset(self.session, self.journal, permit, confirmed=confirmed)
             self.values.start()
             return done

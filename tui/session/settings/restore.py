@@ -116,7 +116,7 @@ async def restore_set(
         left=left,
         links=tuple(links),
         after_reset=tuple(p.code for p in parameters if waits_for_reset(session.profile, p)),
-        unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
+        unsaved=tuple(code for code in done if code in session.unsaved),
         stopped=stopped,
         unseen=unseen,
     )

@@ -79,8 +79,7 @@ class Staging:
                 staged += 1
         if not olds:
             return "Nothing is staged, and no old value is known that could be."
-        values, them = ("old value is", "it") if staged == 1 else ("old values are", "them")
-        return f"{staged} {values} staged; w writes {them}."
+        return f"{staged} {'old value is' if staged == 1 else 'old values are'} staged."
 
     def undo_all(self) -> None:
         """Take every edit back."""

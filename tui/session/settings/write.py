@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,6 +19,8 @@ from ..journal import Entry, Journal, now_text
 from ..journal_entries import CUT_SHORT, parameter_entry, raw_text
 from ..read.reader import Reader
 from ..work import Permit
+
+log = logging.getLogger(__name__)
 
 
 class NotTaken(DriveError):
@@ -42,6 +45,7 @@ class Writer:
         replaceable: bool = False,
         read_back: bool = True,
         priority: Priority = Priority.OPERATOR_WRITE,
+        within: float | None = None,
     ) -> None:
         """Write a raw value and see that the drive holds it, in the bits of `check`.
 
@@ -57,7 +61,8 @@ class Writer:
             await self._read_scale(parameter)
         held = await self._held_word(parameter) if is_field(parameter) else None
         before = session.image.get(code)
-        answer, back, lost = "ok", None, False
+        answer, back, lost, sent = "ok", None, False, True
+        refused = False
         session.image.doubt(code)
         try:
             await session.line.write(
@@ -67,6 +72,7 @@ class Writer:
                 priority=priority,
                 replaceable=replaceable,
                 forbidden=self.permit.refusal if self.permit is not None else None,
+                within=within,
             )
             back = await self._read_back(parameter) if read_back else None
             if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
@@ -76,12 +82,12 @@ class Writer:
                     f" {raw_text(self.session, parameter, back)}."
                 )
         except (RequestRefused, Superseded) as error:
-            answer = str(error)
+            answer, sent = str(error), False
             # never sent: what was known before still holds
             session.image.believe(code, before)
             raise
         except DeviceException as error:
-            answer = str(error)
+            answer, refused = str(error), True
             raise
         except LineError as error:
             answer, lost = str(error), True
@@ -91,12 +97,27 @@ class Writer:
             raise
         finally:
             old = before.raw if before is not None else None
-            entry = parameter_entry(
-                session, parameter, old=old, new=raw, answer=answer, why=why, read_back=back
-            )
-            self.journal.add(entry)
-            if lost:
-                self.complete_later(entry, parameter, check if read_back else 0)
+            try:
+                if sent and not refused and parameter.storage == "ram-until-saved":
+                    self._note_unsaved(parameter, old, back)
+                entry = parameter_entry(
+                    session, parameter, old=old, new=raw, answer=answer, why=why, read_back=back
+                )
+                self.journal.add(entry, sent=sent)
+                if lost:
+                    self.complete_later(entry, parameter, check if read_back else 0)
+            except Exception:
+                if self.permit is not None:
+                    raise
+                # a stop that was sent is not undone by its record
+                log.exception("a stop of device %s is not in the journal", session.device)
+
+    def _note_unsaved(self, parameter: Parameter, before: int | None, now: int | None) -> None:
+        unsaved = self.session.unsaved_settings
+        if parameter.resets_others:
+            unsaved.forget_values()
+            before = None
+        unsaved.note_write(parameter.code, before, now)
 
     def complete_later(self, entry: Entry, parameter: Parameter, check: int = 0xFFFFFFFF) -> None:
         """Put into the journal what a write came to whose answer was lost, once that is read.

@@ -177,10 +177,13 @@ class StartKeeper:
             self._silent = self._silent - {session.device} | lives
             self._left = {**self._left, session.device: found}
 
-    def offered(self, session: Startable, *, runs: bool) -> str:
-        """What to tell of a motor that an earlier program has started; empty where nothing."""
-        record = self._left_of(session)
-        if record is None or session.commanded:
+    def offered(self, session: Startable, *, runs: bool | None) -> str:
+        """Describe a motor that an earlier program has started; empty if any commands it now.
+
+        Not known if it `runs`: None.
+        """
+        record, facts = self._left_of(session), session.line.facts
+        if record is None or session.commanded or facts.commander(session.device) is not None:
             return ""
         return offer(record, session.identity, runs, lives=session.device in self._silent)
 

@@ -48,27 +48,27 @@ class StartRecord:
 def offer(
     record: StartRecord,
     identity: DriveIdentity | None,
-    runs: bool,
+    runs: bool | None,
     now: datetime | None = None,
     *,
     lives: bool = False,
 ) -> str:
-    """What to tell a person of a motor that a program which is gone has started; empty if nothing.
+    """Describe a motor whose program has exited, and that no program commands; empty if none.
 
-    A program that `lives` is frozen, or has left the line. Nothing where the drive does not run,
-    or is another than the one that was started; what either of them left unsaid counts as the
-    same.
+    Not known if it `runs`: None. A program that `lives` is frozen, or has left the line. Empty if
+    the drive does not run, or is not the one that was started; what either of them left unsaid
+    counts as the same.
     """
-    if not runs or (identity is not None and not _same(record, identity)):
+    if runs is False or (identity is not None and not _same(record, identity)):
         return ""
     since = _since(record.begun, now or datetime.now().astimezone())
-    if record.left_running:
-        return f"runs{since}, left running on purpose by a program that {_gone(record, lives)}"
-    return f"runs{since} by a command from here, that program {_gone(record, lives)}"
-
-
-def _gone(record: StartRecord, lives: bool) -> str:
-    return f"does not answer on this line (pid {record.pid})" if lives else "ended"
+    does = "runs" if runs else "may run"
+    how = "left running on purpose" if record.left_running else "started"
+    gone = "does not answer on this line" if lives else "has exited"
+    return (
+        f"{does}{since}, {how} by {record.program}, process {record.pid}, which {gone};"
+        " no program commands it"
+    )
 
 
 def _same(record: StartRecord, identity: DriveIdentity) -> bool:

@@ -6,6 +6,8 @@ from tui.drive.profile.schema import Parameter
 
 from ..body import Body
 
+FULL_REFERENCES = {"%": 100.0, "V": 10.0}
+"""The full reference in units that are parts of it."""
 UNGIVEN_HZ = 30.0
 """Reference in Hz of a drive that the line can run but gives no reference."""
 
@@ -51,11 +53,23 @@ class OwnReference:
         return max(words, key=orders.given_at, default=None)
 
     def _in_hz(self, word: Parameter) -> float:
-        value = self._body.engineering(word)
-        if not self._is_speed(word):
-            return value
+        return self._body.engineering(word) * self._hertz_of_one(word)
+
+    def _hertz_of_one(self, word: Parameter) -> float:
+        """What 1 in the unit of a word is in Hz: a percentage and volts are parts of the whole."""
+        if word.unit in FULL_REFERENCES:
+            return self._whole(word) / FULL_REFERENCES[word.unit]
+        if not self._is_speed(word) and word.unit != "rpm":
+            return 1.0
         poles = round(self._body.value("motor_poles", self._body.rating.poles)) or 4
-        return value * poles / 120
+        return poles / 120
+
+    def _whole(self, word: Parameter) -> float:
+        """What the full reference of a word is in Hz."""
+        rating = self._body.registers.named(word.rating) if word.rating else None
+        if rating is None:
+            return self._full
+        return self._body.engineering(rating) * self._hertz_of_one(rating)
 
     def _is_speed(self, word: Parameter) -> bool:
         ways = self._body.profile.data.references
@@ -72,7 +86,8 @@ class OwnReference:
         self._body.earlier_hz = hz
         words = [word for word in self._words() if not self._is_speed(word)]
         if words:
-            self._body.registers.put(words[0], round(hz / self._body.scale(words[0])))
+            one = self._body.scale(words[0]) * self._hertz_of_one(words[0])
+            self._body.registers.put(words[0], round(hz / one))
 
     def wire(self, hz: float) -> None:
         """Put the analogue input to what gives this reference in Hz."""

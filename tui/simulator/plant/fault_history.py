@@ -51,15 +51,15 @@ class FaultHistory:
     def enter(self, raw: int, *, persists: bool) -> None:
         """Give the drive a fault: keep its record, show it, and move the history on.
 
-        The history moves on by the new fault, or by the one before it where the last fault
-        has a word of its own beside the history.
+        The history moves on by the new fault, or by the one before it where the word of the
+        last fault is its first place.
         """
         body = self._body
         self._records.take()
         named = self._faults.parameter
         present = body.registers.named(named) if named else None
         newest = raw
-        if body.traits.history_before and present is not None:
+        if named in self._faults.history and present is not None:
             newest = body.registers.present(present)
         if present is not None:
             body.registers.put(present, raw)
@@ -70,7 +70,8 @@ class FaultHistory:
 
     def _push(self, newest: int) -> None:
         registers = self._body.registers
-        places = [self._body.profile[code] for code in self._faults.history]
+        behind = (code for code in self._faults.history if code != self._faults.parameter)
+        places = [self._body.profile[code] for code in behind]
         kept = [newest, *(registers.present(place) for place in places)]
         for place, value in zip(places, kept, strict=False):
             registers.put(place, value)

@@ -89,6 +89,33 @@ def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             )
 
 
+def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Commands and status are whole words of 16 bits: no others can be written or stopped by."""
+    parameters = {one.code: one for one in data.parameters}
+    for index, chart in enumerate(data.charts):
+        at: TomlPath = ("charts", index)
+        codes = [(chart.status, (*at, "status")), (chart.command, (*at, "command"))]
+        codes += [
+            (order.parameter, (*at, "orders", place)) for place, order in enumerate(chart.orders)
+        ]
+        for code, place in codes:
+            found = parameters.get(code or "")
+            if found is None:
+                continue
+            if found.type.endswith("32"):
+                yield (
+                    place,
+                    f"chart {chart.id}: {found.code} has 32 bits. A command word or a status word"
+                    " has 16 bits; 32-bit ones are not supported.",
+                )
+            elif found.shift or found.mask != 0xFFFF:
+                yield (
+                    place,
+                    f"chart {chart.id}: {found.code} is a part of a register. A command word or a"
+                    " status word is a whole register.",
+                )
+
+
 def running(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """An order to run leads to a state in which the drive is seen to run."""
     for index, chart in enumerate(data.charts):
@@ -159,4 +186,12 @@ def _leads(chart: Chart, source: str, goal: str) -> bool:
     return goal in reached
 
 
-CHART_RULES = (names_of_states, states, stops_always, running, faults_seen, conditions)
+CHART_RULES = (
+    names_of_states,
+    whole_chart_words,
+    states,
+    stops_always,
+    running,
+    faults_seen,
+    conditions,
+)

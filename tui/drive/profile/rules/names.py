@@ -117,6 +117,11 @@ def _of_faults(data: ProfileData) -> Iterator[NamedPlace]:
             yield ("faults", "stored", place, inner), code
     if ready := data.faults.reset_ready:
         yield ("faults", "reset_ready"), ready.parameter
+    for place, row in enumerate(data.faults.after_reset):
+        for when in row.when:
+            yield ("faults", "after_reset", place, "when"), when.parameter
+    if inputs := data.faults.inputs:
+        yield ("faults", "inputs", "parameter"), inputs.parameter
 
 
 def _of_port_counters(data: ProfileData) -> Iterator[NamedPlace]:

@@ -48,6 +48,7 @@ from .fault_help import (
     Hint,
     LookAt,
     ResetWay,
+    RuledOut,
 )
 from .identification import (
     Erratum,
@@ -74,9 +75,11 @@ from .link import (
 )
 from .memory import MemoryOrder, MemoryOrders
 from .monitoring import (
+    AfterReset,
     CommunicationFault,
     FaultCode,
     Faults,
+    InputBits,
     Monitoring,
     MonitoringValue,
     Reaction,
@@ -95,6 +98,7 @@ from .parameter import (
     ScaleBy,
     Storage,
     UnitBy,
+    WordState,
     WordType,
 )
 from .start_up import StartUpStep
@@ -104,6 +108,7 @@ from .wiring import FamilyWarning, Lamp, Opening, SignalName, Wiring
 __all__ = [
     "Access",
     "Addresses",
+    "AfterReset",
     "AlarmHelp",
     "Bit",
     "BitNumber",
@@ -141,6 +146,7 @@ __all__ = [
     "Identification",
     "IdentificationObject",
     "Identifier",
+    "InputBits",
     "Interlock",
     "Lamp",
     "LineRule",
@@ -171,6 +177,7 @@ __all__ = [
     "ReadShapes",
     "ReferenceWay",
     "ResetWay",
+    "RuledOut",
     "ScaleBy",
     "Setting",
     "SignalName",
@@ -190,5 +197,6 @@ __all__ = [
     "When",
     "Wiring",
     "WordAddress",
+    "WordState",
     "WordType",
 ]

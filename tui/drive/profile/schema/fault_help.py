@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import BitNumber, RawWord, Table
+from .base import BitNumber, RawWord, Table, When
 
 HelpConfidence = Literal["manual", "public", "practice"]
 """How surely the first cause is known; `practice` is general practice, from no document."""
@@ -23,6 +24,30 @@ class LookAt(Table, frozen=True, kw_only=True):
     why: str
 
 
+class RuledOut(Table, frozen=True, kw_only=True):
+    """A cause or a check that the value of a parameter rules out."""
+
+    text: str
+    """The cause or the check, as in `probable` or `check`."""
+    parameter: str
+    values: list[int] = []
+    """Raw values that rule it out."""
+    min: int | None = None
+    """With `max`: the lowest raw value that rules it out."""
+    max: int | None = None
+    """With `min`: the highest raw value that rules it out."""
+    when: list[When] = []
+    """Raw values with which this counts; they must be known."""
+
+    def holds(self, raws: Mapping[str, int]) -> bool:
+        """True if it is ruled out; an unknown value rules out nothing."""
+        raw = raws.get(self.parameter)
+        if raw is None or not all(when.holds(raws) for when in self.when):
+            return False
+        within = self.min is not None and self.max is not None and self.min <= raw <= self.max
+        return raw in self.values or within
+
+
 class Hint(Table, frozen=True, kw_only=True):
     """What something points at: causes, checks, parameters."""
 
@@ -30,6 +55,8 @@ class Hint(Table, frozen=True, kw_only=True):
     """Probable causes, the likeliest first."""
     check: list[str] = []
     look_at: list[LookAt] = []
+    ruled_out: list[RuledOut] = []
+    """Causes and checks that a value can rule out."""
     source: str = ""
     confidence: HelpConfidence = "practice"
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, Identifier, RawWord, Table
+from .base import Confidence, Identifier, RawWord, Table, When, WordAddress
 from .chart import StatusBit
 from .fault_help import FaultHelp
 
@@ -50,6 +50,27 @@ class FaultCode(Table, frozen=True, kw_only=True):
     remedy: str = ""
 
 
+class AfterReset(Table, frozen=True, kw_only=True):
+    """The effect of a fault reset for one command channel; the first row that holds counts."""
+
+    by: Literal["line", "others"] | None = None
+    """The holder of the command channel; absent: any channel, also one that is not known."""
+    when: list[When] = []
+    """Conditions; all must hold."""
+    text: str
+    """The sentence for the question, the Faults screen, `reset` and `status`."""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class InputBits(Table, frozen=True, kw_only=True):
+    """The word that shows which inputs are closed at the terminals."""
+
+    parameter: str
+    mask: WordAddress = 0xFFFF
+    """Its bits that are inputs."""
+
+
 class Faults(Table, frozen=True, kw_only=True):
     """Where faults are read and what their codes mean."""
 
@@ -67,6 +88,10 @@ class Faults(Table, frozen=True, kw_only=True):
     """Name of that file, without .toml, where it is not the profile's id."""
     reset_ready: StatusBit | None = None
     """The bit by which the drive tells that a reset can work now."""
+    after_reset: list[AfterReset] = []
+    """The effect of a reset, one sentence per command channel."""
+    inputs: InputBits | None = None
+    """Inputs at the terminals; absent if Modbus does not show them."""
     none: int = 0
     note: str = ""
     source: str = ""

@@ -29,6 +29,14 @@ class Enumeration(Table, frozen=True, kw_only=True):
     values: dict[str, str]
 
 
+class WordState(Table, frozen=True, kw_only=True):
+    """The values of some bits of a word."""
+
+    mask: WordAddress
+    value: WordAddress
+    """The value of those bits."""
+
+
 class Bit(Table, frozen=True, kw_only=True):
     """One named bit of a word."""
 
@@ -38,6 +46,8 @@ class Bit(Table, frozen=True, kw_only=True):
     on: str = ""
     alarm: bool = False
     """True where a set bit is an alarm."""
+    counts: WordState | None = None
+    """What other bits of the word must be for this one to mean anything."""
     note: str = ""
 
 

@@ -1,0 +1,390 @@
+"""Values that another program sends: each has its bounds, and none of them costs a stop."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import random
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import partial
+from typing import Any, get_args
+
+import msgspec
+import pytest
+from msgspec import inspect
+
+from tui.bus.api import Priority
+from tui.bus.bounds import MOST_STOPPERS, STOPS_WRAP
+from tui.bus.limits import CAUTIOUS, Limits, Window
+from tui.bus.line import Line
+from tui.bus.model import DeviceCounters, DeviceState, LineCounters, LineState, LineStatus
+from tui.bus.program import Program
+from tui.bus.share.failures import ErrorForm
+from tui.bus.share.messages import (
+    VERSION,
+    Alive,
+    Answer,
+    AnyMessage,
+    AskedFor,
+    Asking,
+    Claim,
+    Denied,
+    Describe,
+    Facts,
+    Failed,
+    Granting,
+    Hello,
+    Here,
+    Hush,
+    News,
+    NoMessage,
+    PollWish,
+    RollCall,
+    StopGiven,
+    Told,
+    TurnedAway,
+    Welcome,
+    Withdraw,
+    packed,
+    unpacked,
+)
+from tui.bus.share.place import Owner
+from tui.bus.stop_counts import StopCounts
+
+from .conftest import Share
+from .peer import PtyPeer, eventually, honest
+from .sharing import SharedLines, in_loop
+from .test_share_ends import raw
+
+STOP, RUN = 0, 15
+STRANGER = Program("stranger", "stranger", 1)
+HIGHEST = STOPS_WRAP - 1
+MUTANTS = 4000
+
+
+# Every field has bounds
+
+SIZED = (inspect.StrType, inspect.BytesType, inspect.DictType, inspect.CollectionType)
+
+
+def unbounded(form: inspect.Type, where: str) -> Iterator[str]:
+    """Parts of a type that may hold more, or greater, values than a program may send."""
+    match form:
+        case inspect.IntType() | inspect.FloatType():
+            if form.ge is None or (form.le is None and form.lt is None):
+                yield where
+        case inspect.DictType(key_type=key, value_type=value):
+            yield from unbounded(key, f"{where} key")
+            yield from unbounded(value, f"{where} value")
+        case inspect.CollectionType(item_type=item):
+            yield from unbounded(item, f"{where} item")
+        case inspect.TupleType(item_types=types) | inspect.UnionType(types=types):
+            for one in types:
+                yield from unbounded(one, where)
+        case inspect.StructType() | inspect.DataclassType():
+            for field in form.fields:
+                yield from unbounded(field.type, f"{form.cls.__name__}.{field.name}")
+        case inspect.AnyType():
+            yield where
+    if isinstance(form, SIZED) and form.max_length is None:
+        yield where
+
+
+@pytest.mark.parametrize("kind", [*get_args(AnyMessage), Owner])
+def test_message_fields_all_have_bounds(kind: type) -> None:
+    # the fields of a request are checked as it is made of them
+    assert set(unbounded(inspect.type_info(kind), "")) <= {"Asking.fields value"}
+
+
+# Counts of stops
+
+
+def test_stop_count_wraps_and_each_stop_changes_the_total() -> None:
+    counts = StopCounts()
+    for count in (HIGHEST // 3, 2 * HIGHEST // 3, HIGHEST - 1):
+        counts.learn({1: {"": count, "other": count}})
+    for _ in range(5):
+        before = counts.stamp(1)
+        counts.give("me", (1,), "the stop key")
+        assert counts.stamp(1) == (before + 1) % STOPS_WRAP
+    counts.fold({"other"})
+    assert counts.stamp(1) == before + 1
+    assert all(0 <= n < STOPS_WRAP for n in counts.given[1].values())
+    assert 0 <= counts.stamp(0) < STOPS_WRAP
+
+
+def test_stop_count_at_the_wrap_still_news_to_others() -> None:
+    one, other = StopCounts(), StopCounts()
+    for counts in (one, other):
+        for count in (HIGHEST // 3, 2 * HIGHEST // 3, HIGHEST):
+            counts.learn({1: {"me": count}})
+    one.give("me", (1,), "the stop key")
+    assert one.of("me", (1,)) == (0,)
+    assert other.learn(one.given) == (1,)
+    assert other.stamp(1) == one.stamp(1)
+
+
+def test_stop_count_that_others_raised_falls_back_to_its_own_program() -> None:
+    """Else its next stop would be no news, and what waits would go out after it."""
+    owner = StopCounts()
+    owner.learn_greeting("liar", {1: {"run": 1000}}, ["panel", "liar"])
+    before = owner.stamp(1)
+    assert owner.learn_greeting("run", {1: {"run": 3}}, ["panel", "liar", "run"]) == (1,)
+    assert owner.stamp(1) == before
+    # while it is there, nobody else counts for it
+    assert owner.learn_greeting("liar", {1: {"run": 2000, "panel": 9}}, ["panel", "run"]) == ()
+    assert owner.note("run", (1,), (4,), "the stop key") == (1,)
+    assert owner.stamp(1) == before + 1
+
+
+def test_stop_counts_by_name_stay_few() -> None:
+    owner = StopCounts()
+    for start in range(0, 2000, 100):
+        named = {f"program {n}": 1 for n in range(start, start + 100)}
+        owner.learn_greeting("liar", {1: named, 2: {"program 1": 1}}, ["panel", "run"])
+        owner.note("run", (1,), (start + 1,), "the stop key")
+        assert len(owner.given[1]) < MOST_STOPPERS
+    assert owner.stamp(1) == 2000 + 1901
+    assert owner.of("run", (1,)) == (1901,)
+
+
+# On a line
+
+
+async def voided_and_stopped(lines: SharedLines, peer: PtyPeer, stopper: Line, other: Line) -> None:
+    """A stop by one program voids the other's write of before, and its frame is sent."""
+    device = 3
+    eventually(lambda: stopper.facts.stops.stamp(device) == other.facts.stops.stamp(device))
+    heard: list[tuple[int, ...]] = []
+    seen = len(peer.requests)
+    leave = other.facts.on_stop(lambda devices, _by, _who: heard.append(devices))
+    stamp = other.facts.stops.stamp(device)
+    stopper.facts.give_stop([device], "the stop key")
+    await asyncio.wait_for(stopper.write(device, 1, [STOP], priority=Priority.STOP), timeout=20)
+    eventually(lambda: any(device in one for one in heard))
+    leave()
+    assert (device, STOP) in [(one[0], one[5]) for one in peer.requests[seen:]]
+    assert other.facts.refusal(other.facts.me.id, device, stamp)
+    await asyncio.wait_for(other.write(device, 1, [RUN]), timeout=20)
+
+
+GREETINGS: Mapping[str, Callable[[], Mapping[int, Mapping[str, int]]]] = {
+    "near 2**63": lambda: {n: {"stranger": 2**63 - 1, "": 2**63 - 1} for n in range(1, 9)},
+    "beyond 64 bits": lambda: {3: {"stranger": 2**64 - 1, "x": 2**64 - 1}},
+    "below zero": lambda: {3: {"stranger": -1}},
+    "the highest": lambda: {n: {"stranger": HIGHEST, "": HIGHEST} for n in range(256)},
+    "half way": lambda: {n: {"stranger": HIGHEST // 2, "": HIGHEST // 2} for n in range(256)},
+    "in the name of all": lambda: {
+        n: dict.fromkeys(("panel", "watch", "run", "late"), HIGHEST // 2) for n in range(256)
+    },
+    "many names": lambda: {n: {f"{i:x}": 1 for i in range(250)} for n in range(256)},
+}
+
+
+@pytest.mark.parametrize("name", GREETINGS)
+async def test_stop_counts_of_a_greeting_block_no_later_stop(share: Share, name: str) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        await owner.read(1, 1)
+        hello = packed(Hello(VERSION, STRANGER, "serial:line", GREETINGS[name]()))  # type: ignore[arg-type]
+        for _ in range(3):
+            with raw(lines) as connection, suppress(OSError):
+                connection.sendall(hello)
+                connection.recv(100)
+            await voided_and_stopped(lines, peer, other, owner)
+            await voided_and_stopped(lines, peer, owner, other)
+        late = lines.open("late")
+        await voided_and_stopped(lines, peer, late, owner)
+        await voided_and_stopped(lines, peer, late, other)
+
+
+async def test_stop_in_the_name_of_another_program_ends_the_connection_only(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        await owner.read(1, 1)
+        for victim in (owner, other):
+            forged = StopGiven((3,), (HIGHEST // 2,), "a key", victim.facts.me)
+            with raw(lines) as connection, suppress(OSError):
+                connection.sendall(packed(Hello(VERSION, STRANGER, "", {})) + packed(forged))
+                while connection.recv(4096):
+                    pass
+            await voided_and_stopped(lines, peer, victim, owner if victim is other else other)
+        with raw(lines) as connection, suppress(OSError):
+            connection.sendall(packed(Hello(VERSION, owner.facts.me, "", {})))
+            assert connection.recv(10) == b""
+        assert owner.facts.me in owner.facts.programs
+        await voided_and_stopped(lines, peer, other, owner)
+
+
+# Mutated messages
+
+LIMITS = Limits(frozenset({3, 6, 16}), 29, 27, 0, 0, read_windows=(Window(100, 1, 9, False),))
+STATE = DeviceState(True, 0, 1.0, 2.0, 0.01, 0.01, 3.0)
+SAMPLES: tuple[AnyMessage, ...] = (
+    Hello(VERSION, STRANGER, "serial:line", {1: {"stranger": 1, "": 2}}, {1: 5.0}),
+    Welcome(STRANGER, "serial:line"),
+    TurnedAway("no"),
+    Describe(1, LIMITS),
+    Asking(1, "Read", {"device": 1, "address": 1, "count": 1}, Priority.POLL, False, 0.0, 0, 1e9),
+    Asking(
+        2, "ReadWrite", {"device": 1, "address": 1, "count": 1, "write_address": 5, "values": [1]},
+        Priority.OPERATOR_WRITE, True, 0.5, 0, 1e9, CAUTIOUS, 0.2,
+    ),
+    Withdraw(1),
+    Answer(1, b"\x03\x02\0\1", 5.0),
+    Failed(1, "NoAnswer", ErrorForm("text", 1, 3, 5, "nothing", b"x", retry_in=1.0)),
+    Failed(2, "LineLost", ErrorForm("text")),
+    StopGiven((5, 6), (1, 2), "a key", STRANGER, 5.0),
+    RollCall(1),
+    Here(1),
+    Alive(),
+    Claim(5, True),
+    Denied(5, STRANGER),
+    AskedFor(5, STRANGER),
+    Granting(5, "stranger", True, "why"),
+    Hush(5, "a test of its timeout"),
+    Told(5, "text"),
+    PollWish({1: 0.2}, True),
+    Facts((STRANGER,), {5: "stranger"}, {5: {"stranger": 1}}, {6: ("stranger", "why")}, {5: 1.0}),
+    News(
+        LineState(LineStatus.CONNECTED, "", 1.0, 2.0), LineCounters(3, busy_seconds=1.0),
+        {1: STATE}, {1: 0.5}, ((1.0, "out", b"\1\3", ""),),
+        {1: DeviceCounters(1, exceptions={2: 1})},
+    ),
+)  # fmt: skip
+"""One message of each kind; Goodbye aside, which ends an attachment in good order."""
+
+DEEP: list[Any] = []
+for _ in range(900):
+    DEEP = [DEEP]
+NASTY: tuple[Any, ...] = (
+    None, True, "", "x", "x" * 500, "x" * 70_000, "\x1b[2J", "\U0001f600" * 3000, b"", b"\0" * 9000,
+    -1, 0, 1, 247, 255, 256, 65535, 65536, 2**31 - 1, 2**32 - 1, 2**32, 2**63 - 1, 2**63, 2**64 - 1,
+    -(2**63), 0.0, -0.0, -1e-9, 1e-320, 1e9, 1e10, 1e11, 1e308, -1e308, float("nan"), float("inf"),
+    -float("inf"), [], {}, [1] * 5000, {1: 1}, {"x": {"y": {}}}, {n: n for n in range(300)}, DEEP,
+)  # fmt: skip
+
+
+def plain(message: AnyMessage) -> dict[str, Any]:
+    """A message as maps and lists, which may then be changed at will."""
+    return dict(msgspec.msgpack.decode(packed(message)[4:], strict=False))
+
+
+def places(value: object, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The paths to all parts of a message."""
+    items: Iterator[tuple[Any, Any]] = iter(())
+    if isinstance(value, dict):
+        items = iter(value.items())
+    elif isinstance(value, list):
+        items = iter(enumerate(value))
+    for key, inner in items:
+        yield (*path, key)
+        yield from places(inner, (*path, key))
+
+
+def changed(value: Any, path: tuple[Any, ...], new: Any, *, as_key: bool) -> Any:
+    """A copy with another value, or with another key, at one place."""
+    if not path:
+        return new
+    copy = value.copy()
+    if len(path) == 1 and as_key and isinstance(copy, dict):
+        with suppress(TypeError):
+            copy[new] = copy.pop(path[0])
+        return copy
+    copy[path[0]] = changed(value[path[0]], path[1:], new, as_key=as_key)
+    return copy
+
+
+def mutants() -> list[bytes]:
+    """Messages with one part changed, and some with random bytes changed; the same each time."""
+    found: list[bytes] = []
+    for message in SAMPLES:
+        whole = plain(message)
+        for path, new, as_key in itertools.product(places(whole), NASTY, (False, True)):
+            with suppress(OverflowError, UnicodeEncodeError, TypeError, RecursionError):
+                found.append(
+                    framed(msgspec.msgpack.encode(changed(whole, path, new, as_key=as_key)))
+                )
+    chance = random.Random(28)
+    for _ in range(1000):
+        data = bytearray(packed(chance.choice(SAMPLES))[4:])
+        for _ in range(chance.randint(1, 4)):
+            data[chance.randrange(len(data))] = chance.randrange(256)
+        found.append(framed(bytes(data)))
+    return found
+
+
+def framed(data: bytes) -> bytes:
+    return len(data).to_bytes(4, "big") + data
+
+
+def test_unpacked_with_mutated_messages_refuses_or_takes_what_can_be_sent_on() -> None:
+    found = mutants()
+    assert len(found) > MUTANTS
+    taken = 0
+    for data in found:
+        try:
+            message = unpacked(data[4:])
+        except NoMessage:
+            continue
+        taken += 1
+        assert type(unpacked(packed(message)[4:])) is type(message)
+    assert 100 < taken < len(found) / 2
+
+
+async def test_owner_with_mutated_messages_serves_and_stops(
+    share: Share, caplog: pytest.LogCaptureFixture
+) -> None:
+    """In turns: a handful of connections that say something malformed, then a stop."""
+    chance = random.Random(28)
+    greeting = packed(SAMPLES[0])
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        await owner.read(1, 1)
+        for data in batches(chance.sample(mutants(), 1500)):
+            for one in data:
+                with raw(lines) as connection, suppress(OSError):
+                    connection.sendall(greeting + one + NO_MESSAGE)
+                    while connection.recv(1 << 16):
+                        pass
+            eventually(lambda: [one.name for one in owner.facts.others] == ["watch"], 30)
+            await voided_and_stopped(lines, peer, other, owner)
+            await voided_and_stopped(lines, peer, owner, other)
+    assert "serving a program on the line failed" not in caplog.text
+
+
+NO_MESSAGE = framed(b"\xc1")
+
+
+def batches(found: list[bytes], size: int = 50) -> Iterator[list[bytes]]:
+    for start in range(0, len(found), size):
+        yield found[start : start + size]
+
+
+async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
+    share: Share, caplog: pytest.LogCaptureFixture
+) -> None:
+    chance = random.Random(29)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        await owner.read(1, 1)
+        server = owner._engine._shared._server  # type: ignore[union-attr]
+
+        def say(data: bytes) -> None:
+            for one in server._all():
+                one.writer.write(data)
+
+        # one that lies about the end of a request is believed
+        lies = (b"Answer", b"Failed")
+        found = [one for one in mutants() if not any(kind in one[:20] for kind in lies)]
+        for some in batches(chance.sample(found, 500), 10):
+            for data in some:
+                in_loop(owner, partial(say, data))
+            eventually(lambda: [one.name for one in owner.facts.others] == ["watch"], 30)
+            await voided_and_stopped(lines, peer, other, owner)
+    assert other.state.status is LineStatus.CONNECTED

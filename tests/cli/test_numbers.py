@@ -1,0 +1,93 @@
+"""Numeric options take finite numbers within limits, and no rate that a line cannot achieve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import click
+import pytest
+
+from tui.bus.link import Link, SerialLink, TcpLink
+from tui.cli.main import COMMANDS, main
+from tui.cli.shared.errors import USAGE, Failure
+from tui.cli.shared.numbers import FiniteRange, check_rate
+
+from .commands import refused, tcp_line
+
+NOT_NUMBERS = ["nan", "inf", "-inf", "infinity", "1e400", "-1e400", "x", ""]
+
+
+def numeric_options() -> Iterator[tuple[str, click.Parameter]]:
+    """Every option of every command that takes a number."""
+    with click.Context(main) as context:
+        for name in COMMANDS:
+            command = main.get_command(context, name)
+            assert command is not None
+            subcommands = getattr(command, "commands", {})
+            for one in (command, *subcommands.values()):
+                for parameter in one.params:
+                    if isinstance(
+                        parameter.type,
+                        click.types.FloatParamType | click.types.IntParamType,
+                    ):
+                        yield f"{name} {parameter.opts[0]}", parameter
+
+
+OPTIONS = dict(numeric_options())
+
+
+def test_every_command_is_searched() -> None:
+    assert {"run --for", "watch --every", "serve --fresh", "simulate --run"} <= OPTIONS.keys()
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_option_refuses_all_but_finite_numbers_in_range(name: str) -> None:
+    parameter = OPTIONS[name]
+    kind = parameter.type
+    if isinstance(kind, click.types.FloatParamType):
+        assert isinstance(kind, FiniteRange)
+        assert kind.min is not None
+        assert kind.max is not None
+        outside = [str(kind.min - 1), str(kind.max * 2)]
+    else:
+        outside = [str(kind.min - 1)] if isinstance(kind, click.IntRange) and kind.min else []
+    for text in (*NOT_NUMBERS, *outside):
+        with pytest.raises(click.BadParameter):
+            kind.convert(text, parameter, None)
+
+
+@pytest.mark.parametrize("seconds", ["nan", "inf", "1e400", "0", "-1"])
+def test_run_for_no_finite_time_is_status_2(seconds: str) -> None:
+    with tcp_line("atv71@1") as line:
+        message = refused(2, "run", line, "--reference", "20Hz", "--arm", "--for", seconds)
+        assert "--for" in message
+
+
+@pytest.mark.parametrize("rate", ["nan", "inf", "2", "-0.1", "x"])
+def test_simulate_refuses_a_share_that_is_none(rate: str) -> None:
+    assert "KIND=RATE" in refused(
+        2, "simulate", "atv71", "--tcp", "127.0.0.1:0", "--line-fault", f"late={rate}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("link", "every", "drives", "possible"),
+    [
+        (SerialLink("/dev/x", 19200), 0.05, 1, True),
+        (SerialLink("/dev/x", 19200), 0.05, 31, False),
+        (SerialLink("/dev/x", 19200), 1.0, 31, True),
+        (SerialLink("/dev/x", 1200), 0.1, 1, False),
+        (SerialLink("/dev/x", 1200), 0.3, 1, True),
+        (TcpLink("host", 502), 0.05, 100, True),
+    ],
+)
+def test_rate_is_refused_if_the_line_cannot_achieve_it(
+    link: Link, every: float, drives: int, possible: bool
+) -> None:
+    if possible:
+        check_rate(link, every, drives)
+        return
+    with pytest.raises(Failure) as refusal:
+        check_rate(link, every, drives)
+    assert refusal.value.status == USAGE
+    assert "Use a longer cycle" in refusal.value.message

@@ -1,0 +1,244 @@
+"""Errors of the panel itself while a motor turns: the stop goes out first, then one sentence."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.programs import wait_until
+
+from .failing_panel import TEXT, Plant, planted
+from .pty_panel import PtyPanel, panel_on_a_pty
+
+DRAW = "tui.screens.monitor.screen:MonitorScreen.draw"
+SCREENS = {
+    "Monitor": ("", DRAW),
+    "Line": ("1", "tui.screens.connection.screen:ConnectionScreen.draw"),
+    "Parameters": ("3", "tui.screens.parameters.screen:ParametersScreen.draw"),
+    "Scanner": ("4", "tui.screens.blocks.screen:BlocksScreen.draw"),
+    "Faults": ("5", "tui.screens.faults.screen:FaultsScreen.draw"),
+    "Control": ("6", "tui.screens.control.screen:ControlSourceScreen.draw"),
+    "Frames": ("7", "tui.screens.frames.screen:FramesScreen.draw"),
+    "Messages": ("m", "tui.screens.messages.screen:MessagesScreen.draw"),
+    "Wiring": ("I", "tui.screens.wiring.screen:WiringScreen.draw_frame"),
+}
+DIALOGS = {
+    "Ask": "dialogs.ask",
+    "Confirm": "dialogs.confirm",
+    "Leave": "dialogs.leave",
+    "Palette": "dialogs.palette",
+    "PickFile": "dialogs.pick_file",
+    "WhyScreen": "dialogs.why",
+    "HelpScreen": "keys.help",
+    "OptionsScreen": "command.options",
+    "PickWord": "command.teaching",
+    "PickParameter": "blocks.pick_parameter",
+    "EditNumber": "parameters.edit_value",
+    "PickValue": "parameters.edit_value",
+    "EditBits": "parameters.edit_value",
+    "Results": "parameters.results",
+    "RestQuestion": "parameters.results",
+    "Skipped": "parameters.skipped",
+}
+"""By class, the module below `tui.screens`."""
+PLACES = {
+    "timer": ("", "tui.screens.lookout:Lookout.look_around"),
+    "action": ("m", "tui.screens.places:Places.action_messages"),
+    "key handler": ("z", "tui.screens.base:PanelScreen.on_key"),
+    "worker": ("qs", "tui.screens.leaving:Leaving._stop_and_leave"),
+    "thread of the keys": ("x", "tui.terminal.reader:KeyReader.read"),
+    "callback of the loop": ("", "tui.terminal.lean_app:LeanApp.picture_taken"),
+    "event": ("x", "tui.screens.hands:Hands.on_event"),
+    "renderer": ("", "tui.widgets.lines:Lines.render_lines"),
+    "picture": ("", "tui.terminal.lean_app:LeanApp._display"),
+}
+"""Where else an error comes from, and the keys that lead there."""
+ERRORS = (
+    "RecursionError",
+    "MemoryError",
+    "SystemExit",
+    "KeyboardInterrupt",
+    "Unspeakable",
+    "Lengthy",
+)
+SECOND = {
+    "shutdown": "textual.app:App._shutdown",
+    "unmount": "tui.app:DrivePanelApp.on_unmount",
+    "sentence": "tui.app:DrivePanelApp.last_words",
+    "bookkeeping": "tui.session.monitor.line_watch:LineWatch.under_command",
+}
+"""Where a second error comes from while the panel ends."""
+HANGS = {
+    "shutdown": "textual.app:App._shutdown",
+    "loop": "tui.terminal.last_words:LastWords._fatal_error",
+    "terminal": "textual.drivers.linux_driver:LinuxDriver.stop_application_mode",
+}
+"""What may hang while the panel ends."""
+
+
+@contextmanager
+def failing(
+    folder: Path, *plants: tuple[str, str], dialog: str = "", options: tuple[str, ...] = ()
+) -> Iterator[PtyPanel]:
+    """A panel whose motor runs; errors, each with its place, come once `now` is in the folder."""
+    wanted = [Plant(place, str(folder / "now"), error) for error, place in plants]
+    if dialog:
+        look = "tui.screens.lookout:Lookout.look_around"
+        wanted.append(Plant(look, str(folder / "open"), dialog=dialog))
+    # who renders a traceback first never comes to the stop
+    wanted.append(Plant("rich.traceback:Traceback.__init__", str(folder / "now"), "hang"))
+    program = ("tests.line.failing_panel", planted(*wanted))
+    with panel_on_a_pty(*options, program=program) as panel:
+        panel.run()
+        wait_until(
+            lambda: panel.look() and panel.simulation.drive(1).motor.frequency > 2, "it turns"
+        )
+        yield panel
+
+
+def end(panel: PtyPanel, folder: Path, keys: str = "") -> bytes:
+    """Let the errors come; the stop goes out and nothing else. What came on the terminal."""
+    writes, sent = len(panel.log.writes), len(panel.sent)
+    (folder / "now").touch()
+    for key in keys:
+        panel.type(key)
+        panel.settle(0.5)
+    wait_until(lambda: (panel.look() or True) and panel.stops(writes) > 0, "the stop")
+    ended(panel)
+    assert panel.simulation.drive(1).motor.frequency == 0
+    output = panel.sent[sent:]
+    assert b"Traceback" not in output
+    return output
+
+
+def ended(panel: PtyPanel, *, status: int = 70) -> None:
+    """Wait for the end of the panel's process."""
+    wait_until(lambda: (panel.look() or True) and _left(panel) is not None, "the end of the panel")
+    while panel.look():
+        pass
+    assert _left(panel) == status
+
+
+def _left(panel: PtyPanel) -> int | None:
+    """The exit status of the panel; None while it runs."""
+    found = os.waitid(os.P_PID, panel.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    return found.si_status if found is not None else None
+
+
+def below(output: bytes) -> list[str]:
+    """The lines on the terminal below the screen that was left."""
+    text = output.rpartition(b"\x1b[?1049l")[2].rpartition(b"\x1b[?1004l")[2]
+    # an answer of the terminal that was on its way is echoed once the panel has left
+    return re.sub(r"\^\[\[[0-9;]*R", "", text.decode()).splitlines()
+
+
+def logged() -> str:
+    """The log of the panel."""
+    return Path(os.environ["DRIVEPANEL_STATE"], "drivepanel.log").read_text()
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_an_error_on_a_screen_sends_the_stop_first(screen: str, tmp_path: Path) -> None:
+    key, place = SCREENS[screen]
+    with failing(tmp_path, ("RuntimeError", place)) as panel:
+        if key:
+            panel.type(key)
+            panel.settle(0.4)
+        output = below(end(panel, tmp_path))
+    assert output[0].startswith(
+        f"The panel had to stop after an internal error (RuntimeError: {TEXT});"
+    )
+    assert output[-1] == "Device 1: stopped."
+    assert f"RuntimeError: {TEXT}" in logged()
+    assert "Traceback" in logged()
+
+
+@pytest.mark.parametrize("dialog", DIALOGS)
+def test_an_error_in_a_dialog_sends_the_stop_first(dialog: str, tmp_path: Path) -> None:
+    place = f"tui.screens.{DIALOGS[dialog]}:{dialog}.draw_frame"
+    with failing(tmp_path, ("RuntimeError", place), dialog=dialog) as panel:
+        (tmp_path / "open").touch()
+        wait_until(lambda: panel.look() and not (tmp_path / "open").exists(), "the dialog")
+        panel.settle(0.4)
+        output = below(end(panel, tmp_path))
+    assert output[0].startswith("The panel had to stop after an internal error (RuntimeError")
+    assert output[-1] == "Device 1: stopped."
+
+
+def test_every_dialog_is_among_these() -> None:
+    from tests.ui.test_dialog_keys import dialogs_there_are
+
+    assert dialogs_there_are() == set(DIALOGS)
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_an_error_anywhere_else_sends_the_stop_first(name: str, tmp_path: Path) -> None:
+    keys, place = PLACES[name]
+    with failing(tmp_path, ("RuntimeError", place)) as panel:
+        output = below(end(panel, tmp_path, keys))
+    assert output[0].startswith("The panel had to stop after an internal error (RuntimeError")
+    assert output[-1] == "Device 1: stopped."
+
+
+def test_a_dialog_that_cannot_be_made_sends_the_stop_first(tmp_path: Path) -> None:
+    for method in ("compose", "on_mount"):
+        (folder := tmp_path / method).mkdir()
+        place = f"tui.screens.messages.screen:MessagesScreen.{method}"
+        with failing(folder, ("RuntimeError", place)) as panel:
+            end(panel, folder, "m")
+
+
+@pytest.mark.parametrize("error", ERRORS)
+def test_whatever_the_error_is_the_stop_goes_out_first(error: str, tmp_path: Path) -> None:
+    with failing(tmp_path, (error, DRAW)) as panel:
+        output = below(end(panel, tmp_path))
+    assert output[0].startswith("The panel had to stop after an internal error (")
+    assert [line for line in output if line.startswith(" ")] == []
+    assert output[-1] == "Device 1: stopped."
+
+
+@pytest.mark.parametrize("second", SECOND)
+def test_a_second_error_keeps_no_stop_back(second: str, tmp_path: Path) -> None:
+    with failing(tmp_path, ("RuntimeError", DRAW), ("RuntimeError", SECOND[second])) as panel:
+        output = below(end(panel, tmp_path))
+    assert output[0].startswith("The panel had to stop after an internal error (RuntimeError")
+    assert "Device 1: stopped." in output
+
+
+@pytest.mark.parametrize("hang", HANGS)
+def test_an_end_that_hangs_is_ended(hang: str, tmp_path: Path) -> None:
+    with failing(tmp_path, ("RuntimeError", DRAW), ("hang", HANGS[hang])) as panel:
+        end(panel, tmp_path)
+
+
+def test_a_terminal_that_takes_nothing_holds_up_neither_the_stop_nor_the_end(
+    tmp_path: Path,
+) -> None:
+    # from many frames on its buffer is full: nobody reads here
+    with failing(tmp_path, ("RuntimeError", "tui.terminal.reader:KeyReader.read")) as panel:
+        panel.type("\x0c" * 40, apart=0.1)
+        for _ in range(40):
+            panel.type("\x0c")
+            time.sleep(0.1)
+        writes = len(panel.log.writes)
+        (tmp_path / "now").touch()
+        panel.type("x")
+        wait_until(lambda: panel.stops(writes) > 0, "the stop")
+        wait_until(lambda: _left(panel) is not None, "the end of the panel")
+        assert panel.simulation.drive(1).motor.frequency == 0
+
+
+def test_an_error_leaves_motors_running_that_are_to_run_on(tmp_path: Path) -> None:
+    options = ("--on-hangup", "leave-running")
+    with failing(tmp_path, ("RuntimeError", DRAW), options=options) as panel:
+        writes = len(panel.log.writes)
+        (tmp_path / "now").touch()
+        ended(panel)
+        assert panel.log.writes[writes:] == []
+        assert panel.simulation.drive(1).motor.frequency > 2

@@ -1,0 +1,125 @@
+"""Stops of all motors that Drive Panel runs, ordered because the panel ends."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from tui.session.command.stop_report import AT_THE_MACHINE
+
+if TYPE_CHECKING:
+    from tui.session.command.stop_report import StopReport
+    from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
+
+log = logging.getLogger(__name__)
+
+STOPPED_WITHIN = 60.0
+"""Seconds that a motor may take to its standstill before the panel gives up waiting."""
+BY = "leaving the panel"
+
+
+class LineStops:
+    """Stops of the motors of one line; ordering them raises nothing."""
+
+    def __init__(self, fleet: Fleet, label: str = "") -> None:
+        """`label` names the line, if several are open."""
+        self.fleet = fleet
+        self.label = label
+        self.sessions: list[DriveSession] = []
+        """Drives whose motors are to stop."""
+        self.troubles: dict[int, str] = {}
+        """Why no stop of a device was ordered."""
+
+    def order(self) -> None:
+        """End all work on the line's drives, then order a stop of each motor started from here."""
+        for session in self.fleet.sessions:
+            try:
+                session.work.stop(BY)  # no frame of it from now on: what runs by then is stopped
+            except Exception:
+                log.exception("work on device %s was not ended", session.device)
+        self.sessions = self._started_here()
+        if not self.sessions or self._stopped(self.sessions):
+            return
+        for session in self.sessions:  # an error about one keeps no other from its stop
+            self._stopped([session])
+
+    def _started_here(self) -> list[DriveSession]:
+        """Drives under command, and those whose run frame may be on its way."""
+        try:
+            running = self.fleet.line_watch.under_command()
+        except Exception:
+            log.exception("which motors run is not known: every commanded one is stopped")
+            running = self.fleet.commanded
+        begun = [
+            s for s in self.fleet.sessions if s.starts is not None and s.starts.holds(s.device)
+        ]
+        return [*running, *(one for one in begun if one not in running)]
+
+    def _stopped(self, sessions: Sequence[DriveSession]) -> bool:
+        """Order one stop of them; whether that was done."""
+        try:
+            self.fleet.stop(sessions, by=BY)
+        except Exception as error:
+            log.exception("no stop was ordered")
+            self.troubles |= {one.device: f"{error}" for one in sessions}
+            if len(sessions) == 1 and (console := self.fleet.console(sessions[0].device)):
+                self.fleet.last_stop(error, console)
+            return False
+        for session in sessions:
+            self.troubles.pop(session.device, None)
+        return True
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for the standstill of all; True if every motor was seen at rest."""
+        ordered = [one for one in self.sessions if one.device not in self.troubles]
+        summary = self.fleet.stopper.wait(ordered, seconds)
+        ended = len(summary.reports) == len(ordered) and summary.ended
+        return ended and not summary.failed and not self.troubles
+
+    def lines(self) -> list[str]:
+        """The result of each stop, for a person."""
+        reports = self.fleet.stopper.reports
+        return [
+            f"{self.label}Device {one.device}: {self._result(one.device, reports.get(one.device))}"
+            for one in self.sessions
+        ]
+
+    def _result(self, device: int, report: StopReport | None) -> str:
+        if device in self.troubles or report is None:
+            why = self.troubles.get(device, "no stop was sent")
+            return f"NOT STOPPED: {why} {AT_THE_MACHINE}"
+        if report.phase.value in ("stopped", "failed"):
+            return report.text if report.text.endswith(".") else f"{report.text}."
+        return f"NOT STOPPED after {STOPPED_WITHIN:.0f} s: {report.text}. {AT_THE_MACHINE}"
+
+
+class LastStops(NamedTuple):
+    """The stops of all lines."""
+
+    lines: Sequence[LineStops]
+
+    @property
+    def begun(self) -> str:
+        """The motors that are being stopped, for a person."""
+        devices = [
+            f"{line.label}{one.device}" if line.label else str(one.device)
+            for line in self.lines
+            for one in line.sessions
+        ]
+        if not devices:
+            return ""
+        return f"Stopping device{'s' if len(devices) > 1 else ''} {', '.join(devices)}."
+
+    def follow(self) -> str:
+        """Wait for the standstill of all, for a bounded time; the result of each."""
+        self.wait()
+        return "\n".join(text for line in self.lines for text in line.lines())
+
+    def wait(self) -> bool:
+        """Wait for the standstill of all, for a bounded time; True if all were seen at rest."""
+        end = time.monotonic() + STOPPED_WITHIN
+        stood = [line.wait(max(0.0, end - time.monotonic())) for line in self.lines]
+        return all(stood)

@@ -1,0 +1,24 @@
+"""Steps without which a stop must go on, whatever goes wrong in them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from tui.bus.errors import LineClosed
+
+log = logging.getLogger(__name__)
+
+
+def carried_on(step: Callable[[], object]) -> None:
+    """Do a step on the way of a stop; an internal error in it is logged. Raises LineClosed."""
+    try:
+        step()
+    except LineClosed:
+        raise
+    except Exception:
+        # the log may be what has failed
+        try:
+            log.exception("an internal error on the way of a stop")
+        except Exception:
+            return

@@ -1,0 +1,67 @@
+"""The last known state of a drive, by which it is stopped before anything is read."""
+
+from __future__ import annotations
+
+from tui.drive.channel import command_channel
+from tui.drive.orders import OrderRefused, chart_in_force, choose, nearest_stop, stop_in_any
+from tui.drive.profile.schema import Chart, Order, OrderId
+
+from ..drive import DriveSession
+
+SEEN_RUNNING = 10.0
+"""Seconds for which a motor that was seen to run counts as running: drives are looked at every 3
+to 5 s, and what decides between charts can be changed at rest only."""
+ENABLED = frozenset({"running", "stopping"})
+
+
+def last_known_stop(session: DriveSession, order: OrderId) -> tuple[Chart, Order]:
+    """The words that stop a drive by what was seen of it last. Raises OrderRefused.
+
+    Those of its chart if its motor was just seen to run: a word that ramps a motor down in one
+    chart may start one at rest in another. Otherwise those that stop it in any chart.
+    """
+    profile = session.profile
+    if session.state(SEEN_RUNNING).motion in ENABLED:
+        raws = session.image.trusted
+        if (chart := chart_in_force(profile, raws)) is not None:
+            try:
+                return chart, choose(chart, nearest_stop(chart, order), raws)
+            except OrderRefused:
+                pass
+    if len(profile.data.charts) == 1:
+        # no other chart can be in force: nothing has to be known for a word without conditions
+        chart = profile.data.charts[0]
+        try:
+            return chart, choose(chart, nearest_stop(chart, order), {})
+        except OrderRefused:
+            pass
+    return stop_in_any(profile, {})
+
+
+def is_likely_to_run(session: DriveSession) -> bool:
+    """True if the motor was seen to run just now, or was commanded from here."""
+    return session.commanded or session.state(SEEN_RUNNING).motion in ENABLED
+
+
+def run_by_others(session: DriveSession) -> str:
+    """The source that runs the motor if the line does not, and where to stop it; else empty.
+
+    By what was seen last. A drive that obeys its terminals may still obey a stop over the line.
+    """
+    state = session.state(SEEN_RUNNING)
+    if state.motion not in ENABLED:
+        return ""
+    found = command_channel(session.profile, session.image.trusted)
+    if found is not None and found.by_line is False and found.text:
+        code = f" ({found.parameter.code})" if found.parameter is not None else ""
+        who = f"{_small(found.text)}{code}"
+    elif state.local:
+        who = "its terminals or keypad"
+    else:
+        return ""
+    return f"run by {who}, not by Modbus. Stop it there or at the machine."
+
+
+def _small(name: str) -> str:
+    """A name within a sentence: acronyms keep their capitals."""
+    return f"its {name[0].lower()}{name[1:]}" if name[1:2].islower() else name

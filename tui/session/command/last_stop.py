@@ -1,0 +1,124 @@
+"""The last stop of a drive: its prepared frames, after an internal error on its usual way.
+
+Whatever is called here is called with as little between it and the line as possible, and an error
+in anything beside the frame is logged and passed over.
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import partial
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineError, LineFailed, LineLost
+from tui.bus.link import label
+from tui.bus.requests import WriteOne
+from tui.drive.errors import DriveError
+
+from ..carry_on import carried_on
+from ..drive import DriveSession
+from ..journal import Entry, Journal, now_text
+from ..settings.write import Writer
+from .motor_stop import MotorStop, TellStop
+from .stop_report import AT_THE_MACHINE, NOT_STOPPED, Phase, not_stopped
+
+log = logging.getLogger(__name__)
+
+PREPARED_SENT = "stop sent by its prepared frames after an internal error; see the log"
+SENT_THOUGH_LOST = "stop sent on a connection of its own, as the line was lost"
+NOT_FOLLOWED = (
+    f"{NOT_STOPPED}an internal error (see the log). Its stop was sent, but not seen to work."
+    f" {AT_THE_MACHINE}"
+)
+NONE_PREPARED = f"{NOT_STOPPED}an internal error (see the log), and no frame was ready. "
+NOT_SENT = f"{NOT_STOPPED}an internal error (see the log), and its prepared frame was not sent: "
+
+
+def end_work(session: DriveSession, by: str) -> None:
+    """End the work on a drive and its arming; its count of stops rises in any case."""
+    before = session.work.stops
+    carried_on(lambda: session.work.stop(by))
+    if session.work.stops == before:
+        session.work.stops += 1
+    carried_on(lambda: session.starts.withdraw(session) if session.starts is not None else None)
+
+
+class LastStop:
+    """Sends prepared frames and follows the motor; `send` may be called from any thread.
+
+    Also when the line is lost: perhaps it lets one frame through that is sent on its own.
+    """
+
+    def __init__(self, line: ModbusLine, journal: Journal, say: TellStop) -> None:
+        self._line = line
+        self._journal = journal
+        self._say = say
+
+    def send(
+        self, session: DriveSession, ordered: float, error: Exception, *, taken: bool = False
+    ) -> None:
+        """Stop a drive after an internal error; `taken` if it has answered its stop word before.
+
+        Then it is not sent another: a motor on its ramp would coast by a word for every chart.
+        """
+        lost = isinstance(error, LineLost) and not isinstance(error, LineFailed)
+        if taken:
+            text = not_stopped(str(error)) if lost else NOT_FOLLOWED
+            self._say(session, Phase.FAILED, text, ordered)
+        elif not session.prepared:
+            text = not_stopped(str(error)) if lost else f"{NONE_PREPARED}{AT_THE_MACHINE}"
+            self._say(session, Phase.FAILED, text, ordered)
+        else:
+            ended = partial(self._ended, session, ordered, str(error) if lost else "")
+            try:
+                self._line.send_prepared(session.prepared, ended)
+            except Exception as failure:
+                ended(str(failure) or type(failure).__name__)
+        if lost:
+            return
+        # last: it may be what has failed
+        carried_on(partial(log.error, "stop of device %s", session.device, exc_info=error))
+
+    def _ended(self, session: DriveSession, ordered: float, lost: str, why: str) -> None:
+        """The frames were sent, or `why` not, on a line that was perhaps `lost` before."""
+        if why:
+            text = not_stopped(lost) if lost else f"{NOT_SENT}{why.rstrip('.')}. {AT_THE_MACHINE}"
+            self._say(session, Phase.FAILED, text, ordered)
+            return
+        text = SENT_THOUGH_LOST if lost else PREPARED_SENT
+        self._say(session, Phase.STOPPING, text, ordered)
+        carried_on(partial(self._record, session, text))
+        try:
+            self._line.spawn(partial(self._follow, session, ordered), f"stopped {session.device}")
+        except Exception as error:
+            self.send(session, ordered, error, taken=True)
+
+    def _record(self, session: DriveSession, why: str) -> None:
+        session.told_by_line = True
+        for write in session.prepared:
+            if not isinstance(write.request, WriteOne):
+                continue
+            address, word = write.request.address, write.request.value
+            parameter = session.profile.at(address)
+            code = parameter.code if parameter is not None else str(address)
+            if parameter is not None:
+                session.image.doubt(code)
+            self._journal.add(
+                Entry(
+                    now_text(), label(session.line.link), session.device, session.profile.id, code,
+                    address, None, "", word, f"16#{word:04X}", "not known", None, why,
+                )
+            )  # fmt: skip
+
+    async def _follow(self, session: DriveSession, ordered: float) -> None:
+        """See the motor stop; whatever goes wrong, it counts as not stopped."""
+        try:
+            writer = Writer(session, self._journal, None)
+            why = await MotorStop(session, writer, "stop", ordered, self._say).follow()
+        except (LineError, DriveError) as error:
+            why = str(error)
+        except Exception as error:
+            self.send(session, ordered, error, taken=True)
+            return
+        if why is not None:
+            self._say(session, Phase.FAILED, not_stopped(why), ordered)

@@ -1,0 +1,74 @@
+"""Stops that were begun, and a look from outside whether the first frame of each is sent."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from tui.bus.api import LineStatus, LineWorker
+from tui.bus.model import Timing
+from tui.drive.profile.schema import OrderId
+
+from ..drive import DriveSession
+from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
+
+FIRST_FRAME_EACH = 0.3
+"""Seconds that the first frame of each of several stops may take, on the slowest line."""
+SLOWEST_READS = 6
+"""Timeouts that may pass until a drive that answers nothing is sent its word blind."""
+
+SendLast = Callable[[DriveSession, float, Exception], None]
+
+
+@dataclass(frozen=True, slots=True)
+class UnderWay:
+    """A stop that was begun."""
+
+    stop: MotorStop
+    worker: LineWorker
+    times: int
+    """How often the drive had been armed then."""
+
+    def is_lost(self, begins_late: bool, is_late: bool) -> bool:
+        """True if it ended, or did not begin or get on in time, without having been sent."""
+        stop = self.stop
+        if stop.sent or stop.over:
+            return False
+        connected = stop.session.line.state.status is LineStatus.CONNECTED
+        return self.worker.done() or is_late or (begins_late and connected and not stop.begun)
+
+    def goes_out(self, session: DriveSession, order: OrderId) -> bool:
+        """Whether it does all that another stop of the drive would do now.
+
+        Its words are on their way still, and nothing was written since: that needs arming.
+        """
+        same = self.stop.session is session and self.stop.wanted == order
+        waits = not self.worker.done() and not self.stop.sent
+        return same and waits and self.times == session.arming.times
+
+
+def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: SendLast) -> None:
+    """See in a thread of its own that the first frame of each stop is sent.
+
+    An error outside of the stop itself, in the line's loop, ends it without a word.
+    """
+    if not begun:
+        return
+    longest = timing.first_timeout
+    begin_by = time.monotonic() + longest
+    send_by = begin_by + SLOWEST_READS * longest + FIRST_FRAME_EACH * len(begun)
+
+    def watch() -> None:
+        left = list(begun)
+        while left:
+            time.sleep(STANDSTILL_POLL_INTERVAL)
+            now = time.monotonic()
+            for one in [each for each in left if each.is_lost(now > begin_by, now > send_by)]:
+                error = TimeoutError("its frame was not sent in time")
+                send_last(one.stop.session, one.stop.ordered, error)
+                left.remove(one)
+            left = [one for one in left if not (one.stop.sent or one.stop.over)]
+
+    threading.Thread(target=watch, name="stops sent", daemon=True).start()
