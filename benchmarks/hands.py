@@ -55,6 +55,8 @@ MIXED = (1, 1, 1, 2, 5, 20, 100)
 """Sizes of pieces of keys."""
 QUIET = 0.15
 """Seconds after a piece in which whatever it does has been sent."""
+LATE = 3.0
+"""Seconds for a stop that is not there by then."""
 AWAY = 0.12
 """Longest pause inside a piece that a link cuts, in s."""
 STOP_WORDS = {7, 2, 0, 0x010F}
@@ -182,11 +184,14 @@ def bursts(
         before = len(panel.log.writes)
         send(stopping, chance, [*before_keys, stop])
         settle(panel, beside=beside)
+        text = stop == b" " and not TEXTS.isdisjoint(before_keys)
+        if not text and not any(map(is_stop, panel.log.writes[before:])):
+            settle(panel, LATE, beside=beside)  # a busy machine is no lost stop
         sent = panel.log.writes[before:]
         counted.pieces += 1
         counted.keys += len(before_keys) + 1
         at = next((i for i, write in enumerate(sent) if is_stop(write)), None)
-        typed = at is None and stop == b" " and not TEXTS.isdisjoint(before_keys)
+        typed = at is None and text
         counted.typed += typed
         counted.stopless += at is None and not typed
         counted.stops += sum(map(is_stop, sent))
