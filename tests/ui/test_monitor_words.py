@@ -134,12 +134,49 @@ def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
             assert told in " ".join(" ".join(lines).split())
 
 
-def test_a_word_says_what_is_1_and_nothing_of_what_is_so_while_all_is_well() -> None:
-    view = view_of(ATV71, {**fakes.RUNNING, "ETA": 0x0437})
+def test_a_word_says_nothing_of_what_is_so_while_all_is_well() -> None:
+    view = view_of(ATV71, {**fakes.RUNNING, "ETA": 0x0637})
     line = word_line(view, ATV71["ETA"], 79).plain
-    assert line.split("16#0437")[1].strip() == (
+    assert line.split("16#0637")[1].strip() == (
         "ready · switched on · enabled · power · at reference"
     )
+
+
+@pytest.mark.parametrize(
+    ("family", "code", "raw", "words"),
+    [
+        ("atv71", "ETA", 0x0217, "ready · switched on · enabled · power · quick stop active"),
+        ("atv71", "ETA", 0x0227, "ready · switched on · enabled · no power"),
+        ("atv71", "ETA", 0x0037, "ready · switched on · enabled · power · local"),
+        ("atv71", "ETA", 0x0250, "power · switch on disabled"),
+        ("atv312", "ETA", 0x0021, "ready · forced local"),
+        (
+            "atv312",
+            "ETA",
+            0x0207,
+            "ready · switched on · enabled · quick stop active · no forced local",
+        ),
+        ("atv21", "FD01", 0x4000, "stop · standby"),
+        ("powerdrive", "10.40", 0x0000, "not ready"),
+    ],
+)
+def test_word_line_lists_what_is_true_at_0_too(
+    family: str, code: str, raw: int, words: str
+) -> None:
+    profile = library.load(family)
+    line = word_line(view_of(profile, {code: raw}), profile[code], 100).plain
+    assert line.split(f"16#{raw:04X}")[1].strip() == words
+
+
+@pytest.mark.parametrize("family", PROFILES)
+def test_word_line_lists_nothing_that_the_grid_does_not_light(family: str) -> None:
+    profile = library.load(family)
+    for word in (one for one in profile.data.parameters if one.bits):
+        for raw in (0x0000, 0x0027, 0x0207, 0xFFFF):
+            view = view_of(profile, {word.code: raw})
+            listed = word_line(view, word, 2000).plain.count(" · ")
+            lit = sum("●" in _bit_line(bit, raw, 60).plain for bit in word.bits)
+            assert listed <= lit, (word.code, raw)
 
 
 def test_a_bit_in_columns_says_of_what_it_tells() -> None:

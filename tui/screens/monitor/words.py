@@ -1,8 +1,8 @@
-"""Words with named bits: in a line what is 1, and whole; pure functions of a view."""
+"""Words with named bits: in a line what is true, and whole; pure functions of a view."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -28,8 +28,30 @@ SHORT_NAMES: Mapping[str, str] = {
     "remote": "",
     "direction of the output": "reverse",
     "limit of the reference": "outside its limits",
+    # at 0
+    "power section supplied: no supply": "no power",
+    "remote: local": "local",
+    "drive ready: not ready": "not ready",
+    "unlock the drive: locked": "locked",
+    "run: stop": "stop",
+    "direction: forward": "",
+    "direction of the output: forward": "",
+    "direction of the reference: forward": "",
+    "direction before the ramp: forward": "",
+    "limit of the reference: within lsp..hsp": "",
+    "reference limit: within lsp..hsp": "",
+    "writes not allowed: allowed": "",
+    "transient state: steady": "",
+    "motor thermal threshold: below": "",
+    "motor 1": "",
+    "pid controller: enabled": "",
+    "ramp 1 (acc, dec)": "",
+    "coast stop: output allowed": "",
+    "standby: starting up": "",
+    "standby with run order: starting up": "",
+    "control: remote": "",
 }
-"""What is short for the words of a bit that is 1; nothing for what is so while all is well."""
+"""Short forms of what bits say; nothing for what is so while all is well."""
 CODE_CELLS, RAW_CELLS = 6, 9
 BIT_CELLS = 26
 """Least cells of a bit where bits stand in columns."""
@@ -63,22 +85,29 @@ def shown_words(view_words: Sequence[Parameter]) -> list[Parameter]:
 
 
 def word_line(view: View, parameter: Parameter, width: int) -> Text:
-    """A word and the names of its bits that are 1, as many as there is room for."""
+    """A word and what its bits say that is true, as much as there is room for."""
     raw, shown = _raw(view, parameter)
     mark = "" if is_verified(parameter) else " ?"
     text = Text(f"  {cut(parameter.code + mark, CODE_CELLS)}", FAINT, no_wrap=True)
     text.append(f"{shown:<{RAW_CELLS}}", FAINT)
-    ones = [bit for bit in parameter.bits if raw is not None and raw >> bit.bit & 1]
-    told = [(name, bit) for bit in ones if (name := short_bit(bit))]
-    for at, (name, bit) in enumerate(told):
+    told = [] if raw is None else list(_true_words(parameter, raw))
+    for at, (name, alarm) in enumerate(told):
         link = " · " if at else " "
         more = len(told) - at
         if text.cell_len + len(link) + len(name) + (5 if more > 1 else 0) > width:
             text.append(f" … {more}", FAINT)
             break
         text.append(link, FAINT)
-        text.append(name, ALARM if bit.alarm else PLAIN)
+        text.append(name, ALARM if alarm else PLAIN)
     return text
+
+
+def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
+    """What the bits say that is true, in short, and whether it is an alarm."""
+    for bit in parameter.bits:
+        on = bool(raw >> bit.bit & 1)
+        if _counts(bit, raw) and _holds(bit, on) and (words := short_bit(bit, on=on)):
+            yield words, on and bit.alarm
 
 
 def alarm_line(view: View, width: int, *, tab: bool) -> Text:
@@ -105,10 +134,10 @@ def _alarms(view: View) -> tuple[str, Style]:
     return ("none" if tells else "not told by this drive"), FAINT
 
 
-def short_bit(bit: Bit) -> str:
-    """What a bit that is 1 says, in a word or two; empty where that is so while all is well."""
-    said = bit.name if bit.on.casefold() in GENERIC else _bit_words(bit, True, 60)
-    for words in (said.casefold(), bit.name.casefold()):
+def short_bit(bit: Bit, *, on: bool) -> str:
+    """What a bit says, in a word or two; empty where that is so while all is well."""
+    said = bit.name if on and bit.on.casefold() in GENERIC else _bit_words(bit, on, 60)
+    for words in (said.casefold(), *([bit.name.casefold()] if on else [])):
         if words in SHORT_NAMES:
             return SHORT_NAMES[words]
     first, rest = said[:1], said[1:]
@@ -171,8 +200,7 @@ def _heading(view: View, page: WordPage, width: int) -> Text:
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
     """A bit in exactly so many cells; whoever takes it copies it before changing it."""
-    counts = bit.counts
-    if raw is not None and counts is not None and raw & counts.mask != counts.value:
+    if raw is not None and not _counts(bit, raw):
         return _dim_bit(bit, width)
     return _drawn_bit(bit, None if raw is None else bool(raw >> bit.bit & 1), width)
 
@@ -195,6 +223,11 @@ def _drawn_bit(bit: Bit, on: bool | None, width: int) -> Text:
     alarm = on and bit.alarm
     text.append("●" if true else "·", ALARM if alarm else STRONG if true else FAINT)
     return text.append(f" {cut(_bit_words(bit, on, room), room)} ", PLAIN if true else FAINT)
+
+
+def _counts(bit: Bit, raw: int) -> bool:
+    """True if the bit means anything in the state that its word shows."""
+    return bit.counts is None or raw & bit.counts.mask == bit.counts.value
 
 
 def _holds(bit: Bit, on: bool) -> bool:
