@@ -255,6 +255,7 @@ async def test_a_paste_goes_into_a_text_and_does_nothing_else(
         assert app.query_one("#text", Input).value == value
         assert app.submitted == []
         assert app.done in ([], ["yes"])
+        assert len(app._notifications) == (focus is None)
 
 
 @pytest.mark.parametrize(

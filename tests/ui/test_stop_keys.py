@@ -20,6 +20,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.hands import NOBODY_TO_STOP
 from tui.session.command.commander import Commander
 from tui.session.fleet import FoundDrive
+from tui.terminal.admission import PASTE_IGNORED
 from tui.terminal.reader import KeyReader
 from tui.terminal.stroke import Stroke, attach
 
@@ -94,7 +95,12 @@ async def test_what_is_known_of_a_key_is_known_while_it_has_its_effect() -> None
         await until(pilot, lambda: app.stroke is None)
 
 
-async def test_a_paste_outside_of_a_text_is_nothing() -> None:
+def shown_text(app: DrivePanelApp) -> str:
+    assert isinstance(app.focused, Input)
+    return app.focused.value
+
+
+async def test_a_paste_outside_of_a_text_is_reported_and_does_nothing() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         await until(pilot, lambda: bool(app.connection.query("#lines")))
@@ -104,6 +110,14 @@ async def test_a_paste_outside_of_a_text_is_nothing() -> None:
         app.post_message(Paste("q \r"))
         await pilot.press("down")
         assert (app.stop_stamp(), app.screen) == before
+        texts = [event.text for event in app.events.events]
+        assert texts.count(PASTE_IGNORED) == 1
+        app.post_message(Paste(""))
+        app.push_screen(Ask("Save to", str))
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        app.post_message(Paste("motor"))
+        await until(pilot, lambda: shown_text(app) == "motor")
+        assert [event.text for event in app.events.events] == texts
 
 
 async def test_space_is_text_again_once_a_key_that_may_leave_has_had_its_effect() -> None:

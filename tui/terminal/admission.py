@@ -25,6 +25,8 @@ LATE: float = 3.0
 """Seconds after which a key does what a key of a piece may: where the terminal took nothing, the
 panel stood still, and nobody expects its keys any more."""
 
+PASTE_IGNORED = "Pasted text ignored: it goes into a text field only."
+
 
 class Stamps(Protocol):
     """What admission needs of the app, besides what every app has."""
@@ -49,7 +51,10 @@ class Admission:
     def admits(self, event: Key | Paste) -> bool:
         """Whether the app may take a key or a paste now, when its turn has come."""
         if isinstance(event, Paste):
-            return takes_text(self._app.focused)
+            is_text = takes_text(self._app.focused)
+            if event.text and not is_text:
+                self._app.notify(PASTE_IGNORED)
+            return is_text
         stroke = stroke_of(event)
         if stroke is None:  # no terminal has sent it: a test, or the app itself
             attach(event, Stroke(time.monotonic(), self._stamps.stop_stamp()))
