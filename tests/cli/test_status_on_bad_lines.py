@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections import Counter
 from typing import Any
 
 import pytest
@@ -12,6 +13,8 @@ import pytest
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Line
 from tui.cli.shared import drive_status
+from tui.session.drive import DriveSession
+from tui.session.timeout_told import Timeout, TimeoutWatch
 
 from .commands import ended, tcp_line
 
@@ -19,12 +22,21 @@ TIMEOUT_WORD = 6005
 """Register of TTO of an Altivar 71."""
 
 
-def lose(monkeypatch: pytest.MonkeyPatch, register: int, seconds: float) -> None:
-    """Let each read of a register end without an answer after so many seconds."""
+def lose(
+    monkeypatch: pytest.MonkeyPatch, register: int, seconds: float, *, answered: int = 0
+) -> None:
+    """Let each read of a register end without an answer after so many seconds.
+
+    All but the first `answered` ones of each line.
+    """
     read = Line.read
+    reads: Counter[int] = Counter()
 
     async def losing(self: Line, device: int, address: int, count: int = 1, **more: Any) -> Any:
         if address <= register < address + count:
+            reads[id(self)] += 1
+            if reads[id(self)] <= answered:
+                return await read(self, device, address, count, **more)
             await asyncio.sleep(seconds)
             raise NoAnswer(device, 3, address)
         return await read(self, device, address, count, **more)
@@ -58,6 +70,34 @@ def test_status_shows_what_is_known_if_a_setting_is_not_read(
     assert watch in text
     assert document["state"]["id"] != "unknown"
     assert document["values"]["output_frequency"]["value"] == 0
+
+
+def test_status_does_not_list_a_timeout_as_unread_that_it_shows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The drive told it as it was identified; every later read of it hangs."""
+    monkeypatch.setattr(drive_status, "STATUS_WITHIN", 2.0)
+    with tcp_line("atv71@1") as line:
+        lose(monkeypatch, TIMEOUT_WORD, 60.0, answered=1)
+        document = json.loads(ended(0, "status", line, "--json").stdout)
+    assert document["timeout"]["seconds"] == document["watch"]["timeout_s"] == 10
+    assert document["unread"] == []
+
+
+def test_status_shows_no_timeout_that_is_learnt_after_its_words_were_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def learnt_meanwhile(session: DriveSession, motion: str) -> None:
+        session.timeout = Timeout(True, TimeoutWatch(10.0, None))
+
+    monkeypatch.setattr(drive_status, "STATUS_WITHIN", 2.0)
+    monkeypatch.setattr(drive_status, "left_behind", learnt_meanwhile)
+    with tcp_line("atv71@1") as line:
+        lose(monkeypatch, TIMEOUT_WORD, 60.0)
+        document = json.loads(ended(3, "status", line, "--json").stdout)
+    assert document["unread"] == ["TTO"]
+    assert document["timeout"]["seconds"] is None
+    assert document["watch"] is None
 
 
 def test_status_reads_within_ten_seconds() -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.reading import Reading
-    from tui.session.timeout_told import TimeoutWatch
+    from tui.session.timeout_told import Timeout, TimeoutWatch
 
 log = logging.getLogger(__name__)
 
@@ -61,6 +61,8 @@ class Status:
     refused: str
     """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
+    timeout: Timeout
+    """Its time-out as it was known when `unread` was settled; it may be learnt later."""
     left: LeftBehind | None = None
     """Its motor, if the program that started it has exited and no program commands it."""
     finding: FaultFinding | None = None
@@ -115,6 +117,7 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     from tui.session.drive_state import drive_state
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
+    from tui.session.monitor.timeout import timeout_now
 
     from ..commands.orders import watch_of
 
@@ -124,13 +127,14 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     rules = profile.data.communication_fault
     end = asyncio.get_running_loop().time() + patience(opened.line, STATUS_WITHIN)
     watch = finding = None
+    is_late = False
     try:
         readings, unread = await read_until(console, _codes(profile), end)
         try:
             async with asyncio.timeout_at(end):
                 watch = await watch_of(fleet, console)
         except (Failure, TimeoutError):
-            unread.append(rules.timeout if rules is not None else "")
+            is_late = True
         state = drive_state(profile, readings)
         try:
             async with asyncio.timeout_at(end + FINDING_WITHIN):
@@ -139,12 +143,17 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
             log.warning("advice on device %s was not read: %s", session.device, error)
     finally:
         fleet.forget()
+    timeout = timeout_now(session)
+    if is_late and timeout.known:  # the drive told it before, or after all
+        watch = timeout.watch
+    elif is_late:
+        unread.append(rules.timeout if rules is not None else "")
     channels = _channels(profile, readings, state)
     switches = switch_texts(profile, session.image.raws)
     refused = _refused(session)
     left = await asyncio.to_thread(left_behind, session, state.motion)
     return Status(
-        session, state, readings, channels, switches, refused, watch, left, finding, unread
+        session, state, readings, channels, switches, refused, watch, timeout, left, finding, unread
     )
 
 
@@ -199,11 +208,13 @@ def _refused(session: DriveSession) -> str:
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
+    from .left_alone import timeout_json
     from .output import drive_json
 
     state, watch = status.state, status.watch
     return {
         **drive_json(line_text, status.session),
+        "timeout": timeout_json(status.timeout),
         "state": {"id": state.id, "name": state.name, "kind": state.kind},
         "direction": state.direction,
         "fault": fault_json(state, status.finding),
@@ -264,10 +275,10 @@ def status_table(status: Status) -> list[tuple[str, str]]:
 
 
 def _time_out_text(status: Status) -> str:
-    told, rules = status.session.timeout, status.session.profile.data.communication_fault
+    rules = status.session.profile.data.communication_fault
     if rules is not None and rules.timeout in status.unread:
         return f"not known: {rules.timeout} was not read"
-    if told is not None and not told.known:
+    if not status.timeout.known:
         return "not told by this drive: it may act when nobody asks it"
     return watch_text(status.watch)
 
