@@ -292,6 +292,34 @@ async def test_reset_without_a_fault_says_so() -> None:
         assert writes(made.app) == []
 
 
+@pytest.mark.parametrize(
+    ("family", "sets"),
+    [("atv31", {"CHCF": 2, "Cd1": 1}), ("powerdrive", {"6.43": 0}), ("atv71", {})],
+)
+async def test_failed_reset_is_whole_on_faults_and_messages_at_80x24(
+    family: str, sets: dict[str, int]
+) -> None:
+    async with bench(family, sets=sets) as made:
+        faults = made.drive().profile.data.faults.codes
+        made.drive().provoke(next((f.raw for f in faults if f.raw), 1), persists=True)
+        await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+        await made.armed()
+        await made.pilot.press("5")
+        await until(made.pilot, lambda: isinstance(made.app.screen, FaultsScreen))
+        await made.answer("x", "y")
+        await until(made.pilot, lambda: bool(failed_reset(made.app)))
+        text = failed_reset(made.app)
+        await until(made.pilot, lambda: text in " ".join(shown(made.app, "said").split()))
+        await made.pilot.press("m")
+        await until(made.pilot, lambda: isinstance(made.app.screen, MessagesScreen))
+        await until(made.pilot, lambda: text in " ".join(shown(made.app, "list").split()))
+
+
+def failed_reset(app: DrivePanelApp) -> str:
+    """What was said of a reset after which the drive was still in fault."""
+    return next((one.text for one in app.events.events if "still in fault" in one.text), "")
+
+
 def follows(app: DrivePanelApp) -> str:
     found = app.screen.query("#follows")
     return " ".join(str(found.first().render()).split()) if found else ""

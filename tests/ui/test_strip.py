@@ -7,8 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
+from tests.drive.test_fault_reset import BY_TERMINALS
+from tui.drive.fault_reset import not_in_command
+from tui.drive.profile import library
 from tui.screens.frame import TABS, said_lines
 from tui.screens.keys.table import MONITOR, PLACES
+from tui.session.command.carry_out import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
 from tui.widgets.strip import DriveNow, Said, StripView, strip_line, tabs_line
@@ -126,14 +130,25 @@ def test_a_mark_moves_no_tab() -> None:
     assert bare.index("4 Scanner") == marked.index("4 Scanner")
 
 
-def test_a_message_that_warns_is_whole_at_first_and_one_line_later() -> None:
+@pytest.mark.parametrize("kind", ["refused", "done"])
+def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
     text = "Not sent: 80.0 Hz is above the high speed HSP, 60.0 Hz. Raise HSP on Parameters first."
-    new = said_lines(Said("14:02:11", text, "refused", 1.0), 80)
-    later = said_lines(Said("14:02:11", text, "refused", 60.0), 80)
+    new = said_lines(Said("14:02:11", text, kind, 1.0), 80)
+    later = said_lines(Said("14:02:11", text, kind, 60.0), 80)
     assert " ".join(" ".join(line.plain for line in new).split()).endswith(text)
     assert len(later) == 1
     assert "…" in later[0].plain
     assert "m messages" in later[0].plain
+
+
+@pytest.mark.parametrize("width", [60, 80])
+@pytest.mark.parametrize("family", BY_TERMINALS)
+def test_failed_reset_is_shown_whole(family: str, width: int) -> None:
+    for why in (not_in_command(library.load(family), BY_TERMINALS[family]), STILL_IN_FAULT):
+        text = f"Fault reset: {why}"
+        lines = said_lines(Said("14:02:11", text, "done", 1.0), width)
+        assert text in " ".join(" ".join(line.plain for line in lines).split())
+        assert all(line.cell_len <= width for line in lines)
 
 
 @given(st.text(max_size=200), st.integers(1, 120))

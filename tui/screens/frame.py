@@ -61,11 +61,11 @@ SAID_STYLES: dict[str, Style] = {
 }
 SELDOM = 2.0
 """Seconds between two looks on a slow link; state, stop and fault are shown at once."""
-WARNS = frozenset({"fault", "failed", "error", "refused", "alarm", "told"})
+WHOLE_KINDS = frozenset({"fault", "failed", "error", "refused", "alarm", "told", "done"})
 """Kinds of a message that is shown whole for a while, on more lines where it takes them."""
 WHOLE_FOR = 15.0
-"""Seconds for which a message that warns takes more lines than its own."""
-WHOLE_LINES = 3
+"""Seconds for which such a message takes more lines than its own."""
+WHOLE_LINES = 6
 NOT_STOPPED_LINES = 6
 """Rows of the motors that a stop does not stop; more are named in one sentence."""
 NOT_STOPPED_MANY = "NOT STOPPED: {} drives. Stop them at the machine. Press m for the reasons."
@@ -204,7 +204,7 @@ def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
 
 
 def said_lines(said: Said | None, width: int, *, lead: bool = True) -> list[Text]:
-    """The message; one that warns and is new has as many lines as it takes, up to three.
+    """The message; one that is new has as many lines as it takes, up to `WHOLE_LINES`.
 
     `lead` says whether the keys that show more lead there now.
     """
@@ -212,7 +212,7 @@ def said_lines(said: Said | None, width: int, *, lead: bool = True) -> list[Text
         return [Text("")]
     style = SAID_STYLES.get(said.kind, FAINT)
     room = width - 12
-    if said.kind in WARNS and said.age < WHOLE_FOR and len(plain(said.text)) > room - 12:
+    if said.kind in WHOLE_KINDS and said.age < WHOLE_FOR and len(plain(said.text)) > room - 12:
         parts = wrapped(said.text, max(10, room), WHOLE_LINES)
         lines = []
         for number, part in enumerate(parts):
