@@ -96,6 +96,10 @@ REFUSED = {
     "run, scale not known": Refused(
         MIXER, (*RUN, "--reference", "20Hz"), "its scale follows MODE", sets={"MODE": 9}
     ),
+    "run, another scale": Refused("atv71", RUN, "Bit 9 of CMI is set", sets={"CMI": 0x0200}),
+    "reference, another scale": Refused(
+        "atv312", ("reference", "20Hz", "--arm"), "Bit 9 of CMI is set", sets={"CMI": 0x0200}
+    ),
     "reference, not armed": Refused("atv71", ("reference", "20Hz"), "Not armed"),
     "reference above a limit": Refused(
         "atv71", ("reference", "90Hz", "--arm"), "above HSP", sets={"HSP": 500}

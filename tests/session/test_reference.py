@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from decimal import Decimal
 
 import pytest
@@ -75,6 +76,51 @@ async def test_start_is_refused_if_the_scale_changes_behind_the_write() -> None:
         text = await made.done(OutcomeKind.REFUSED)
         assert "REF holds 2.00 Hz, 20 Hz was requested" in text
         assert made.writes() == [(REFERENCE, 200)]
+
+
+HIGH_RESOLUTION = 0x0200
+"""Bit 9 of CMI, with which an Altivar counts references in another scale."""
+
+
+@pytest.mark.parametrize("family", ["atv31", "atv312", "atv71"])
+async def test_start_and_reference_are_refused_while_another_master_has_changed_the_scale(
+    family: str,
+) -> None:
+    async with bench(family, sets={"CMI": HIGH_RESOLUTION}) as made:
+        commander = made.commander
+        commands: list[Callable[[], None]] = [
+            lambda: commander.refer("20Hz"),
+            lambda: commander.step(Decimal(5)),
+            lambda: commander.order("forward"),
+            lambda: commander.run("forward", "20Hz"),
+            lambda: commander.check_run("forward"),
+        ]
+        for give in commands:
+            give()
+            text = await made.done(OutcomeKind.REFUSED)
+            assert text.startswith("Bit 9 of CMI is set:"), text
+            assert text.endswith("Have the program that set it clear it.")
+        assert made.writes() == []
+        assert made.drive.motor.frequency == 0
+        made.drive.set("CMI", 0x0010)
+        commander.run("forward", "20Hz")
+        await made.done()
+
+
+@pytest.mark.parametrize("family", ["atv31", "atv71"])
+async def test_stop_is_sent_in_any_scale_of_the_references(family: str) -> None:
+    async with bench(family) as made:
+        made.commander.run("forward", "20Hz")
+        await made.done()
+        made.drive.set("CMI", HIGH_RESOLUTION)
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+
+
+async def test_start_of_a_drive_without_the_word_of_the_scale_is_not_refused() -> None:
+    async with bench("atv71", protects=frozenset({"CMI"})) as made:
+        made.commander.run("forward", "20Hz")
+        await made.done()
 
 
 @pytest.mark.parametrize(

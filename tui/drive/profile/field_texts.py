@@ -80,6 +80,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "channel": "The bits that tell who commands.",
     },
     "CommandExample": {"word": "The whole command word.", "does": "What it does."},
+    "ScaleWhen": {"values": "Raw values of the parameter with which the condition holds."},
     "ReferenceWay": {
         "kind": "Whether the word is a frequency or a speed.",
         "signed": "True where a negative reference turns the motor in reverse.",

@@ -13,7 +13,7 @@ from tui.drive.profile.schema import CommandOption, Order, OrderId
 from tui.drive.values import from_words
 
 from .access import CommandAccess
-from .motor_start import MotorStart, without_effect, write_reference
+from .motor_start import MotorStart, check_scale, without_effect, write_reference
 from .reference import (
     Reference,
     parse_reference,
@@ -78,6 +78,7 @@ async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -
         raise OrderRefused(told_anywhere(held))
     if refusal := state_refusal(profile, then, id, raws):
         raise OrderRefused(refusal)
+    await check_scale(access)
     if reference is not None:
         await _typed_reference(access, reference)
     return "Nothing speaks against the run."

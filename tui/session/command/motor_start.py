@@ -13,7 +13,7 @@ from tui.drive.profile.schema import Chart, Order, OrderId, Parameter
 from ..drive import DriveSession
 from ..starts.keeper import record_start
 from .access import STATE_POLL_INTERVAL, CommandAccess, NotFollowed
-from .reference import Reference, read_back_differs, reference_codes
+from .reference import Reference, other_scale, read_back_differs, reference_codes, scale_codes
 
 LOOKS = 10
 """Looks within which the direction of a start must be the ordered one."""
@@ -37,6 +37,17 @@ async def write_reference(
     text += without_effect(access)
     access.given.note_reference(reference, text)
     return text
+
+
+async def check_scale(access: CommandAccess) -> None:
+    """Raise OrderRefused if references surely count in another scale than the profile's."""
+    profile = access.session.profile
+    if not (codes := scale_codes(profile)):
+        return
+    readings = await access.read(codes)
+    raws = {code: one.raw for code, one in readings.items() if one.raw is not None}
+    if refusal := other_scale(profile, raws):
+        raise OrderRefused(refusal)
 
 
 def without_effect(access: CommandAccess) -> str:
@@ -73,6 +84,7 @@ class MotorStart:
         if refusal := state_refusal(self.session.profile, chart, id, access.raws):
             raise OrderRefused(refusal)
         at_rest = state.kind not in ENABLED_KINDS
+        await check_scale(access)
         await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
         try:
             await self._give_reference(reference)

@@ -13,7 +13,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 
 from tui.drive.errors import UnitRefused, ValueRefused
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.profile.schema import Parameter, Quantity, ScaleWhen
 from tui.drive.shown import depends_on, number_of, raw_of_text
 from tui.drive.taught_profile import reference_of
 from tui.drive.units import factor_between, spelled
@@ -70,11 +70,29 @@ def reference_codes(profile: Profile) -> list[str]:
     wanted: tuple[Quantity, ...] = (*LIMITS, *MOTOR_DATA, *REFERENCES)
     found = (profile.quantity(quantity) for quantity in wanted)
     codes = [parameter.code for parameter in found if parameter is not None]
+    codes += scale_codes(profile)
     for parameter in reference_parameters(profile):
         codes += [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]
         limit = taught_limit(profile, parameter.code)
         codes += [limit.code] if limit is not None else []
     return list(dict.fromkeys(codes))
+
+
+def _scale_conditions(profile: Profile) -> list[ScaleWhen]:
+    return [way.scale_when for way in profile.data.references if way.scale_when is not None]
+
+
+def scale_codes(profile: Profile) -> list[str]:
+    """Codes of the words on which it depends in which scale references count."""
+    return list(dict.fromkeys(when.parameter for when in _scale_conditions(profile)))
+
+
+def other_scale(profile: Profile, raws: Mapping[str, int]) -> str:
+    """Why references surely count in another scale now, with what to do; empty if they do not."""
+    for when in _scale_conditions(profile):
+        if when.holds(raws) is False:
+            return when.otherwise
+    return ""
 
 
 def taught_limit(profile: Profile, code: str) -> Parameter | None:
@@ -123,7 +141,7 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Readin
 
     Another unit is converted by what the drive holds: pairs of poles, what 100 % is. Raises
     UnitRefused where nothing leads from one to the other, ValueRefused for what is no reference,
-    has no place on this drive, or follows a scale that was not read.
+    has no place on this drive, or follows a scale that was not read or is another one now.
     """
     match = _TYPED.fullmatch(text.strip())
     if match is None:
@@ -136,6 +154,8 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Readin
         raise ValueRefused("A reference is not negative; run reverse instead.")
     parameter, number = _placed(known, text, typed, unit)
     raws, absent = known.raws, known.absent
+    if refusal := other_scale(profile, raws):
+        raise ValueRefused(refusal)
     conversion = raw_of_text(profile, parameter, f"{number:f}", raws, absent)
     held = number_of(profile, parameter, conversion.raw, raws, absent)
     scale = profile.scale(parameter, raws, absent)

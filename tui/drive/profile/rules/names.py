@@ -45,12 +45,7 @@ def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:
     for index, chart in enumerate(data.charts):
         for path, code in _of_chart(chart):
             yield ("charts", index, *path), code
-    for index, reference in enumerate(data.references):
-        yield ("references", index, "parameter"), reference.parameter
-        yield ("references", index, "feedback"), reference.feedback
-    for index, one in enumerate(data.teachable_references):
-        yield ("teachable_references", index, "parameter"), one.parameter
-        yield ("teachable_references", index, "most"), one.most
+    yield from _reference_places(data)
     for index, group in enumerate(data.groups):
         yield ("groups", index, "needs_factory"), group.needs_factory
     yield from _of_channels(data)
@@ -86,6 +81,17 @@ def _of_chart(chart: Chart) -> Iterator[NamedPlace]:
                 yield (key, place, "when"), when.parameter
             for code in getattr(row, "clears", ()):
                 yield (key, place, "clears"), code
+
+
+def _reference_places(data: ProfileData) -> Iterator[NamedPlace]:
+    for index, reference in enumerate(data.references):
+        yield ("references", index, "parameter"), reference.parameter
+        yield ("references", index, "feedback"), reference.feedback
+        if reference.scale_when is not None:
+            yield ("references", index, "scale_when"), reference.scale_when.parameter
+    for index, one in enumerate(data.teachable_references):
+        yield ("teachable_references", index, "parameter"), one.parameter
+        yield ("teachable_references", index, "most"), one.most
 
 
 def _of_channels(data: ProfileData) -> Iterator[NamedPlace]:

@@ -174,6 +174,13 @@ class CommandExample(Table, frozen=True, kw_only=True):
     confidence: Confidence = "manual"
 
 
+class ScaleWhen(When, frozen=True, kw_only=True):
+    """A condition on another word, without which references count in another scale."""
+
+    otherwise: str
+    """What is wrong if it does not hold, and what to do, as sentences."""
+
+
 class ReferenceWay(Table, frozen=True, kw_only=True):
     """A way to give the drive its frequency or speed."""
 
@@ -181,6 +188,8 @@ class ReferenceWay(Table, frozen=True, kw_only=True):
     kind: Literal["frequency", "speed"]
     signed: bool = False
     feedback: str = ""
+    scale_when: ScaleWhen | None = None
+    """With which raw value of another word it has the scale of this profile."""
     note: str = ""
 
 
