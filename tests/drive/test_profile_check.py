@@ -28,6 +28,29 @@ source = "guide 4.3"
 confidence = "manual"
 """
 WRITTEN_PAIR = PAIR.replace('"r"', '"rw"')
+HALT = PAIR.replace("PAIR", "HALT").replace('"uint32"', '"uint16"')
+INPUTS = """
+[[functions]]
+code = 4
+name = "Read input registers"
+"""
+BOTH = """
+[[functions]]
+code = 23
+name = "Read and write"
+max_read = 125
+max_write = 122
+"""
+BLOCK = """
+[[blocks]]
+id = "block"
+name = "Block"
+direction = "read"
+address = 400
+slots = ["MODE"]
+selects_by = "address"
+max_words = {}
+"""
 SOURCE = """
 [[control_sources]]
 id = "line"
@@ -70,6 +93,110 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         [("address = 300\n", "address = 300\nmask = 0x00FF\n")],
         "CTRL is a part of a register",
         'command = "CTRL"',
+    ),
+    "a command word that cannot be written": (
+        [('access = "rw"\ngroup = "Command"', 'access = "r"\ngroup = "Command"')],
+        "CTRL has access r. A command word must be writable",
+        'command = "CTRL"',
+    ),
+    "a command word in an input register": (
+        [
+            ("[[functions]]\ncode = 6", f"{INPUTS}\n[[functions]]\ncode = 6"),
+            ('access = "rw"\ngroup = "Command"', 'access = "r"\nfunction = 4\ngroup = "Command"'),
+        ],
+        "CTRL has access r. A command word must be writable",
+        'command = "CTRL"',
+    ),
+    "a stop word in another register that cannot be written": (
+        [
+            ('"Stop", words = [0] }', '"Stop", words = [0], parameter = "HALT" }'),
+            ("\n[[enumerations]]", f"{HALT}\n[[enumerations]]"),
+        ],
+        "HALT has access r. A command word must be writable",
+        '  { id = "stop"',
+    ),
+    "a stop word that is locked while the motor runs": (
+        [('access = "rw"\ngroup = "Command"', 'access = "rw-stopped"\ngroup = "Command"')],
+        "order stop: CTRL can be written only at rest (access rw-stopped)",
+        '  { id = "stop"',
+    ),
+    "a status word that cannot be read": (
+        [
+            (
+                'access = "r"\ngroup = "Monitoring"\nquantity = "status_word"',
+                'access = "w"\ngroup = "Monitoring"\nquantity = "status_word"',
+            )
+        ],
+        "STAT has access w. A status word must be readable",
+        'status = "STAT"',
+    ),
+    "a read that no request holds": (
+        [("max_read = 16", "max_read = 126")],
+        "allowed is 1 to 125",
+        "max_read = 126",
+    ),
+    "a read of nothing": (
+        [("max_read = 16", "max_read = 0")],
+        "allowed is 1 to 125",
+        "max_read = 0",
+    ),
+    "a write that no request holds": (
+        [('"Write single register"', '"Write single register"\nmax_write = 124')],
+        "allowed is 1 to 123",
+        "max_write = 124",
+    ),
+    "a write by function 23 that no request holds": (
+        [("[[functions]]\ncode = 6", f"{BOTH}\n[[functions]]\ncode = 6")],
+        "function 23 writes at most 121 words",
+        "max_write = 122",
+    ),
+    "a sub-function that no request holds": (
+        [('"Write single register"', '"Write single register"\nsubfunctions = [0, 65536]')],
+        "allowed is 0 to 65535",
+        "subfunctions = [0, 65536]",
+    ),
+    "a negative sub-function": (
+        [('"Write single register"', '"Write single register"\nsubfunctions = [-1]')],
+        "allowed is 0 to 65535",
+        "subfunctions = [-1]",
+    ),
+    "an exception code that no reply holds": (
+        [('"Write single register"', '"Write single register"\npast_limit_exception = 256')],
+        "allowed is 1 to 255",
+        "past_limit_exception = 256",
+    ),
+    **{
+        f"a block of {words} words": (
+            [("# Parameters come last", f"{BLOCK.format(words)}\n# Parameters come last")],
+            "allowed is 1 to 125",
+            f"max_words = {words}",
+        )
+        for words in (-1, 0, 126)
+    },
+    "a block that is written and no request holds": (
+        [
+            (
+                "# Parameters come last",
+                BLOCK.format(124).replace('"read"', '"write"') + "\n# Parameters come last",
+            )
+        ],
+        "block block: a request writes at most 123 words",
+        "max_words = 124",
+    ),
+    "a block that is shorter than its shortest access": (
+        [("# Parameters come last", BLOCK.format(4) + "min_words = 5\n# Parameters come last")],
+        "block block: min_words 5 is above max_words 4",
+        "min_words = 5",
+    ),
+    "a block past the last register": (
+        [
+            (
+                "# Parameters come last",
+                BLOCK.format(4).replace("400", "65533") + "\n# Parameters come last",
+            )
+        ],
+        "block block: 4 words from 65533 run past address 65535",
+        "address = 65533",
     ),
     "no way to the running state": (
         [('status = "STAT"\n', 'status = "STAT"\nruns_in = "running"\n')],

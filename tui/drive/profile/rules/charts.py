@@ -116,6 +116,38 @@ def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 )
 
 
+def chart_words_in_reach(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Status words can be read, command words written, and those that stop also at speed."""
+    access = {one.code: one.access for one in data.parameters}
+    for index, chart in enumerate(data.charts):
+        at: TomlPath = ("charts", index)
+        if access.get(chart.status) == "w":
+            yield (
+                (*at, "status"),
+                f"chart {chart.id}: {chart.status} has access w. A status word must be readable:"
+                " access r or rw.",
+            )
+        places = [(chart.command, (*at, "command"))]
+        places += [
+            (order.parameter, (*at, "orders", place)) for place, order in enumerate(chart.orders)
+        ]
+        for code, path in places:
+            if access.get(code) == "r":
+                yield (
+                    path,
+                    f"chart {chart.id}: {code} has access r. A command word must be writable:"
+                    " access rw or w.",
+                )
+        for place, order in enumerate(chart.orders):
+            code = order.parameter or chart.command
+            if order.id in SURE_STOPS and access.get(code) == "rw-stopped":
+                yield (
+                    (*at, "orders", place),
+                    f"order {order.id}: {code} can be written only at rest (access rw-stopped)."
+                    " The word of a stop must have access rw or w.",
+                )
+
+
 def running(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """An order to run leads to a state in which the drive is seen to run."""
     for index, chart in enumerate(data.charts):
@@ -189,6 +221,7 @@ def _leads(chart: Chart, source: str, goal: str) -> bool:
 CHART_RULES = (
     names_of_states,
     whole_chart_words,
+    chart_words_in_reach,
     states,
     stops_always,
     running,

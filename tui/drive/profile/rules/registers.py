@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
 
+MOST_WRITTEN, MOST_WRITTEN_BY_23 = 123, 121
+"""Words that one request of Modbus can write: by function 16, and by function 23."""
+
 
 def overlaps(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Two parameters in one register are fields of it that share no bit."""
@@ -85,4 +88,31 @@ def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 )
 
 
-REGISTER_RULES = (whole_words, overlaps, functions)
+def sizes(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A request holds what a block or a function may take at once."""
+    for index, function in enumerate(data.functions):
+        if function.code == 23 and (function.max_write or 0) > MOST_WRITTEN_BY_23:
+            yield (
+                ("functions", index, "max_write"),
+                f"function 23 writes at most {MOST_WRITTEN_BY_23} words, not {function.max_write}.",
+            )
+    for index, block in enumerate(data.blocks):
+        at, most = ("blocks", index), block.max_words
+        if block.direction == "write" and most > MOST_WRITTEN:
+            yield (
+                (*at, "max_words"),
+                f"block {block.id}: a request writes at most {MOST_WRITTEN} words, not {most}.",
+            )
+        if block.min_words > most:
+            yield (
+                (*at, "min_words"),
+                f"block {block.id}: min_words {block.min_words} is above max_words {most}.",
+            )
+        if block.address + most > 0x10000:
+            yield (
+                (*at, "address"),
+                f"block {block.id}: {most} words from {block.address} run past address 65535.",
+            )
+
+
+REGISTER_RULES = (whole_words, overlaps, functions, sizes)

@@ -9,6 +9,9 @@ from msgspec import Meta, Struct
 
 WordAddress = Annotated[int, Meta(ge=0, le=0xFFFF)]
 RawWord = Annotated[int, Meta(ge=-0x8000, le=0xFFFF)]
+ReadCount = Annotated[int, Meta(ge=1, le=125)]
+WriteCount = Annotated[int, Meta(ge=1, le=123)]
+ExceptionByte = Annotated[int, Meta(ge=1, le=255)]
 DeviceAddress = Annotated[int, Meta(ge=0, le=255)]
 DecimalText = Annotated[str, Meta(pattern=r"^[0-9]+(\.[0-9]+)?$")]
 SignedDecimalText = Annotated[str, Meta(pattern=r"^-?[0-9]+(\.[0-9]+)?$")]

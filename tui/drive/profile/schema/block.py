@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from .base import Effective, Identifier, RawWord, Table, WordAddress
+from .base import Effective, Identifier, RawWord, ReadCount, Table, WordAddress
 
 
 class BlockChoice(Table, frozen=True, kw_only=True):
@@ -21,8 +21,8 @@ class Block(Table, frozen=True, kw_only=True):
     name: str
     direction: Literal["read", "write"]
     address: WordAddress
-    min_words: int = 1
-    max_words: int
+    min_words: ReadCount = 1
+    max_words: ReadCount
     slots: list[str]
     """Parameters that select what stands in each place, in order."""
     values: list[str] = []

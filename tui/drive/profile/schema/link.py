@@ -6,7 +6,16 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import DecimalText, DeviceAddress, RawWord, Table, WordAddress
+from .base import (
+    DecimalText,
+    DeviceAddress,
+    ExceptionByte,
+    RawWord,
+    ReadCount,
+    Table,
+    WordAddress,
+    WriteCount,
+)
 
 PastLimit = Literal["exception", "silence"]
 
@@ -76,12 +85,12 @@ class Function(Table, frozen=True, kw_only=True):
 
     code: Annotated[int, Meta(ge=1, le=127)]
     name: str
-    max_read: Annotated[int, Meta(ge=1, le=125)] | None = None
-    max_write: Annotated[int, Meta(ge=1, le=123)] | None = None
+    max_read: ReadCount | None = None
+    max_write: WriteCount | None = None
     broadcast: bool = False
     past_limit: PastLimit = "exception"
-    past_limit_exception: int = 3
-    subfunctions: list[int] = []
+    past_limit_exception: ExceptionByte = 3
+    subfunctions: list[WordAddress] = []
     note: str = ""
     source: str = ""
 
@@ -104,7 +113,7 @@ class ReadShapes(Table, frozen=True, kw_only=True):
     """True where only one word, or a block declared below, can be read."""
     unknown_word: WordAddress | None = None
     """Word that stands for an unknown or protected parameter inside a longer read."""
-    unknown_exception: int | None = 2
+    unknown_exception: ExceptionByte | None = 2
     """Exception for a read of unknown words only; absent where the manual names none."""
     low_word_first: bool = True
     """Order of the two words of 32-bit values, where a parameter does not say otherwise."""
@@ -117,7 +126,7 @@ class ReadShapes(Table, frozen=True, kw_only=True):
 class ExceptionCode(Table, frozen=True, kw_only=True):
     """What an exception code means on this family."""
 
-    code: Annotated[int, Meta(ge=1, le=255)]
+    code: ExceptionByte
     name: str
     meaning: str
     remedy: str = ""
