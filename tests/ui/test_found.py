@@ -37,7 +37,9 @@ NAMELESS = DriveIdentity(7, "", "", "", "", None, ("powerdrive", "proxidrive", "
 
 def found(identity: DriveIdentity, profile: str | None = "atv71", *, guessed: bool) -> FoundDrive:
     console = None if profile is None else fakes.console_of(None, family=profile)
-    return FoundDrive(identity, console, guessed)
+    if console is not None:
+        console.session.guessed = guessed
+    return FoundDrive(identity, console)
 
 
 rows = st.builds(

@@ -33,7 +33,7 @@ from tui.session.paths import recent_lines
 from tui.simulator import DriveSpec, Simulation
 
 from . import fakes
-from .test_flows import shown, until
+from .test_flows import picture, shown, until
 
 __all__ = ["adapters"]
 
@@ -191,6 +191,26 @@ async def test_a_named_line_is_offered_and_opens_its_drive(simulation: Simulatio
         assert found.session is not None
         assert found.session.profile.id == "powerdrive"
         assert app.connection.query_one("#addresses", Input).value == "5"
+
+
+async def test_a_drive_of_a_guessed_family_is_never_shown_as_stopped(
+    simulation: Simulation,
+) -> None:
+    drive = simulation.drive(5)
+    drive.set("6.43", 1)
+    drive.set("6.42", 3)
+    app = DrivePanelApp(start=rtu_tcp(simulation), device=5)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.chosen is not None and app.chosen.latest is not None)
+        assert app.take_stop_key("space")
+        await until(pilot, lambda: "NOT STOPPED" in picture(app))
+        await until(pilot, lambda: drive.motor.frequency == 0)
+        await until(pilot, lambda: "it is not known if the motor stopped" in picture(app))
+        assert app.chosen is not None
+        app.chosen.session.rest_seen = app.clock.monotonic()
+        app.look_around()
+        await pilot.pause()
+        assert "it is not known if the motor stopped" in picture(app)
 
 
 async def test_a_name_may_be_typed(simulation: Simulation) -> None:

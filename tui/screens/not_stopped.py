@@ -42,7 +42,8 @@ def is_not_stopped(report: StopReport, session: DriveSession, now: float) -> boo
         return False
     outcome = session.work.outcome
     newer = outcome is not None and outcome.kind == "done" and outcome.time > report.since
-    return not newer and session.rest_seen <= report.since
+    # by a guessed family no motor is seen at rest
+    return not newer and (session.guessed or session.rest_seen <= report.since)
 
 
 def repeats(message: str, texts: Iterable[str]) -> bool:

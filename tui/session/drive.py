@@ -54,6 +54,8 @@ class DriveSession:
         """What is known of its registers."""
         self.arming = Arming(line, clock, device)
         """Whether it may be written to from here."""
+        self.guessed = False
+        """True if its family was neither named nor told by the drive: never told as stopped."""
         self.contradiction = contradiction(identity, profile)
         """How the drive contradicts its profile by what it says of itself; empty if it does not."""
         if self.contradiction:

@@ -51,8 +51,11 @@ class FoundDrive:
 
     identity: DriveIdentity
     console: DriveConsole | None = None
-    guessed: bool = False
-    """Whether its profile is one of several that may fit, and nobody has said which."""
+
+    @property
+    def guessed(self) -> bool:
+        """Whether its profile is one of several that may fit, and nobody has said which."""
+        return self.session is not None and self.session.guessed
 
     @property
     def session(self) -> DriveSession | None:
@@ -135,22 +138,24 @@ class Fleet:
         """
         before = self.console(session.device)
         if before is not None and _same(before.session, session):
-            self._put(FoundDrive(identity or session.known_identity, before, guessed))
+            before.session.guessed = guessed
+            self._put(FoundDrive(identity or session.known_identity, before))
             return before
         if before is not None and self._runs_as_it_is(before.session, session):
             return before
+        session.guessed = guessed
         session.starts = self.starts
         session.work.on_tell = partial(self._note_outcome, session.device)
         console = DriveConsole(session, self.journal)
         said = identity or session.known_identity
-        self._put(FoundDrive(said, console, guessed))
+        self._put(FoundDrive(said, console))
         if before is not None:
             before.close()
         self._strangers.let_go(session.device)
         self.line_watch.keep(session, console.monitor)
         console.monitor.listen(partial(self._note_fault, session.device))
         # reads files: in a thread that nobody waits for
-        threading.Thread(target=self._recall, args=(console, guessed), daemon=True).start()
+        threading.Thread(target=self._recall, args=(console,), daemon=True).start()
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
@@ -165,13 +170,13 @@ class Fleet:
         self.events.add("refused", told, session.device)
         return True
 
-    def _recall(self, console: DriveConsole, guessed: bool) -> None:
+    def _recall(self, console: DriveConsole) -> None:
         """What earlier programs have left of a drive: a motor that runs, and what was taught.
 
         One that may be of another family is prepared to be stopped as that, too.
         """
         session, said = console.session, console.session.known_identity
-        if guessed or session.contradiction:
+        if session.guessed or session.contradiction:
             may_be = [said.profile] if said.profile else said.candidates
             others = [library.load(one) for one in may_be if one != session.profile.id]
             families = [session.profile, *others]

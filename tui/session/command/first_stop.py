@@ -14,9 +14,12 @@ from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import DeviceException, ExchangeError, LineError, NoAnswer
 from tui.bus.limits import Limits
 from tui.drive.first_stop import FirstWord, StopPlace, first_word, followers, stop_places
+from tui.drive.orders import stop_alike
+from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
-from tui.drive.profile.stop_facts import StopFacts
+from tui.drive.profile.stop_facts import StopFacts, stop_facts_of
 
+from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
 
 ONE_WORD = Limits(
@@ -77,6 +80,15 @@ class _Look:
     there: bool | None
     """Whether the drive has such a status word; None where it did not answer."""
     raws: dict[int, int]
+
+
+def unlike_families(session: DriveSession) -> tuple[StopFacts, ...]:
+    """Families of which a guessed drive may be, if the word that stops one may start another."""
+    ids = session.known_identity.candidates if session.guessed else ()
+    profiles = [library.load(one) for one in ids]
+    if not profiles or stop_alike(profiles):
+        return ()
+    return tuple(stop_facts_of(one, names_itself=False) for one in profiles)
 
 
 async def stop_first(

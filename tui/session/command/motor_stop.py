@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from tui.bus.api import Priority
@@ -21,15 +21,18 @@ from tui.drive.orders import (
     with_options,
 )
 from tui.drive.profile.schema import Chart, Order, OrderId
+from tui.drive.profile.stop_facts import StopFacts
 from tui.drive.values import from_words
 
+from ..connect.limits import limits_of
 from ..drive import DriveSession
 from ..drive_state import STATE_FRESH
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
+from .first_stop import stop_first, unlike_families
 from .last_known import last_known_stop, run_by_others
-from .stop_report import Phase, not_stopped
+from .stop_report import Phase, not_proved, not_stopped
 from .wave import FirstWave
 
 log = logging.getLogger(__name__)
@@ -83,6 +86,8 @@ class MotorStop:
     async def carry_out(self) -> str | None:
         """Choose, send and follow; returns why the motor does not stop, or nothing."""
         self.begun = True
+        if families := unlike_families(self.session):
+            return await self._stop_any(families)
         if self.wave is not None and not self.sent:
             try:
                 await self._send_at_once()
@@ -95,9 +100,32 @@ class MotorStop:
         self.answered = None  # should it be tried again
         return await self._follow(chart, chosen)
 
+    async def _stop_any(self, families: Sequence[StopFacts]) -> str | None:
+        """Send the word that stops every family; none of them can follow the motor."""
+        session, ids = self.session, [one.id for one in families]
+        try:
+            first = await stop_first(
+                session.line, session.device, self.writer.journal, families, ids, self.order
+            )
+        finally:
+            session.line.describe(session.device, limits_of(session.profile))
+            if self.wave is not None:
+                self.wave.passed(session.device)
+        self.sent = bool(first.sent)
+        self._mark_commanded()
+        if first.taken is None:
+            return "it took no stop word." if first.answered else "it did not answer."
+        session.image.distrust()
+        self.taken = True
+        self.say(session, Phase.FAILED, not_proved(), self.ordered)
+        return None
+
     async def follow(self) -> str | None:
         """See a motor stop whose stop was sent another way; returns why it does not, or nothing."""
         self.begun = self.sent = True
+        if unlike_families(self.session):
+            self.say(self.session, Phase.FAILED, not_proved(), self.ordered)
+            return None
         return await self._follow(*await self._chosen())
 
     async def _send_at_once(self) -> None:
@@ -169,7 +197,7 @@ class MotorStop:
         if (held := session.image.get(parameter.code)) is not None:
             self.held[parameter.code] = held
         kept = {code: one.raw for code, one in self.held.items() if one.raw is not None}
-        session.told_by_line = True
+        self._mark_commanded()
         for word in with_options(chart, order, kept):
             raw = from_words(parameter, [word])
             why = f"stopped: {order.name}"
@@ -182,6 +210,9 @@ class MotorStop:
                 raise
         self.answered, self.taken = self._target(chart, order), True
         self._tell_sent(order)
+
+    def _mark_commanded(self) -> None:
+        self.session.told_by_line = True
 
     def _tell_sent(self, order: Order) -> None:
         """The words have gone out: it stops, unless something else is known to run the motor."""
@@ -200,7 +231,7 @@ class MotorStop:
         while (now := self.session.clock.monotonic()) - self.ordered < SEEN_FOR:
             kind, hertz = await self._motion(chart)
             if not hertz and kind in STANDING:
-                self.say(self.session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
+                self._tell_standing()
                 self.session.stir()
                 return None
             if hertz == 0 and kind == "running" and ending is not None:
@@ -226,6 +257,14 @@ class MotorStop:
             self.say(self.session, Phase.STOPPING, text, self.ordered)
             await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
         return "it still turns after a minute."
+
+    def _tell_standing(self) -> None:
+        """It stands, as its profile reads it; by a guessed one that proves nothing."""
+        session = self.session
+        if session.guessed:
+            self.say(session, Phase.FAILED, not_proved(session.profile.name), self.ordered)
+        else:
+            self.say(session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
 
     def _instead(self) -> str:
         """Which way to stop the drive lacks, where another took its place."""

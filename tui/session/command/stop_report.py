@@ -8,12 +8,22 @@ from typing import NamedTuple
 NOT_STOPPED = "NOT STOPPED: "
 """The beginning of every text of a stop that does not stop its motor."""
 AT_THE_MACHINE = "Stop it at the machine."
+NOT_PROVED = (
+    f"{NOT_STOPPED}it is not known if the motor stopped. The drive does not identify itself.{{}}"
+    " Look at the machine, or name its profile."
+)
+"""The text for a drive whose family is neither named nor proved, with what was read."""
 
 
 def not_stopped(why: str) -> str:
     """The text of a stop that does not stop its motor: why, and what to do."""
     where = "" if why.endswith("at the machine.") else f" {AT_THE_MACHINE}"
     return f"{NOT_STOPPED}{why}{where}"
+
+
+def not_proved(read_as: str = "") -> str:
+    """The text for a drive of a guessed family, that is at standstill if `read_as` this one."""
+    return NOT_PROVED.format(f" Read as {read_as}, it is at standstill." if read_as else "")
 
 
 class Phase(StrEnum):
