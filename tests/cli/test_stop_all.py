@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from tui.bus.api import Priority
 from tui.bus.errors import ChecksumFault, LineError
 from tui.bus.fake import FakeLine
-from tui.cli.running.stop_targets import found_at
+from tui.cli.running.stop_targets import StopWish, found_at
+from tui.cli.running.stop_telling import StopTelling
 from tui.cli.shared.errors import Failure
+from tui.drive.profile import library
+from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.open_line import OpenLine, open_line
+from tui.session.journal import Journal
+from tui.session.starts.starts import Starts
 
-from .commands import run, tcp_line
+from .commands import ended, run, tcp_line
+from .test_documents import documents
+
+NAMELESS = DriveIdentity(1, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 
 
 def test_a_drive_that_another_program_leaves_alone_is_stopped_too() -> None:
@@ -30,8 +40,10 @@ def test_a_drive_that_another_program_leaves_alone_is_stopped_too() -> None:
 
 async def stop_of(line: FakeLine, patience: Priority) -> str:
     """What an address is stopped as."""
-    opened = OpenLine("fake", line)
-    found = await found_at(opened, 1, None, patience)
+    journal, telling = Journal(), StopTelling("fake", as_json=False)
+    wish = StopWish(OpenLine("fake", line), None, "stop", journal, telling)
+    found = await found_at(wish, 1, None, patience)
+    journal.close()
     return "" if found is None else found.name
 
 
@@ -53,3 +65,53 @@ async def test_what_is_heard_but_damaged_is_asked_for_with_more_patience() -> No
     silent = FakeLine({1: {}})
     silent.silence(1)
     assert await stop_of(silent, Priority.PATIENT) == ""
+
+
+GUESSED = "NOT STOPPED: it is not known if the motor stopped"
+WAYS = [("-d", "1"), ("--all", "--addresses", "1"), ("-d", "1", "-d", "2")]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_stop_of_a_guessed_family_reports_not_stopped(way: tuple[str, ...]) -> None:
+    with tcp_line("powerdrive@1", "atv71@2") as line:
+        done = ended(4, "stop", line, *way)
+        assert "Device 1: " + GUESSED in done.stderr
+        assert "Read as Powerdrive, it is at standstill" in done.stderr
+        assert "Device 1, " not in done.stdout
+        assert ("Device 2, Altivar 71: stopped." in done.stdout) is ("2" in way)
+        one, *_ = documents(ended(4, "stop", line, *way, "--json").stdout)
+        assert (one["profile"], one["stopped"], one["status"]) == (None, False, 4)
+        named = ended(0, "stop", line, *way, "-p", "powerdrive")
+        assert "Device 1, Powerdrive: stopped." in named.stdout
+
+
+@pytest.mark.parametrize("guessed", [False, True])
+@pytest.mark.parametrize("way", WAYS[:2])
+def test_a_start_on_record_names_the_family_unless_it_was_a_guess(
+    way: tuple[str, ...], guessed: bool
+) -> None:
+    with tcp_line("powerdrive@1") as line:
+        starts = Starts()
+        record = starts.record(line, NAMELESS, "powerdrive", "forward", program="panel")
+        starts.begin(replace(record, guessed=guessed))
+        done = ended(4 if guessed else 0, "stop", line, *way)
+        assert (GUESSED in done.stderr) is guessed
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_profile_named_goes_before_another_that_claims_the_reference(
+    way: tuple[str, ...],
+) -> None:
+    """One of the folder that knows the very model has no say."""
+    text = (library.packaged_folder() / "atv71.toml").read_text("utf-8")
+    text = text.replace('id = "atv71"', 'id = "hoist"', 1)
+    text = text.replace('name = "Altivar 71"', 'name = "Hoist"', 1)
+    text = text.replace('reference_prefixes = ["ATV71"', 'reference_prefixes = ["ATV71HU15"', 1)
+    folder = library.user_folder()
+    folder.mkdir(parents=True)
+    (folder / "hoist.toml").write_text(text, "utf-8")
+    with tcp_line("atv71@1", "atv71@2") as line:
+        assert "Device 1, Hoist: stopped." in run(0, "stop", line, *way)
+        named = ended(0, "stop", line, *way, "-p", "atv71")
+        assert "Device 1, Altivar 71: stopped." in named.stdout
+        assert "Device 1, Hoist" not in named.output

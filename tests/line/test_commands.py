@@ -444,13 +444,13 @@ def test_stop_all_tells_which_it_could_not_stop_and_stops_the_others() -> None:
         done = drivepanel("stop", line, "--all", "--addresses", "1,2")
         assert done.returncode == 4, done.stdout + done.stderr
         assert "Device 1: NOT STOPPED" in done.stderr
-        assert "with -p" in done.stderr
+        assert "name its profile" in done.stderr
         assert "Device 2, Altivar 71: stopped." in done.stdout
         assert stands(simulation, 2)
 
 
 @pytest.mark.parametrize("which", [("--all", "--addresses", "1,2"), ()])
-def test_a_drive_without_a_name_is_stopped_where_all_it_can_be_stop_alike(
+def test_a_drive_without_a_name_is_stopped_as_what_it_was_started_as(
     which: tuple[str, ...],
 ) -> None:
     with bench(DriveSpec("proxidrive", 1, sets={"6.43": 1})) as (simulation, line):
@@ -458,9 +458,7 @@ def test_a_drive_without_a_name_is_stopped_where_all_it_can_be_stop_alike(
         started = drivepanel("run", line, "-p", "proxidrive", "--arm", *until)
         assert turns(simulation), started.stderr
         done = drivepanel("stop", line, *which)
-        # one drive is stopped as what it was started as from here; --all goes by what each says
-        name = "Powerdrive or Proxidrive or Varmeca 33/34" if which else "Proxidrive"
-        assert f"Device 1, {name}: stopped." in done.stdout
+        assert "Device 1, Proxidrive: stopped." in done.stdout
         assert stands(simulation)
 
 
@@ -584,6 +582,38 @@ def test_3_a_drive_that_answers_nothing_is_not_told_as_stopped() -> None:
             assert done.returncode == 3, done.stdout
             assert "NOT STOPPED: Device 1 did not answer" in done.stderr
             assert ("16#0000 to CMD" in done.stdout) is bool(named)
+
+
+@pytest.mark.parametrize("way", [("--all", "--addresses", "1"), ("-d", "1", "-d", "2")])
+def test_stop_of_several_sends_a_silent_drive_the_word_of_its_profile(
+    way: tuple[str, ...],
+) -> None:
+    """Its replies are lost, not what is sent to it."""
+    with bench(DriveSpec("atv312", 1, run_hz=20.0)) as (simulation, line):
+        wait_until(lambda: turns(simulation), "the motor turns")
+        silence(simulation)
+        done = drivepanel("stop", line, *way)
+        assert done.returncode == 3, done.stdout
+        assert "sent first" not in done.stdout
+        assert turns(simulation)
+        done = drivepanel("stop", line, *way, "-p", "atv312")
+        assert done.returncode == 3, done.stdout
+        assert "Device 1: sent first 16#0000 to CMD" in done.stdout
+        assert "NOT STOPPED: no answer at 1" in done.stderr
+        assert ": stopped" not in done.stdout
+        wait_until(lambda: stands(simulation), "it was stopped blind")
+
+
+def test_stop_of_a_guessed_family_reports_not_stopped() -> None:
+    spec = DriveSpec("powerdrive", 1, run_hz=20.0, sets={"6.43": 1, "6.42": 3})
+    for way in ((), ("--all", "--addresses", "1")):
+        with bench(spec) as (simulation, line):
+            wait_until(lambda: turns(simulation), "the motor turns")
+            done = drivepanel("stop", line, *way)
+            assert done.returncode == 4, done.stdout + done.stderr
+            assert ": stopped" not in done.stdout
+            assert "NOT STOPPED: it is not known if the motor stopped" in done.stderr
+            assert stands(simulation)
 
 
 @pytest.mark.parametrize(

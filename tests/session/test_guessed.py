@@ -17,6 +17,8 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.fleet import Fleet
 from tui.session.journal import Journal
+from tui.session.starts.keeper import StartKeeper
+from tui.session.starts.starts import Starts
 from tui.simulator import DriveSpec
 
 from .test_stop import WORDS, Start, ended, journal, start, wait_for, writes
@@ -114,3 +116,13 @@ async def test_a_guess_among_families_that_stop_otherwise_sends_what_stops_them_
         assert "Read as" not in report.text
     sent = [(one.address, one.value) for one in line.requests if isinstance(one, WriteOne)]
     assert sent == [(COMMAND, 0x0000)] * len(sessions)
+
+
+def test_a_start_by_a_guess_is_on_record_as_one(tmp_path: Path) -> None:
+    starts = Starts(tmp_path)
+    session = DriveSession(FakeLine(), 1, library.load("powerdrive"), nameless(*LEROY_SOMER))
+    for guessed in (False, True):
+        session.guessed = guessed
+        StartKeeper("panel", starts).begin(session, "forward")
+        assert starts.newest(session.line_text)[1].guessed is guessed
+    assert starts.close(60)

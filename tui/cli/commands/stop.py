@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..running.stop_targets import StoppableDrive, first_stopped, found_at, remembered
+from ..running.stop_targets import (
+    StoppableDrive,
+    StopWish,
+    first_stopped,
+    found_at,
+    remembered,
+)
 from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
 from ..shared.left_alone import LeftAlone, look_after
@@ -33,11 +39,10 @@ if TYPE_CHECKING:
 
 USUAL_ADDRESSES = "1-10"
 STOP_POLL_INTERVAL = 0.05
-NOT_PROVED = (
-    "a stop word was sent, but it is not known if the motor stopped. The drive does not identify"
-    " itself. Read as {}, it is at standstill. Look at the machine, or repeat with -p."
+NAMES_NO_FAMILY = (
+    "Device {}: NOT STOPPED: it does not say who it is. Name its profile with -p (drivepanel"
+    " profiles), or stop it at the machine."
 )
-"""The text for a drive whose family is neither named nor proved."""
 
 
 @click.command()
@@ -89,12 +94,17 @@ def stop(
     telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
-        if every or target.others:
-            status = await _stop_all(opened, devices, order, target.profile_id, telling)
-            if status and opened.line.state.status is LineStatus.LOST:
-                complain(opened.line.state.reason)
-            return status
-        status, session = await _stop_one(opened, target, order, telling)
+        journal = told_journal()
+        wish = StopWish(opened, target.profile_id, order, journal, telling)
+        try:
+            if every or target.others:
+                status = await _stop_all(wish, devices)
+                if status and opened.line.state.status is LineStatus.LOST:
+                    complain(opened.line.state.reason)
+                return status
+            status, session = await _stop_one(wish, target.device)
+        finally:
+            close_journal(journal)
         if give_back and not status:
             from ..running.giving_back import give_control_back
 
@@ -141,9 +151,7 @@ async def ended(
         await asyncio.sleep(STOP_POLL_INTERVAL)
 
 
-async def _stop_one(
-    opened: OpenLine, target: Target, order: OrderId, telling: StopTelling
-) -> tuple[int, DriveSession]:
+async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
     """Stop one drive: first by the word that stops whatever it may be, then by its own.
 
     Returns the exit status, and the session with it. Raises UsageError where it is not known what
@@ -152,45 +160,37 @@ async def _stop_one(
     from tui.bus.errors import LineLost
     from tui.session.command.stop import Stopper
 
-    journal = told_journal()
+    before = (await remembered(wish.opened)).get(device)
     try:
-        try:
-            found = await first_stopped(opened, target, order, journal, telling)
-        except LineLost as lost:
-            raise LineLost(f"NOT STOPPED: {lost} Stop it at the machine.") from lost
-        look_after(opened, found.session, target.line_text)
-        stopper = Stopper(opened.line, journal)
-        return await _seen_through(stopper, found, order, telling), found.session
-    finally:
-        close_journal(journal)
+        found = await first_stopped(wish, device, before)
+    except LineLost as lost:
+        raise LineLost(f"NOT STOPPED: {lost} Stop it at the machine.") from lost
+    look_after(wish.opened, found.session, wish.opened.text)
+    stopper = Stopper(wish.opened.line, wish.journal)
+    return await _seen_through(stopper, found, wish), found.session
 
 
-async def _seen_through(
-    stopper: Stopper, found: StoppableDrive, order: OrderId, telling: StopTelling
-) -> int:
+async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
     from tui.drive.orders import INSTEAD
     from tui.session.command.stop_report import Phase
 
-    session = found.session
+    session, order, telling = found.session, wish.order, wish.telling
     # a drive without the wished way is stopped all the same; it is told by which
     way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
     stopper.stop([session], way, by="drivepanel stop")
-    who = f"Device {session.device}, {found.name}"
+    who = f"Device {session.device}" + ("" if session.guessed else f", {found.name}")
     report = await ended(stopper, session.device, lambda text: complain(f"{who}: {text}"))
     if telling.as_json:
         await LeftAlone(session, "", goes_on=True).learn()
-    if report.phase is Phase.STOPPED and not found.proved:
-        text = f"Device {session.device}: {NOT_PROVED.format(found.name)}"
-        telling.failed(session.device, None, text, DRIVE_REFUSED)
-        return DRIVE_REFUSED
     if report.phase is Phase.STOPPED:
         lacks = "" if way == order else f" (it has no {order}: ramp stop)"
         telling.stopped(session, f"{who}: {report.text}{lacks}.")
         await asyncio.to_thread(forget_start, session)
         return 0
     status = await _why(session)
-    telling.failed(session.device, session.profile.id, f"{who}: {report.text}", status)
+    profile = None if session.guessed else session.profile.id
+    telling.failed(session.device, profile, f"{who}: {report.text}", status)
     return status
 
 
@@ -209,26 +209,21 @@ async def _why(session: DriveSession) -> int:
     return DRIVE_REFUSED
 
 
-async def _stop_all(
-    opened: OpenLine,
-    named: Sequence[int],
-    order: OrderId,
-    profile_id: str | None,
-    telling: StopTelling,
-) -> int:
+async def _stop_all(wish: StopWish, named: Sequence[int]) -> int:
     """Stop each drive as soon as it is found; what one does holds up no other.
 
     Every address is first asked once, shortly, before any is asked with patience: a silent one
     takes seconds to rule out, and meanwhile motors turn. A silent address is a failure where a
     drive is known to be there: named, simulated, or started from here. It has all patience, as
-    one has that says anything; others are asked once more, as a search does.
+    one has that says anything; others are asked once more, as a search does. Where its family is
+    named, too, it is sent the stop word although it is silent: perhaps it hears.
     """
     from tui.bus.api import Priority
     from tui.bus.errors import LineError
     from tui.session.command.stop import Stopper
 
-    journal = told_journal()
-    stopper = Stopper(opened.line, journal)
+    opened, telling = wish.opened, wish.telling
+    stopper = Stopper(opened.line, wish.journal)
     stops: list[asyncio.Task[int]] = []
     started = await remembered(opened)
     devices = named or sorted({*(opened.devices or _devices(USUAL_ADDRESSES)), *started})
@@ -237,6 +232,7 @@ async def _stop_all(
     left = sorted(devices, key=lambda device: device not in started)
     likely = set(expected)
     worst = 0
+    found: StoppableDrive | None
     try:
         for patient in (False, True):
             asked, left = left, []
@@ -244,11 +240,20 @@ async def _stop_all(
                 patience = Priority.BACKGROUND
                 if patient:
                     patience = Priority.OPERATOR_READ if device in likely else Priority.PATIENT
+                before = started.get(device)
+                blind = device in expected and (wish.profile_id or before) is not None
                 try:
-                    found = await found_at(opened, device, profile_id, patience)
+                    if patient and blind:
+                        found = await first_stopped(wish, device, before)
+                    else:
+                        found = await found_at(wish, device, before, patience)
                 except Failure as failure:
                     telling.failed(device, None, failure.message, failure.status)
                     worst = max(worst, failure.status)
+                    continue
+                except click.UsageError:
+                    telling.failed(device, None, NAMES_NO_FAMILY.format(device), DRIVE_REFUSED)
+                    worst = max(worst, DRIVE_REFUSED)
                     continue
                 except LineError:
                     likely.add(device)
@@ -257,11 +262,10 @@ async def _stop_all(
                     left.append(device)
                     continue
                 look_after(opened, found.session, opened.text)
-                stops.append(asyncio.create_task(_seen_through(stopper, found, order, telling)))
+                stops.append(asyncio.create_task(_seen_through(stopper, found, wish)))
     finally:
         # whatever went wrong with the search: stops that were begun are seen through
         worst = max([worst, *await asyncio.gather(*stops)])
-        close_journal(journal)
     if missing := sorted(expected.intersection(left)):
         telling.silent(missing, LINE_TROUBLE)
         worst = max(worst, LINE_TROUBLE)

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..commands.orders import complain
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
-from ..shared.options import Target, unidentified
+from ..shared.options import unidentified
 
 if TYPE_CHECKING:
     from tui.bus.api import Priority
-    from tui.drive.profile.profile import Profile
     from tui.drive.profile.schema import OrderId
     from tui.session.command.first_stop import FirstStop
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.journal import Journal
+    from tui.session.starts.record import StartRecord
 
     from .stop_telling import StopTelling
 
@@ -37,34 +36,51 @@ class StoppableDrive:
 
     session: DriveSession
     name: str
-    proved: bool = True
-    """True if the user, a recorded start or the drive itself named its family."""
 
 
-async def first_stopped(
-    opened: OpenLine, target: Target, order: OrderId, journal: Journal, telling: StopTelling
-) -> StoppableDrive:
-    """Send the first word, then find out what the drive is; both are told."""
+@dataclass(frozen=True, slots=True)
+class StopWish:
+    """How the drives of a line are to be stopped."""
+
+    opened: OpenLine
+    profile_id: str | None
+    """The profile that the user named; final, unless a drive identifies itself as another."""
+    order: OrderId
+    journal: Journal
+    telling: StopTelling
+
+    @property
+    def typed(self) -> str | None:
+        """The id of the profile that the user named. Raises DriveError if there is none such."""
+        from tui.drive.profile import library
+
+        return library.load(self.profile_id).id if self.profile_id is not None else None
+
+
+async def first_stopped(wish: StopWish, device: int, before: StartRecord | None) -> StoppableDrive:
+    """Send the first word, then find out what the drive is; both are told.
+
+    `before` is the last start of its motor from here. Raises UsageError where it is not known what
+    stops it, NoAnswer where it is not there, Failure where it took no stop word.
+    """
     from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import ExchangeError, NoAnswer
     from tui.drive.first_stop import families_beside
-    from tui.drive.profile import library
     from tui.drive.profile.stop_facts import stop_facts
     from tui.session.command.first_stop import stop_first
     from tui.session.connect.identify import DriveIdentity, identify_drive
 
-    device = target.device
-    typed = library.load(target.profile_id).id if target.profile_id is not None else None
+    opened, typed = wish.opened, wish.typed
     families = await asyncio.to_thread(stop_facts)
     if typed is not None:
         families = families_beside(families, typed)
-    before = (await remembered(opened)).get(device)
     known = {typed, *(one.id for one in families)}
-    named = [one for one in (typed, before) if one is not None and one in known]
+    recorded = before.profile if before is not None else None
+    named = [one for one in (typed, recorded) if one is not None and one in known]
     # what other programs meant for it is void before the first word, not once it is known
     opened.line.facts.give_stop([device], "drivepanel stop")
     for _ in range(BLIND_TRIES if typed else 1):
-        first = await stop_first(opened.line, device, journal, families, named, order)
+        first = await stop_first(opened.line, device, wish.journal, families, named, wish.order)
         if first.answered:
             break
     identity = DriveIdentity(device, "", "", "", "", None, ())
@@ -75,7 +91,7 @@ async def first_stopped(
         says = f"it says it is {identity.reference}" if identity.reference else "it names nothing"
     except ExchangeError as error:
         silent, says = error, "it does not say what it is"
-    telling.sent_first(device, first.sent, says)
+    wish.telling.sent_first(device, first.sent, says)
     if silent is not None and not first.answered:
         hint = "" if typed else " -p sends a stop word blind."
         # past a frozen owner of the line: what keeps the stop from the drive
@@ -83,7 +99,7 @@ async def first_stopped(
         why = f" {opened.line.state.reason}" if away else ""
         text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine.{hint}{why}"
         raise NoAnswer(device, silent.function, silent.address, text)
-    found = await asyncio.to_thread(_by_what_is_known, opened, identity, typed, named, first)
+    found = await asyncio.to_thread(_by_what_is_known, wish, identity, before, first)
     if found is None and first.sent:
         text = f"Device {device}: NOT STOPPED: it took no stop word. Stop it at the machine."
         raise Failure(text, DRIVE_REFUSED)
@@ -95,54 +111,54 @@ async def first_stopped(
 
 
 def _by_what_is_known(
-    opened: OpenLine,
+    wish: StopWish,
     identity: DriveIdentity,
-    typed: str | None,
-    named: Sequence[str],
-    first: FirstStop,
+    before: StartRecord | None,
+    first: FirstStop | None = None,
 ) -> StoppableDrive | None:
     """The drive by the user's profile, else by its own words, else by the word that it took.
 
     The user's profile is final unless the drive identifies itself as one of another family.
     """
+    from tui.drive.errors import DriveError
     from tui.drive.profile import library
     from tui.session.connect.contradiction import contradiction
 
-    if typed is not None:
+    if (typed := wish.typed) is not None:
         own = identity.profile or typed
         if wrong := contradiction(identity, library.load(typed)):
             complain(f"{wrong} It is stopped as {library.load(own).name}.")
-            return _stoppable(opened, identity, [library.load(own)])
-        return _stoppable(opened, identity, [library.load(typed)])
-    for one in named:
-        profile = library.load(one)
-        unsaid = identity.profile is None and first.may_be(one)
-        if not contradiction(identity, profile) and (one in identity.candidates or unsaid):
-            return _stoppable(opened, identity, [profile])
-    if identity.profile or identity.candidates:
-        return _session(opened, identity, None)
-    if first.taken is None or not first.followers:
-        return None
-    found = _stoppable(opened, identity, [library.load(first.followers[0])])
-    name = " or ".join(one.name for one in first.taken.families)
-    return StoppableDrive(found.session, name, proved=False)
+            return _stoppable(wish, identity, own)
+        return _stoppable(wish, identity, typed)
+    if before is not None:
+        unsaid = identity.profile is None and first is not None and first.may_be(before.profile)
+        with suppress(DriveError):
+            wrong = contradiction(identity, library.load(before.profile))
+            if not wrong and (before.profile in identity.candidates or unsaid):
+                guessed = before.guessed and identity.profile is None
+                return _stoppable(wish, identity, before.profile, guessed=guessed)
+    if identity.profile is not None:
+        return _stoppable(wish, identity, identity.profile)
+    followers = first.followers if first is not None and first.taken is not None else ()
+    guess = next(iter((*identity.candidates, *followers)), None)
+    return _stoppable(wish, identity, guess, guessed=True) if guess is not None else None
 
 
-async def remembered(opened: OpenLine) -> dict[int, str]:
-    """By device, the profile by which a motor of this line was last started from here.
+async def remembered(opened: OpenLine) -> dict[int, StartRecord]:
+    """By device, the last start of a motor of this line from here.
 
     A disk that hangs holds up no stop: then it is not known.
     """
     from tui.bus.link import label
     from tui.session.starts.starts import Starts
 
-    found: list[dict[int, str]] = []
+    found: list[dict[int, StartRecord]] = []
     loop, done = asyncio.get_running_loop(), asyncio.Event()
 
     def look() -> None:
         try:
             with suppress(OSError):
-                found.append(Starts().profiles(label(opened.line.link)))
+                found.append(Starts().newest(label(opened.line.link)))
         finally:
             with suppress(RuntimeError):  # the loop has ended: nobody waits for it
                 loop.call_soon_threadsafe(done.set)
@@ -156,70 +172,42 @@ async def remembered(opened: OpenLine) -> dict[int, str]:
 
 
 async def found_at(
-    opened: OpenLine, device: int, profile_id: str | None, patience: Priority
+    wish: StopWish, device: int, before: StartRecord | None, patience: Priority
 ) -> StoppableDrive | None:
     """The drive at an address; None where nobody answers.
 
-    What comes but is no answer is asked for anew with an operator's patience. Raises Failure where
-    the drive cannot be stopped, and why; where it is asked shortly, LineError for no answer.
+    What comes but is no answer is asked for anew with an operator's patience. A drive that tells
+    nothing of its family is sent the word that stops them all first. Raises what
+    `first_stopped` raises, Failure for answers that are none; where it is asked shortly, LineError.
     """
     from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import LineError, NoAnswer
     from tui.session.connect.identify import identify_drive
 
+    line = wish.opened.line
     # nothing else goes past an owner that is frozen, or to a drive that is left alone
-    past = opened.line.state.status is LineStatus.LOST or device in opened.line.facts.hushed
+    past = line.state.status is LineStatus.LOST or device in line.facts.hushed
     try:
         priority = Priority.STOP if past else patience
-        identity = await identify_drive(opened.line, device, priority=priority)
+        identity = await identify_drive(line, device, priority=priority)
     except NoAnswer:
         return None
     except LineError as error:
         if patience is Priority.BACKGROUND:
             raise
         if patience is Priority.PATIENT:
-            return await found_at(opened, device, profile_id, Priority.OPERATOR_READ)
+            return await found_at(wish, device, before, Priority.OPERATOR_READ)
         raise Failure(f"Device {device}: NOT STOPPED: {error}", LINE_TROUBLE) from error
-    if (found := await asyncio.to_thread(_session, opened, identity, profile_id)) is not None:
-        if profile_id is not None and (wrong := _wrongly_named(identity, profile_id)):
-            complain(f"{wrong} It is stopped as {found.name}.")
-        return found
-    fits = ", ".join(identity.candidates) or "drivepanel profiles"
-    raise Failure(
-        f"Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
-        f" with -p ({fits}), or stop it at the machine.",
-        DRIVE_REFUSED,
-    )
-
-
-def _session(
-    opened: OpenLine, identity: DriveIdentity, profile_id: str | None
-) -> StoppableDrive | None:
-    """A session with the drive; None where it is not known what stops it.
-
-    A drive that does not say who it is may belong to several families: where the same words stop
-    them all, which one it is does not matter.
-    """
-    from tui.drive.orders import stop_alike
-    from tui.drive.profile import library
-
-    named = identity.profile or profile_id
-    profiles = [library.load(one) for one in ([named] if named else identity.candidates)]
-    return _stoppable(opened, identity, profiles) if stop_alike(profiles) else None
+    found = await asyncio.to_thread(_by_what_is_known, wish, identity, before)
+    return found if found is not None else await first_stopped(wish, device, before)
 
 
 def _stoppable(
-    opened: OpenLine, identity: DriveIdentity, profiles: Sequence[Profile]
+    wish: StopWish, identity: DriveIdentity, profile: str, *, guessed: bool = False
 ) -> StoppableDrive:
+    from tui.drive.profile import library
     from tui.session.drive import DriveSession
 
-    session = DriveSession(opened.line, identity.device, profiles[0], identity)
-    return StoppableDrive(session, " or ".join(profile.name for profile in profiles))
-
-
-def _wrongly_named(identity: DriveIdentity, profile_id: str) -> str:
-    """How a drive contradicts the profile of -p; empty if it does not."""
-    from tui.drive.profile import library
-    from tui.session.connect.contradiction import contradiction
-
-    return contradiction(identity, library.load(profile_id))
+    session = DriveSession(wish.opened.line, identity.device, library.load(profile), identity)
+    session.guessed = guessed
+    return StoppableDrive(session, session.profile.name)

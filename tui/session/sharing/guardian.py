@@ -177,8 +177,10 @@ class Guardian:
         if session is not None:
             return session
         try:
-            return DriveSession(self._line, record.device, library.load(record.profile))
+            session = DriveSession(self._line, record.device, library.load(record.profile))
         except DriveError as error:
             log.error("drive %s cannot be stopped: %s", record.device, error)
             self._tell(record.device, f"Not stopped: {error} Stop it at the machine.")
             return None
+        session.guessed = record.guessed
+        return session

@@ -34,6 +34,7 @@ class Startable(Protocol):
     identity: DriveIdentity | None
     starts: StartKeeper | None
     line: ModbusLine
+    guessed: bool
 
     @property
     def line_text(self) -> str:
@@ -88,6 +89,7 @@ class StartKeeper:
             order,
             program=self._program,
             left_running=self.left_running,
+            guessed=session.guessed,
         )
         self._put(session, record)
 

@@ -35,6 +35,8 @@ class StartRecord:
     """Whether the motor is meant to go on when the program ends."""
     wall: str
     """When the start was ordered: ISO with zone, to the millisecond."""
+    guessed: bool = False
+    """True if the profile was a guess; it names the drive's family to nobody."""
 
     @property
     def begun(self) -> datetime | None:

@@ -87,6 +87,7 @@ class Starts:
         *,
         program: str,
         left_running: bool = False,
+        guessed: bool = False,
     ) -> StartRecord:
         """A start by this program, now; begin() puts it on the disk."""
         return StartRecord(
@@ -104,6 +105,7 @@ class Starts:
             program=program,
             left_running=left_running,
             wall=datetime.now().astimezone().isoformat(timespec="milliseconds"),
+            guessed=guessed,
         )
 
     def taken_over(
@@ -220,12 +222,9 @@ class Starts:
         here = [one for one in self._files.records() if line_key(one.line) == key]
         return sorted(here, key=lambda one: one.begun.timestamp() if one.begun else 0.0)
 
-    def profiles(self, line: str) -> dict[int, str]:
-        """By device, the profile of the last start on record, whose program lives or not.
-
-        Reads files.
-        """
-        return {one.device: one.profile for one in self._of(line)}
+    def newest(self, line: str) -> dict[int, StartRecord]:
+        """By device, the last start on record, whose program lives or not; reads files."""
+        return {one.device: one for one in self._of(line)}
 
     def close(self, timeout: float = 1.0) -> bool:
         """Wait for what is still to be written or removed, so many seconds; False if it was not."""
