@@ -74,6 +74,14 @@ SECOND = {
     "bookkeeping": "tui.session.monitor.line_watch:LineWatch.under_command",
 }
 """Where a second error comes from while the panel ends."""
+UNSEEN = {
+    "wait": ("RuntimeError", "tui.session.command.stop:Stopper.wait", "Device 1: it"),
+    "result": ("RuntimeError", "tui.screens.last_stops:LineStops.lines", "It"),
+    "end": ("RuntimeError", "tui.screens.last_stops:LastStops.follow", "It"),
+    "exit": ("SystemExit", "tui.screens.last_stops:LastStops.follow", "It"),
+}
+"""Second errors that leave it unknown whether the motor stopped, and the first words on that."""
+UNKNOWN = " is not known whether the motor"
 HANGS = {
     "shutdown": "textual.app:App._shutdown",
     "loop": "tui.terminal.last_words:LastWords._fatal_error",
@@ -209,6 +217,17 @@ def test_a_second_error_keeps_no_stop_back(second: str, tmp_path: Path) -> None:
         output = below(end(panel, tmp_path))
     assert output[0].startswith("The panel had to stop after an internal error (RuntimeError")
     assert "Device 1: stopped." in output
+
+
+@pytest.mark.parametrize("second", UNSEEN)
+def test_second_error_in_the_wait_is_reported_as_unknown(second: str, tmp_path: Path) -> None:
+    error, place, begin = UNSEEN[second]
+    with failing(tmp_path, ("RuntimeError", DRAW), (error, place)) as panel:
+        writes, sent = len(panel.log.writes), len(panel.sent)
+        (tmp_path / "now").touch()
+        ended(panel)
+        assert panel.stops(writes) > 0
+        assert below(panel.sent[sent:])[-1].startswith(begin + UNKNOWN)
 
 
 @pytest.mark.parametrize("hang", HANGS)

@@ -19,6 +19,7 @@ log = logging.getLogger(__name__)
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
 BY = "leaving the panel"
+STANDSTILL_NOT_KNOWN = "it is not known whether the motor stopped. Check it at the machine."
 
 
 class LineStops:
@@ -32,6 +33,8 @@ class LineStops:
         """Drives whose motors are to stop."""
         self.troubles: dict[int, str] = {}
         """Why no stop of a device was ordered."""
+        self.followed = True
+        """False if an error ended the wait for the standstill."""
 
     def order(self) -> None:
         """End all work on the line's drives, then order a stop of each motor started from here."""
@@ -75,7 +78,12 @@ class LineStops:
     def wait(self, seconds: float) -> bool:
         """Wait for the standstill of all; True if every motor was seen at rest."""
         ordered = [one for one in self.sessions if one.device not in self.troubles]
-        summary = self.fleet.stopper.wait(ordered, seconds)
+        try:
+            summary = self.fleet.stopper.wait(ordered, seconds)
+        except Exception:
+            log.exception("the stops were not followed")
+            self.followed = False
+            return False
         ended = len(summary.reports) == len(ordered) and summary.ended
         return ended and not summary.failed and not self.troubles
 
@@ -93,6 +101,8 @@ class LineStops:
             return f"NOT STOPPED: {why} {AT_THE_MACHINE}"
         if report.phase.value in ("stopped", "failed"):
             return report.text if report.text.endswith(".") else f"{report.text}."
+        if not self.followed:
+            return STANDSTILL_NOT_KNOWN
         return f"NOT STOPPED after {STOPPED_WITHIN:.0f} s: {report.text}. {AT_THE_MACHINE}"
 
 

@@ -37,6 +37,7 @@ FAILED = 70
 TRIES, TRIED_AGAIN = 5, 0.2
 """How often the last work is ordered where an error keeps it from that, and after how long."""
 NOT_ORDERED = "NOT STOPPED: motors that were started here may run on. Stop them at the machine."
+END_NOT_SEEN = "It is not known whether the motors stopped. Check them at the machine."
 
 
 class LastWork(Protocol):
@@ -72,6 +73,8 @@ class LastWords(App[None]):
         self._work: LastWork | None = None
         self._following: threading.Thread | None = None
         """Follows the last work after an error; the process does not end before it."""
+        self._saying: threading.Thread | None = None
+        """Says the last words; alone, as long as it lives."""
         self._followed = threading.Event()
         self._unsaid: list[str] = []
 
@@ -98,8 +101,19 @@ class LastWords(App[None]):
                 raise
             log.error("another error while the panel ends", exc_info=error)
         if self._failing.locked():
+            self._finish()
             self._return_code = FAILED
         return result
+
+    def _finish(self) -> None:
+        """See the end through, also if a second error interrupted it."""
+        if self._following is None:
+            self._follow()
+        else:
+            self._following.join()
+        self._print_error_renderables()
+        if self._driver is not None:
+            self._driver.close()  # writes what is still queued
 
     def follow_last_work(self) -> None:
         """Wait for the end of the last work; orders it where that was not done yet."""
@@ -149,8 +163,9 @@ class LastWords(App[None]):
         self._work = self._ordered()
         cause = error.error if isinstance(error, WorkerFailed) else error
         self._unsaid = self._first_words(cause)
-        words = _started(self._say_all, "last words", daemon=True)
-        self._following = _started(lambda: self._follow(words), "last work")
+        if isinstance(screen := self._driver, OwnScreen):
+            self._saying = _started(lambda: self._say_all(screen), "last words", daemon=True)
+        self._following = _started(self._follow, "last work")
         log.error("the panel had to stop", exc_info=cause)
 
     def _first_words(self, error: BaseException) -> list[str]:
@@ -158,7 +173,9 @@ class LastWords(App[None]):
             words = self.last_words(error)
         except Exception:
             words = f"The panel had to stop after an internal error ({type(error).__name__})."
-        begun = self._work.begun if self._work is not None else ""
+        begun = ""
+        with suppress(Exception):
+            begun = self._work.begun if self._work is not None else ""
         return [words, begun] if begun else [words]
 
     def _ordered(self) -> LastWork | None:
@@ -168,17 +185,18 @@ class LastWords(App[None]):
             log.error("the last work was not ordered", exc_info=error)
             return None
 
-    def _follow(self, words: threading.Thread | None) -> None:
+    def _follow(self) -> None:
         """See the last work to its end; then the app may end, and has to soon."""
         for _ in range(TRIES):
             if self._work is not None:
                 break
             time.sleep(TRIED_AGAIN)
             self._work = self._ordered()
-        result = NOT_ORDERED
-        if self._work is not None:
-            with suppress(Exception):
-                result = self._work.follow()
+        try:
+            result = self._work.follow() if self._work is not None else NOT_ORDERED
+        except BaseException as error:
+            log.error("the last work was not followed", exc_info=error)
+            result = END_NOT_SEEN
         if result:
             self._unsaid.append(result)
         self._followed.set()
@@ -186,14 +204,11 @@ class LastWords(App[None]):
             last_resort = threading.Timer(ENDED_WITHIN, os._exit, (FAILED,))
             last_resort.daemon = True
             last_resort.start()
-        if words is not None:
-            words.join(SAID_WITHIN)
+        if self._saying is not None:
+            self._saying.join(SAID_WITHIN)
 
-    def _say_all(self) -> None:
+    def _say_all(self, screen: OwnScreen) -> None:
         """Give the terminal back, and say all there; in a thread, as it may take nothing."""
-        screen = self._driver
-        if not isinstance(screen, OwnScreen):
-            return
         screen.stop_application_mode()
         self._say(screen)
         self._followed.wait()
@@ -206,9 +221,10 @@ class LastWords(App[None]):
 
     def _print_error_renderables(self) -> None:
         """Say what could not be said before."""
-        for text in self._unsaid:
-            self.error_console.print(Text(text))
-        self._unsaid.clear()
+        if self._saying is None or not self._saying.is_alive():
+            for text in self._unsaid:
+                self.error_console.print(Text(text))
+            self._unsaid.clear()
         super()._print_error_renderables()
 
 
