@@ -150,6 +150,11 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
             f" details are in {place}."
         )
 
+    def leave_now(self) -> None:
+        """End the screen; may be called in any thread."""
+        super().leave_now()
+        self.release_input()
+
     def action_help(self) -> None:
         """Every key of the screen on top."""
         from tui.screens.keys.help import HelpScreen

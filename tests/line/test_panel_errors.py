@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
-import re
+import signal
+import sys
+import termios
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -90,6 +93,12 @@ HANGS = {
 """What may hang while the panel ends."""
 
 
+SLOW, QUICK = 6000, 5
+"""Ramps of the motor, in 0.1 s: longer than any of these tests, and soon over."""
+A_WHILE = 1.0
+"""Seconds in which a key or a signal would have had its effect."""
+
+
 @contextmanager
 def failing(
     folder: Path, *plants: tuple[str, str], dialog: str = "", options: tuple[str, ...] = ()
@@ -142,8 +151,7 @@ def _left(panel: PtyPanel) -> int | None:
 def below(output: bytes) -> list[str]:
     """The lines on the terminal below the screen that was left."""
     text = output.rpartition(b"\x1b[?1049l")[2].rpartition(b"\x1b[?1004l")[2]
-    # an answer of the terminal that was on its way is echoed once the panel has left
-    return re.sub(r"\^\[\[[0-9;]*R", "", text.decode()).splitlines()
+    return text.decode().splitlines()
 
 
 def logged() -> str:
@@ -228,6 +236,78 @@ def test_second_error_in_the_wait_is_reported_as_unknown(second: str, tmp_path: 
         ended(panel)
         assert panel.stops(writes) > 0
         assert below(panel.sent[sent:])[-1].startswith(begin + UNKNOWN)
+
+
+def hold_the_ramp(panel: PtyPanel, folder: Path) -> int:
+    """Let the errors come; the motor ramps down until `end_the_ramp`. The output before it."""
+    panel.simulation.drive(1).set("DEC", SLOW)
+    sent = len(panel.sent)
+    (folder / "now").touch()
+    wait_until(lambda: panel.look() and b"Stopping device 1." in panel.sent[sent:], "the sentence")
+    return sent
+
+
+def end_the_ramp(panel: PtyPanel) -> None:
+    """Let the motor stop soon."""
+    assert panel.simulation.drive(1).motor.frequency > 0
+    panel.simulation.drive(1).set("DEC", QUICK)
+
+
+def is_usual(terminal: int) -> bool:
+    """True if a terminal echoes, edits lines, and has keys that send signals."""
+    usual = termios.ECHO | termios.ICANON | termios.ISIG
+    flags: int = termios.tcgetattr(terminal)[3]
+    return flags & usual == usual
+
+
+def test_input_is_held_until_the_motor_stands(tmp_path: Path) -> None:
+    """Typed keys were echoed, and Ctrl-C ended the panel with status 130."""
+    with failing(tmp_path, ("RuntimeError", DRAW)) as panel:
+        sent = hold_the_ramp(panel, tmp_path)
+        shell = os.open(f"/proc/{panel.pid}/fd/0", os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            panel.type("\x1b[1;1R", "rm x\r\n", "\x03", "\x1c", "\x1a")
+            panel.look(A_WHILE)
+            assert not termios.tcgetattr(shell)[3] & (termios.ECHO | termios.ICANON | termios.ISIG)
+            end_the_ramp(panel)
+            wait_until(lambda: panel.look() and _left(panel) is not None, "the end of the panel")
+            assert _left(panel) == 70
+            assert is_usual(shell)
+            unread = int.from_bytes(fcntl.ioctl(shell, termios.FIONREAD, bytes(4)), sys.byteorder)
+            assert unread == 0
+        finally:
+            os.close(shell)
+        assert below(panel.sent[sent:])[1:] == ["Stopping device 1.", "Device 1: stopped."]
+
+
+ENDS = {
+    signal.SIGINT: 70,
+    signal.SIGTERM: 128 + signal.SIGTERM,
+    signal.SIGQUIT: 128 + signal.SIGQUIT,
+}
+"""The exit status if a signal arrives while the motor ramps down after an error."""
+
+
+@pytest.mark.parametrize("number", ENDS)
+def test_no_signal_ends_the_wait_for_the_motor(number: signal.Signals, tmp_path: Path) -> None:
+    with failing(tmp_path, ("RuntimeError", DRAW)) as panel:
+        sent = hold_the_ramp(panel, tmp_path)
+        os.kill(panel.pid, number)
+        panel.look(A_WHILE)
+        end_the_ramp(panel)
+        ended(panel, status=ENDS[number])
+        assert below(panel.sent[sent:])[-1] == "Device 1: stopped."
+        assert is_usual(panel.terminal)
+
+
+def test_signal_ends_a_wait_that_hangs_and_restores_the_terminal(tmp_path: Path) -> None:
+    hang = ("hang", "tui.screens.last_stops:LastStops.follow")
+    with failing(tmp_path, ("RuntimeError", DRAW), hang) as panel:
+        (tmp_path / "now").touch()
+        wait_until(lambda: panel.look() and b"Stopping device 1." in panel.sent, "the sentence")
+        os.kill(panel.pid, signal.SIGQUIT)
+        ended(panel, status=128 + signal.SIGQUIT)
+        assert is_usual(panel.terminal)
 
 
 @pytest.mark.parametrize("hang", HANGS)

@@ -11,6 +11,7 @@ import pytest
 from textual.app import App
 from textual.driver import Driver
 
+from tui.terminal.held_input import with_held_input
 from tui.terminal.last_words import END_NOT_SEEN, FAILED, LastWords
 
 BEGUN, RESULT, SENTENCE = "It is being done.", "It is done.", "It had to end."
@@ -75,7 +76,7 @@ class Ending(LastWords):
         self.on_end: Callable[[], None] = self.work.may_end.set
 
     def get_driver_class(self) -> type[Driver]:
-        return SlowDriver
+        return with_held_input(SlowDriver)
 
     def order_last_work(self) -> Work:
         return self.work
@@ -88,7 +89,6 @@ class Ending(LastWords):
 
     def on_unmount(self) -> None:
         self.on_end()
-        self.follow_last_work()
 
     @property
     def lines(self) -> list[str]:
@@ -127,6 +127,13 @@ def test_second_error_before_the_terminal_has_taken_all_loses_no_line(
     app.run()
     assert app.lines == [SENTENCE, BEGUN, RESULT]
     assert app.return_code == FAILED
+
+
+def test_end_that_does_not_wait_for_the_work_loses_no_line() -> None:
+    app = Ending()
+    app.on_end = lambda: threading.Timer(0.2, app.work.may_end.set).start()
+    app.run()
+    assert app.lines == [SENTENCE, BEGUN, RESULT]
 
 
 @pytest.mark.parametrize("error", [RuntimeError("lost"), SystemExit(3), KeyboardInterrupt()])

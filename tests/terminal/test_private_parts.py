@@ -124,6 +124,13 @@ def _driver_heeds_mouse() -> bool:
     return "mouse" in taken and "if not self._mouse" in _source("_enable_mouse_support")
 
 
+def _attributes_are_restored_if_known() -> bool:
+    ends = _source("stop_application_mode")
+    return "self.attrs_before = termios.tcgetattr" in _source("start_application_mode") and (
+        "if self.attrs_before is not None:" in ends and ends.count("tcsetattr") == 1
+    )
+
+
 def _pointer_shape() -> bool:
     from textual.app import App
 
@@ -335,6 +342,12 @@ PARTS = [
         "driver.py",
         "QuietDriver: what Textual asks of a terminal where no mouse is wanted",
         _driver_heeds_mouse,
+    ),
+    Part(
+        "LinuxDriver.attrs_before",
+        "held_input.py",
+        "with_held_input: when Textual restores the attributes of a terminal",
+        _attributes_are_restored_if_known,
     ),
     Part(
         "App._set_pointer_shape",

@@ -23,6 +23,7 @@ from textual._xterm_parser import XTermParser
 from textual.driver import Driver
 from textual.message import Message
 
+from .held_input import with_held_input
 from .loop import soon_in_loop
 from .reader import KeyReader, Pressed, Stops, TerminalInput
 from .stroke import attach
@@ -82,7 +83,7 @@ class Drawing(Protocol):
 @lru_cache(maxsize=1)
 def with_own_keys(driver: type[Driver]) -> type[Driver]:
     """The driver of this platform, asking for less and reading keys the panel's way."""
-    quiet = _quiet(_giving_back(driver))
+    quiet = _quiet(_giving_back(with_held_input(driver)))
     return _reading(quiet) if driver.__name__ == POSIX else _stopping(quiet)
 
 

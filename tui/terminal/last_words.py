@@ -61,6 +61,12 @@ class OwnScreen(Protocol):
     def say_below(self, text: str) -> None:
         """Write a line on the terminal that was given back."""
 
+    def hold_input(self) -> None:
+        """Keep typed keys without echo and signals, also after the screen was left."""
+
+    def release_input(self) -> None:
+        """Discard typed keys, then restore the terminal's attributes."""
+
 
 class LastWords(App[None]):
     """An app that orders its last work before all else when an error ends it."""
@@ -97,13 +103,23 @@ class LastWords(App[None]):
         try:
             result = super().run(**settings)
         except BaseException as error:
-            if not self._failing.locked():
+            if not self.failed:
                 raise
             log.error("another error while the panel ends", exc_info=error)
-        if self._failing.locked():
+        if self.failed:
             self._finish()
             self._return_code = FAILED
         return result
+
+    @property
+    def failed(self) -> bool:
+        """True if an error ends the app."""
+        return self._failing.locked()
+
+    def release_input(self) -> None:
+        """Release the input that an error has left held; in any thread."""
+        if self.failed and isinstance(self._driver, OwnScreen):
+            self._driver.release_input()
 
     def _finish(self) -> None:
         """See the end through, also if a second error interrupted it."""
@@ -112,6 +128,7 @@ class LastWords(App[None]):
         else:
             self._following.join()
         self._print_error_renderables()
+        self.release_input()
         if self._driver is not None:
             self._driver.close()  # writes what is still queued
 
@@ -144,7 +161,7 @@ class LastWords(App[None]):
             # SystemExit and KeyboardInterrupt, in whichever task, come by no other way
             self._begin_end(error)
             raise
-        if not self._failing.locked():
+        if not self.failed:
             self._work = self._ordered()
 
     def _loop_met(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -164,6 +181,7 @@ class LastWords(App[None]):
         cause = error.error if isinstance(error, WorkerFailed) else error
         self._unsaid = self._first_words(cause)
         if isinstance(screen := self._driver, OwnScreen):
+            screen.hold_input()
             self._saying = _started(lambda: self._say_all(screen), "last words", daemon=True)
         self._following = _started(self._follow, "last work")
         log.error("the panel had to stop", exc_info=cause)
@@ -206,6 +224,7 @@ class LastWords(App[None]):
             last_resort.start()
         if self._saying is not None:
             self._saying.join(SAID_WITHIN)
+        self.release_input()
 
     def _say_all(self, screen: OwnScreen) -> None:
         """Give the terminal back, and say all there; in a thread, as it may take nothing."""

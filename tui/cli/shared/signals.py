@@ -140,6 +140,10 @@ def _complain(text: str) -> None:
 class Stoppable(Protocol):
     """The panel as far as its end needs it."""
 
+    @property
+    def failed(self) -> bool:
+        """True if an error of its own ends it."""
+
     def stop_motors(self) -> bool:
         """Stop every motor that runs by an order from here; False where one runs on."""
 
@@ -152,7 +156,7 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[list[int]]:
     """While inside, a signal stops the motors first (with `stop`), then ends the panel.
 
     The number of the first signal is handed out. A hangup ends the panel even if it is ignored: a
-    panel without its terminal commands nothing.
+    panel without its terminal commands nothing. After an internal error SIGINT changes nothing.
     """
     came: list[int] = []
     ended = threading.Event()
@@ -169,6 +173,8 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[list[int]]:
             panel.leave_now()
 
     def handle(number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGINT and panel.failed:
+            return
         came.append(number)
         if len(came) == 1:
             # in a thread: the main one may be stuck with a terminal that takes nothing any more
