@@ -174,7 +174,8 @@ async def bench(
 
     def opener(_: str, **how: object) -> OpenLine:
         opened = open_line(text, **how)  # type: ignore[arg-type]
-        opened.devices = tuple(range(1, len(families) + 1))
+        opened.profiles = dict(enumerate(families, start=1))
+        opened.devices = tuple(opened.profiles)
         return opened
 
     app = DrivePanelApp(open_line=opener, start=text, read_only=read_only)
@@ -229,8 +230,6 @@ async def test_a_motor_that_stands_after_a_quick_stop_is_not_told_as_stopping() 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "powerdrive"))
 async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
     async with bench(family) as made:
-        assert made.app.chosen is not None
-        made.app.chosen.session.guessed = False  # as if its profile were typed
         await made.running()
         await until(made.pilot, lambda: runs(made.app))
         await made.run("v")

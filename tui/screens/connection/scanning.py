@@ -186,7 +186,9 @@ class Scanning(LineView):
             return
         named = None
         if not (typed or identity.profile):
-            named = await asyncio.to_thread(_named, self.app.line_text, identity.device)
+            opened = self.app.opened
+            named = opened.profiles.get(identity.device) if opened is not None else None
+            named = named or await asyncio.to_thread(_named, self.app.line_text, identity.device)
         wanted = typed or identity.profile or named or next(iter(identity.candidates), None)
         if wanted is None:
             fleet.note(identity)

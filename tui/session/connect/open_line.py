@@ -40,6 +40,8 @@ class OpenLine:
     simulation: Simulation | None = None
     devices: tuple[int, ...] = ()
     """Addresses known to be taken: those of a simulated line, else none."""
+    profiles: Mapping[int, str] = field(default_factory=dict)
+    """The profiles that the text of a simulated line names, by address."""
     known: KnownLine | None = None
     """Whether it is still what it was, where that is looked at; None for a simulated line."""
     again: Callable[[SerialLink], ModbusLine] | None = None
@@ -164,12 +166,13 @@ def _simulated(
     timing = Timing(min_timeout=1.0)
     line = Line(_serve(simulation), timing=timing, read_only=read_only)
     text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
-    devices = tuple(spec.address for spec in specs)
+    profiles = {spec.address: spec.profile for spec in specs}
 
     def again(other: SerialLink) -> ModbusLine:
         return Line(other, timing=timing, read_only=read_only)
 
-    return _opened(OpenLine(text, line, simulation, devices, again=again), wait)
+    opened = OpenLine(text, line, simulation, tuple(profiles), profiles, again=again)
+    return _opened(opened, wait)
 
 
 def _opened(opened: OpenLine, wait: float | None) -> OpenLine:
