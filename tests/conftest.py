@@ -16,9 +16,10 @@ from hypothesis import settings
 
 from tui.bus.line import Timing, timing_of
 from tui.bus.link import Link
-from tui.cli.shared.logs import stop_logging
+from tui.session.logs import stop_logging
 
 from .compiled import compile_tests
+from .programs import kill_keepers
 
 # each worker and each program of a test would compile all that it imports again
 sys.dont_write_bytecode = False
@@ -90,6 +91,7 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
     monkeypatch.setenv("TZ", "UTC")
     yield tmp_path
     stop_logging()
+    kill_keepers(tmp_path / "state" / "lines", tmp_path / "group")
 
 
 @pytest.fixture

@@ -13,9 +13,14 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
 
+from tui.bus.program import KEEPER
+from tui.bus.share.place import has_ended, owner_of_lock
+from tui.session.connect.share_place import group_folder
 from tui.simulator import Simulation
 
 PATIENCE = 60.0
@@ -77,6 +82,39 @@ def simulated(*arguments: str, stdin: int = subprocess.DEVNULL) -> Iterator[Serv
     command = [*DRIVEPANEL, "simulate", *arguments]
     with served(command, ready="Ready:", stdin=stdin) as program:
         yield program
+
+
+def keepers(*folders: Path) -> list[int]:
+    """Process ids of the keepers whose locks lie in these folders, or in those of the test."""
+    places = folders or (Path(os.environ["DRIVEPANEL_STATE"], "lines"), group_folder())
+    found = []
+    for lock in chain.from_iterable(one.glob("*.lock") for one in places):
+        owner = owner_of_lock(lock)
+        if owner is not None and owner.program.name == KEEPER and not has_ended(owner.program):
+            found.append(owner.program.pid)
+    return found
+
+
+def end_keepers(*folders: Path) -> None:
+    """End them; each would wait some seconds for the next program."""
+    for pid in (ended := keepers(*folders)):
+        os.kill(pid, signal.SIGTERM)
+    wait_until(lambda: not any(map(is_running, ended)), "the keepers end")
+
+
+def kill_keepers(*folders: Path) -> None:
+    """Leave none behind: their drives are gone, and some would wait for them."""
+    for pid in keepers(*folders):
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+def is_running(pid: int) -> bool:
+    """True for a process that has not ended; a zombie has."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (OSError, IndexError):
+        return False
 
 
 def _own_interrupts() -> None:

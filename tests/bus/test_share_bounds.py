@@ -251,7 +251,8 @@ SAMPLES: tuple[AnyMessage, ...] = (
     Facts((STRANGER,), {5: "stranger"}, {5: {"stranger": 1}}, {6: ("stranger", "why")}, {5: 1.0}),
     News(
         LineState(LineStatus.CONNECTED, "", 1.0, 2.0), LineCounters(3, busy_seconds=1.0),
-        {1: STATE}, {1: 0.5}, ((1.0, "out", b"\1\3", ""),),
+        {1: STATE}, {1: 0.5}, ("PortMissing", ErrorForm("gone", path="/dev/x", ports=("/dev/y",))),
+        ((1.0, "out", b"\1\3", ""),),
         {1: DeviceCounters(1, exceptions={2: 1})},
     ),
 )  # fmt: skip

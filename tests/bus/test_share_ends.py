@@ -343,7 +343,7 @@ async def test_another_user_is_turned_away_in_words(
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("panel")
-        monkeypatch.setattr("tui.bus.share.server.user_of", lambda _: os.getuid() + 4711)
+        monkeypatch.setattr("tui.bus.share.greeting.user_of", lambda _: os.getuid() + 4711)
         with pytest.raises(NotShared, match="other users only"):
             lines.open("foreign")
 

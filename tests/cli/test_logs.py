@@ -9,8 +9,8 @@ import threading
 
 from tests.programs import PATIENCE, wait_until
 from tests.sources import PACKAGE, calls_of
-from tui.cli.shared.logs import log_file, start_logging, stop_logging
 from tui.session.connect.open_line import open_line
+from tui.session.logs import log_file, start_logging, stop_logging
 
 
 async def unforeseen() -> None:
@@ -40,7 +40,7 @@ def test_every_module_logs_by_its_own_name() -> None:
         name = path.relative_to(PACKAGE).as_posix()
         named.setdefault(name, []).extend(ast.unparse(each) for each in call.args)
     # the one that hangs the handler, and the one that silences pymodbus
-    assert named.pop("cli/shared/logs.py") == ["PANEL", "PANEL"]
+    assert named.pop("session/logs.py") == ["PANEL", "PANEL"]
     assert named["bus/line.py"] == ["'pymodbus'", "'pymodbus'"]
     del named["bus/line.py"]
     assert len(named) > 3

@@ -132,7 +132,20 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", REFUSED.values(), ids=REFUSED)
+MAIN = (
+    "run at a reference, interlock", "reference above a limit", "run, another scale",
+    "write, motor runs", "run, read-only", "reset, no fault", "another family", "run, not armed",
+)  # fmt: skip
+"""The refusals outside the sweeps; each is a program of its own."""
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=name, marks=() if name in MAIN else pytest.mark.sweep)
+        for name, case in REFUSED.items()
+    ],
+)
 def test_status_5_means_that_nothing_was_written(case: Refused) -> None:
     installed_mixer(SCALE_BY)
     with counted(case.family, sets=case.sets, run_hz=case.run_hz) as served:

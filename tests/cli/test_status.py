@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from tests.programs import drivepanel, free_port
 from tui.bus.errors import RequestRefused
 from tui.cli.shared.errors import told
-from tui.cli.shared.logs import log_file, start_logging, stop_logging
 from tui.drive.errors import ValueRefused
+from tui.session.logs import log_file, start_logging, stop_logging
 
 from .commands import ended, tcp_line
 

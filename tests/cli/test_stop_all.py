@@ -79,7 +79,8 @@ def test_stop_of_a_guessed_family_reports_not_stopped(way: tuple[str, ...]) -> N
         assert "Read as Powerdrive, it is at standstill" in done.stderr
         assert "Device 1, " not in done.stdout
         assert ("Device 2, Altivar 71: stopped." in done.stdout) is ("2" in way)
-        one, *_ = documents(ended(4, "stop", line, *way, "--json").stdout)
+        found = documents(ended(4, "stop", line, *way, "--json").stdout)
+        one = next(document for document in found if document["device"] == 1)
         assert (one["profile"], one["stopped"], one["status"]) == (None, False, 4)
         named = ended(0, "stop", line, *way, "-p", "powerdrive")
         assert "Device 1, Powerdrive: stopped." in named.stdout

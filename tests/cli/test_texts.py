@@ -11,12 +11,12 @@ import pytest
 
 from tests.drive.test_add_a_drive import example
 from tests.sweeps import kept
-from tui.cli.shared.logs import stop_logging
 from tui.cli.shared.output import json_text
 from tui.cli.shared.say import printable
 from tui.drive.plain import commands
 from tui.drive.profile import library
 from tui.drive.settings.set_file import read_set
+from tui.session.logs import stop_logging
 from tui.simulator import DriveSpec, Simulation
 
 from .commands import invoked, refused, run

@@ -14,7 +14,7 @@ from typing import Any
 import click
 import pytest
 
-from tests.programs import DRIVEPANEL, port_of, served, simulated
+from tests.programs import DRIVEPANEL, end_keepers, port_of, served, simulated
 from tui.cli.commands.watch import watch
 from tui.cli.shared.options import Target
 from tui.cli.shared.several_lines import LineWish, further_lines, lines_wished, split_addresses
@@ -124,6 +124,7 @@ def test_a_line_that_is_lost_does_not_stop_the_others_and_ctrl_c_ends_all() -> N
     assert "drivepanel: pump: " in said
     assert "Ended by Ctrl-C after" in said
     assert "Traceback" not in said
+    end_keepers()
     assert sockets() == []
 
 

@@ -34,8 +34,8 @@ DEFECTS = (
     Defect(
         "listener-takes-an-owned-line",
         "tui/bus/listening_line.py",
-        "            if self._lock.take():\n",
-        "            if self._lock.take() or True:\n",
+        "if self._lock.take() or (",
+        "if True or (",
         "Listening takes the replies from the panel that commands a motor.",
         ("tests/bus/test_listening_line.py::test_a_line_of_another_drivepanel_is_left_to_it",),
     ),

@@ -101,7 +101,7 @@ DEFECTS = (
     ),
     Defect(
         "log-of-a-full-disk-tells-tracebacks",
-        "tui/cli/shared/logs.py",
+        "tui/session/logs.py",
         "[return-value]\n\n    def handleError(",
         "[return-value]\n\n    def handle_error(",
         "A full disk answers a stop that worked with six tracebacks.",
@@ -249,7 +249,7 @@ DEFECTS = (
     ),
     Defect(
         "log-commands-the-terminal",
-        "tui/cli/shared/logs.py",
+        "tui/session/logs.py",
         "return plain(super().format(record), lines=True)",
         "return super().format(record)",
         "Who prints the log has the screen blanked.",
@@ -281,9 +281,9 @@ DEFECTS = (
     ),
     Defect(
         "log-thread-takes-the-signals",
-        "tui/cli/shared/logs.py",
-        "        take_no_signals()\n",
-        "",
+        "tui/session/logs.py",
+        "            signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())\n",
+        "            pass\n",
         "The system suspends the program by the one thread that does not hold the signal back.",
         ("tests/line/test_signals.py",),
     ),

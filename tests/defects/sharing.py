@@ -15,6 +15,38 @@ BLOCK = "tests/cli/test_block.py"
 
 DEFECTS = (
     Defect(
+        "keeper-keeps-the-port",
+        "tui/bus/share/keeper_share.py",
+        "        while self._needed:\n            await asyncio.sleep(CARE_INTERVAL)\n",
+        "        while True:\n            await asyncio.sleep(CARE_INTERVAL)\n",
+        "A port stays in use after the last program has left the line.",
+        ("tests/line/test_keeper.py::test_the_port_is_free_when_the_last_program_has_ended",),
+    ),
+    Defect(
+        "keeper-knows-nothing-of-the-one-before",
+        "tui/bus/share/keeper_share.py",
+        "set_programs(self._keeping.before)",
+        "set_programs(())",
+        "A motor runs on whose program died together with the keeper of its line.",
+        ("tests/line/test_keeper.py::test_the_motor_stops_when_its_program_dies_with_the_keeper",),
+    ),
+    Defect(
+        "keeper-has-the-output-of-a-command",
+        "tui/keeper/starting.py",
+        "stdout=subprocess.DEVNULL",
+        "stdout=None",
+        "A shell waits for the output of a command until the keeper ends.",
+        ("tests/line/test_keeper.py::test_it_inherits_nothing_and_outlives_its_command",),
+    ),
+    Defect(
+        "lost-line-without-its-error",
+        "tui/bus/share/news_heard.py",
+        "error_of(*news.failure) if news.failure is not None else None",
+        "None",
+        "A port that is not there is waited for, and not reported as missing.",
+        ("tests/line/test_keeper.py::test_a_port_that_is_not_there_is_reported_at_once",),
+    ),
+    Defect(
         "no-way-past-not-told",
         "tui/bus/share/direct.py",
         "            self._dispatcher.fail_all(self.trouble, LineLost)",
@@ -180,7 +212,7 @@ DEFECTS = (
     Defect(
         "successor-does-not-wait",
         "tui/bus/share/sharing.py",
-        "await asyncio.sleep(max(0.0, self._quiet_until - inside.clock()))",
+        "await asyncio.sleep(max(0.0, self._quiet_until - self._inside.clock()))",
         "pass",
         "The answer to the killed program's request is taken for the next one's.",
         (ENDS,),

@@ -13,6 +13,7 @@ import pytest
 
 from tests.conftest import need_peer
 from tests.programs import PATIENCE
+from tui.__main__ import NO_KEEPER
 
 from .pty_panel import PtyPanel, panel_on_a_pty
 from .terminal import Terminal
@@ -43,6 +44,20 @@ def _built(source: str, folder: Path) -> Path | str:
         return "gcc is not here; it comes with the package gcc."
     assert built.returncode == 0, built.stderr
     return target
+
+
+@pytest.fixture(params=["keeper", "inside"])
+def holder(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The line is held by a keeper, or by the program that opens it first."""
+    if request.param == "inside":
+        monkeypatch.setenv(NO_KEEPER, "1")
+    return str(request.param)
+
+
+@pytest.fixture
+def held_inside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program that opens a line first holds it, as where no keeper can be started."""
+    monkeypatch.setenv(NO_KEEPER, "1")
 
 
 @pytest.fixture(scope="session")

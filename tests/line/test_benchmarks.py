@@ -24,6 +24,7 @@ SMALL = {
     "gateway": "--seconds 0.3 --rounds 1",
     "hands": "--bursts 2 --keys 8 --ends 1 --resizes 24",
     "hostile": "--cases 20",
+    "keeper": "--rounds 1 --seconds 2",
     "keys": "",
     "line": "--families atv31 --bauds 19200 --seconds 0.2",
     "scan": "--addresses 4 --rounds 1",

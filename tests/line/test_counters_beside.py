@@ -25,11 +25,11 @@ def test_counters_beside_a_panel_are_those_of_both_and_a_reset_is_seen_there(
         panel.press("Tab")
         panel.press("Tab")
         panel.wait_for("function 8")
-        # the panel owns the line and counts for both; nothing is lost, and that is said
+        # the keeper of the line counts for both; nothing is lost, and that is said
         done = drivepanel("counters", line, "-d", "1", "--frames", "20", "--for", "1", "--json")
         assert done.returncode == 0, done.stdout + done.stderr
         told = json.loads(done.stdout)
-        assert told["counted_by"].startswith("panel")
+        assert told["counted_by"].startswith("keeper")
         assert told["test"] == {"frames": 20, "answered": 20}
         assert told["ours"]["frames"] > 20, "what the panel sends meanwhile belongs to it"
         assert told["differences"] == []

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -16,6 +17,9 @@ from tui.simulator import DriveSpec, Simulation
 
 from .terminal import Terminal, runs
 from .test_ways_to_end import running
+
+INSIDE = pytest.mark.usefixtures("held_inside")
+"""A keeper would stop the motor: see test_keeper for its own death."""
 
 Start = Callable[[list[str]], Terminal]
 PANEL = [sys.executable, "-m", "tui"]
@@ -31,6 +35,7 @@ def frames(simulation: Simulation) -> int:
     return simulation.drive(1).raw("CMD")
 
 
+@INSIDE
 def test_the_next_panel_knows_the_motor_and_takes_it_over(
     terminal_with: Start, second_terminal: Start
 ) -> None:
@@ -57,6 +62,7 @@ def test_the_next_panel_knows_the_motor_and_takes_it_over(
         wait_until(lambda: not runs(terminal.client()), "the second panel ended")
 
 
+@INSIDE
 def test_a_motor_that_is_disowned_is_not_left_without_a_question(
     terminal_with: Start, second_terminal: Start
 ) -> None:
@@ -73,6 +79,7 @@ def test_a_motor_that_is_disowned_is_not_left_without_a_question(
         assert made.speed > 2
 
 
+@INSIDE
 def test_a_stop_that_was_seen_withdraws_the_offer(
     terminal_with: Start, second_terminal: Start
 ) -> None:
@@ -89,6 +96,7 @@ def test_a_stop_that_was_seen_withdraws_the_offer(
         assert "Runs since" not in terminal.text()
 
 
+@pytest.mark.usefixtures("holder")
 def test_a_motor_left_running_on_purpose_is_told_of(
     terminal_with: Start, second_terminal: Start
 ) -> None:
@@ -98,6 +106,7 @@ def test_a_motor_left_running_on_purpose_is_told_of(
         terminal.wait_for("A motor runs by your command")
         terminal.answer("l")
         made.ended()
+        time.sleep(3)
         assert made.speed > 2
         again(second_terminal, made.line).wait_for("Runs since", "left running on purpose")
 
@@ -145,7 +154,7 @@ class Killed(NamedTuple):
 
 
 @pytest.fixture
-def killed() -> Iterator[Killed]:
+def killed(held_inside: None) -> Iterator[Killed]:
     """A `run` that was killed; the drive itself acts after 30 s without a request."""
     with Simulation(
         [DriveSpec("atv71", 1, sets={"TTO": 300}), DriveSpec("atv71", 2)]

@@ -251,6 +251,7 @@ def test_publishing_keeps_no_motor_running_whose_client_died(programs: ExitStack
     wait_until(lambda: up(program), "it is read again")
 
 
+@pytest.mark.usefixtures("held_inside")
 def test_a_serve_that_comes_back_feeds_no_motor_of_the_one_before(programs: ExitStack) -> None:
     spec = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 30})
     simulation, line = programs.enter_context(bench(spec))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.programs import DRIVEPANEL, PATIENCE, served
+from tests.programs import DRIVEPANEL, PATIENCE, end_keepers, served
 from tui.simulator import DriveSpec, Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -150,4 +150,5 @@ def test_serve_opens_its_socket_for_the_group_that_it_is_told(
         assert done.returncode == 0
         assert "Shared with serve" in done.stderr
         assert one.end()[0] == 0
+    end_keepers()
     assert not list(folder.glob("*.sock"))

@@ -198,7 +198,7 @@ async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None
     """Its socket closes before its number is free: its start would be a living program's."""
     bench.started(1)
     living = {"100"}
-    bench.starts._processes.started = lambda pid: (  # type: ignore[method-assign]
+    bench.starts.processes.started = lambda pid: (  # type: ignore[method-assign]
         "100" if living or pid in (os.getpid(), LIVING) else None
     )
     bench.guardian()

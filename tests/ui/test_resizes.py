@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.widgets.small import is_too_small
 
@@ -63,7 +64,7 @@ def random_sizes(count: int, seed: int) -> list[tuple[int, int]]:
 PLACES = [*SCREENS, *DIALOGS]
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", kept(PLACES, *PLACES[::3]))
 async def test_awkward_sizes_end_no_screen(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     await resizes(monkeypatch, [*AWKWARD, *random_sizes(3, PLACES.index(place))], place)
 

@@ -51,6 +51,7 @@ class PortRefused(LineError):
 
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
+        self.reason = reason
         super().__init__(f"{path} cannot be opened: {reason}")
 
 

@@ -44,7 +44,7 @@ from .schedule.patience import Devices
 from .schedule.queue import Job
 from .schedule.worker import ThreadWork, Worker
 from .share.place import SharePlace
-from .share.sharing import Sharing
+from .share.sharing import ShareLine, Sharing
 from .shared_facts import SharedFacts
 from .trace import Frame
 
@@ -89,15 +89,15 @@ class Line:
         clock: Callable[[], float] = time.monotonic,
         place: SharePlace | None = None,
         program: Program | None = None,
+        share: ShareLine = Sharing,
     ) -> None:
-        self.link = link
-        self.read_only = read_only
+        self.link, self.read_only = link, read_only
         self.held = ""
         self.timing = timing or timing_of(link)
         self.facts = SharedFacts(program)
         """What the programs on the line know of each other."""
-        share = partial(Sharing, place) if place is not None else None
-        self._engine = Engine(link, self.timing, clock, self.facts, share)
+        shared = partial(share, place) if place is not None else None
+        self._engine = Engine(link, self.timing, clock, self.facts, shared)
         self.pace = self._engine.pace
         """Shares the line's time out among regular polls."""
 

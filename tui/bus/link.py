@@ -153,6 +153,13 @@ def label(link: Link) -> str:
             return f"rtu-tcp:{_bracketed(host)}:{port}{timeout}"
 
 
+def absolute(link: Link) -> Link:
+    """The same with the whole path of its port, for a process in another folder."""
+    if isinstance(link, SerialLink) and os.path.exists(link.path):
+        return replace(link, path=os.path.abspath(link.path))
+    return link
+
+
 def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 

@@ -9,6 +9,7 @@ from typing import Self
 from .errors import NotShared, PortBusy
 from .link import SerialLink, character_time, silence
 from .program import Program
+from .share.keeping import ends_unneeded
 from .share.messages import VERSION
 from .share.place import Owner, OwnerLock, SharePlace, owner_of
 from .transport.ports import is_pseudo_terminal
@@ -72,10 +73,10 @@ class ListeningLine:
         if self._lock is None or self._place is None:
             return
         with suppress(OSError):  # without a lock the port itself is locked
-            if self._lock.take():
+            owner = owner_of(self._place)
+            if self._lock.take() or (owner is not None and ends_unneeded(owner, self._lock)):
                 self._lock.tell(Owner(VERSION, self._program, ""))
                 return
-            owner = owner_of(self._place)
             who = f"drivepanel {owner.program.text}" if owner is not None else "another drivepanel"
             raise NotShared(
                 f"{who} has {self.link.path}, and a port that is listened to can have no other"

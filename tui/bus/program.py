@@ -6,6 +6,9 @@ import msgspec
 
 from .bounds import Number, ProgramId, Word
 
+KEEPER = "keeper"
+"""The name of the process that holds a line for the programs on it."""
+
 
 class Program(msgspec.Struct, frozen=True):
     """A program on the line, as others name it."""

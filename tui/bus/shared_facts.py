@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from .facts_heard import FactsHeard, LineVoice, heard
-from .program import Program
+from .program import KEEPER, Program
 from .stop_counts import GivenStops, StopCounts
 
 DEPARTED_KEPT = 16
@@ -46,8 +46,9 @@ class SharedFacts(FactsHeard):
 
     @property
     def others(self) -> tuple[Program, ...]:
-        """The other programs on the line."""
-        return tuple(one for one in self.programs if one.id != self.me.id)
+        """The other programs on the line; its keeper is none."""
+        mine = self.me.id
+        return tuple(one for one in self.programs if one.id != mine and one.name != KEEPER)
 
     def program(self, id: str) -> Program | None:
         """A program on the line."""
@@ -59,6 +60,7 @@ class SharedFacts(FactsHeard):
         commanders: Mapping[int, str],
         given: GivenStops,
         hushed: Mapping[int, tuple[str, str]],
+        departed: tuple[Program, ...] = (),
     ) -> tuple[int, ...]:
         """Take over what the owner tells; what this program claims is its own until denied.
 
@@ -72,6 +74,9 @@ class SharedFacts(FactsHeard):
             self.hushed = MappingProxyType({**told, **own})
             self.commanders = MappingProxyType({**others, **mine})
             unheard = self.stops.replace(given, self.me.id)
+            known = {one.id for one in (*self.departed, *programs, self.me)}
+            earlier = tuple(one for one in departed if one.id not in known)
+            self.departed = (*earlier, *self.departed)[-DEPARTED_KEPT:]
         self.set_programs(programs)
         return unheard
 

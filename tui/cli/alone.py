@@ -5,8 +5,9 @@ from __future__ import annotations
 import gc
 import sys
 
+from tui.session.logs import start_logging
+
 from .opening import open_panel, terminal_trouble
-from .shared.logs import start_logging
 
 
 def alone() -> None:

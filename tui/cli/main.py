@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import tui
+from tui.session.logs import start_logging
 
 from .shared.errors import plain_errors
 from .shared.lines import is_line
-from .shared.logs import start_logging
 from .shared.typed import note_typed
 
 if TYPE_CHECKING:

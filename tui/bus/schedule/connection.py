@@ -104,6 +104,7 @@ class Connection:
         around: LineContext,
         dispatcher: Dispatcher,
         changed: Callable[[LineState, LineError | None], None],
+        quiet_after: Callable[[], float],
         shared: SharedLine | None = None,
         last_way: LastWay | None = None,
     ) -> None:
@@ -113,6 +114,7 @@ class Connection:
         self._around = around
         self._dispatcher = dispatcher
         self._changed = changed
+        self._quiet_after = quiet_after
         self._failures = 0
         self._lost_since: float | None = None
         self.refusal: LineError | None = None
@@ -124,6 +126,7 @@ class Connection:
         while True:
             try:
                 await self._once()
+                continue
             except LineError as error:
                 failure = error
             except Exception as error:
@@ -140,10 +143,10 @@ class Connection:
                 self._dispatcher.fail_all(str(failure), kind)
             except Exception:
                 log.exception("what waits for the line was not told that it is lost")
-            await asyncio.sleep(delay)
+            await (self._shared.pause(delay) if self._shared else asyncio.sleep(delay))
 
     async def _once(self) -> None:
-        """One connection from opening to loss; always raises."""
+        """One connection, from opening until nobody needs it any more. Raises when it is lost."""
         if self._shared is not None:
             await self._shared.own(self._say_of_owner)
         master = await open_master(
@@ -154,21 +157,42 @@ class Connection:
             self._failures = 0
             if self._last_way is not None:
                 self._last_way.master = master
-            await self._dispatcher.serve(master)
+            await self._serve(master)
         finally:
             if self._last_way is not None:
                 self._last_way.lose()
+            quiet = self._quiet_after()
             master.close()
+            if self._shared is not None:
+                self._dispatcher.in_flight = False
+                self._shared.rest(quiet)
+        self._say(LineStatus.CONNECTING)
+
+    async def _serve(self, master: Master) -> None:
+        """Serve requests; return when the line is held for other programs and none needs it."""
+        if self._shared is None or not self._shared.keeps:
+            await self._dispatcher.serve(master)
+            return
+        serving = asyncio.ensure_future(self._dispatcher.serve(master))
+        unwanted = asyncio.ensure_future(self._shared.unwanted())
+        try:
+            done, _ = await asyncio.wait((serving, unwanted), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (serving, unwanted):
+                task.cancel()
+            await asyncio.wait((serving, unwanted))
+        for task in done:
+            task.result()
 
     def _say_opened(self, note: str) -> None:
         self._say(LineStatus.CONNECTED, note)
 
-    def _say_of_owner(self, status: LineStatus, text: str) -> None:
+    def _say_of_owner(self, status: LineStatus, text: str, error: LineError | None) -> None:
         """What the program tells that owns the line; its requests are its own business."""
         if status is LineStatus.CONNECTED:
             self.refusal = None
             self._failures = 0
-        self._say(status, text)
+        self._say(status, text, error)
 
     def _say(
         self,

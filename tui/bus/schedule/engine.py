@@ -79,7 +79,14 @@ class Engine:
         )
         around = LineContext(timing, self.trace, self.tally, clock, self._dispatcher.stray)
         inside = LineInside(
-            link, around, self._dispatcher, self.devices, self.pace, lambda: self.state, self._take
+            link,
+            around,
+            self._dispatcher,
+            self.devices,
+            self.pace,
+            lambda: self.state,
+            lambda: self._error,
+            self._take,
         )
         self._shared = share(inside) if share is not None else None
         self._last_way = self._dispatcher.last_way = LastWay(
@@ -89,7 +96,13 @@ class Engine:
             lambda data: self.trace.add(clock(), "out", data),
         )
         self._connection = Connection(
-            link, around, self._dispatcher, self._changed, self._shared, self._last_way
+            link,
+            around,
+            self._dispatcher,
+            self._changed,
+            self._quiet_after,
+            self._shared,
+            self._last_way,
         )
 
     def start(self, wait: float | None) -> None:
@@ -109,7 +122,9 @@ class Engine:
 
     def _await_connection(self, wait: float) -> None:
         with self._news:
-            self._news.wait_for(self._is_decided, wait)
+            while not self._news.wait_for(self._is_decided, wait):
+                if self._shared is None or not self._shared.starts:
+                    break
             if self.state.status is LineStatus.CONNECTED or self._is_stops_only():
                 return
             error = self._error

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from ..errors import LineError
 from ..link import Link
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
@@ -26,6 +27,8 @@ class LineInside:
     devices: Devices
     pace: Pace
     state: Callable[[], LineState]
+    error: Callable[[], LineError | None]
+    """The reason why the line is lost."""
     submit: Callable[[Job], None]
     """Queues a job, or fails it at once where the line is lost."""
 
@@ -45,15 +48,35 @@ class LineInside:
         return self.dispatcher.facts
 
 
+Say = Callable[[LineStatus, str, LineError | None], None]
+"""Tell the line's status, what is to be said of it, and the error that a lost one has."""
+
+
 class SharedLine(Protocol):
     """Other programs on the line; see tui.bus.share."""
+
+    keeps: bool
+    """True if the line is held for other programs alone: open as long as one is attached."""
+
+    @property
+    def starts(self) -> bool:
+        """True while the process starts that is to hold the line, for some time."""
 
     @property
     def stops_only(self) -> bool:
         """Whether the owner is frozen, so that nothing but stops goes out."""
 
-    async def own(self, say: Callable[[LineStatus, str], None]) -> None:
+    async def own(self, say: Say) -> None:
         """Return once this program owns the line; until then its requests go to the owner."""
+
+    async def unwanted(self) -> None:
+        """Return once no program needs the line; only where `keeps`."""
+
+    async def pause(self, seconds: float) -> None:
+        """Wait before a lost line is tried again; a program that comes ends the wait."""
+
+    def rest(self, quiet: float) -> None:
+        """The port is closed; a reply may still come for `quiet` seconds."""
 
     def pass_on(self, message: bytes) -> bool:
         """Send a finished message to the owner; False if none takes it."""

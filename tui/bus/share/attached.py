@@ -12,7 +12,7 @@ from functools import partial
 from ..bounds import MOST_BYTES, MOST_FRAMES
 from ..errors import RequestRefused
 from ..limits import CAUTIOUS, Limits
-from ..model import DeviceCounters, DeviceState, Reply
+from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
@@ -49,6 +49,8 @@ class Client:
     frames: int = 0
     """How many frames of the line it was told of."""
     limits: dict[int, Limits] = field(default_factory=dict)
+    stops_left: list[Job] = field(default_factory=list)
+    """Stops that it had asked when it went."""
     asked: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
     counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
@@ -84,10 +86,18 @@ class Client:
 
     def drop(self) -> None:
         """Have nothing to do with it any more; it may come back."""
+        self.forget()
+        self.writer.transport.abort()
+
+    def forget(self) -> list[Job]:
+        """Drop what it asked, except stops: they are sent although no program waits for them."""
         asked, self.asked = self.asked, {}
         for job in asked.values():
-            job.answer.cancel()
-        self.writer.transport.abort()
+            if job.priority is Priority.STOP:
+                self.stops_left.append(job)
+            else:
+                job.answer.cancel()
+        return self.stops_left
 
     def ask(self, inside: LineInside, message: Asking) -> None:
         """It asks for something on the line. Raises NoMessage."""
@@ -143,4 +153,6 @@ class Client:
         counted = {d: one for d, one in counters.devices.items() if self.counted.get(d) != one}
         self.counted = counters.devices
         plain = replace(counters, devices={})
-        return News(inside.state(), plain, changed, shares, frames, counted)
+        error = inside.error()
+        failure = failure_told(error) if error is not None else None
+        return News(inside.state(), plain, changed, shares, failure, frames, counted)

@@ -5,16 +5,15 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ..errors import OWNER_SILENT, NotShared
 from ..link import label
-from ..model import LineState, LineStatus
-from ..schedule.inside import LineInside
-from ..trace import Frame
+from ..model import LineStatus
+from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
 from .lease import SILENT_OWNER
 from .messages import (
@@ -31,6 +30,7 @@ from .messages import (
     Granting,
     Hello,
     Here,
+    Hush,
     News,
     NoMessage,
     PollWish,
@@ -42,6 +42,7 @@ from .messages import (
     next_message,
     packed,
 )
+from .news_heard import NewsHeard
 from .past_owner import PastOwner
 from .place import Owner, short_path
 from .voices import ProgramVoice
@@ -51,13 +52,13 @@ log = logging.getLogger(__name__)
 WATCH_INTERVAL = 0.1
 LOOKS_A_SIGN = 4
 """Looks at the owner for each own sign of life."""
+LEAVE_WITHIN = 1.0
+"""Seconds that a program which leaves waits for the port to be closed."""
 WAITED_ENOUGH = 5.0
 """Seconds that a request waits for a frozen owner before it is told so."""
 
 STOP_UNHEARD = ("a stop while nobody owned the line", "a stop while this program stood still")
 STOOD_STILL = "This program stood still and was taken for gone: it commands nothing any more."
-
-Say = Callable[[LineStatus, str], None]
 
 
 class OwnerAway(Exception):
@@ -74,15 +75,12 @@ class ShareClient:
         self._loop = asyncio.get_running_loop()
         self.writer: asyncio.StreamWriter | None = None
         self._asked = RequestsAsked(inside, past, self._tell)
-        self._state: LineState | None = None
-        self._note = ""
+        self._news = NewsHeard(inside, say)
         self._wish: tuple[dict[int, float], bool] = ({}, False)
         self._past = past
         self._gone, self._told = False, ""
-        self.again = False
-        """Whether this program was attached to the line before."""
-        self.taken_in = False
-        """Whether it was attached to this owner."""
+        self.again = False  # attached to the line before
+        self.taken_in = False  # attached to this owner
         self.heard = inside.clock()
         """When the owner last gave a sign of life."""
         self.quiet_until = 0.0
@@ -111,7 +109,12 @@ class ShareClient:
             closing = False
         finally:
             self._inside.facts.voice = None
+            # what is said from here on would not be heard: a stop takes another way
+            self.writer = None
+            frozen = self.frozen
             await self._past.end()
+            if closing and self.taken_in and not frozen:
+                await self._leave(reader, writer)
             with suppress(OSError, RuntimeError):
                 writer.close()
             self._asked.give_up_all(closing=closing)
@@ -124,8 +127,17 @@ class ShareClient:
         finally:
             for task in tasks:
                 task.cancel()
+            await asyncio.wait(tasks)
         for task in done:
             task.result()
+
+    async def _leave(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Tell the owner, and wait for its answer: a program that needs the port may follow."""
+        with suppress(OSError, RuntimeError, TimeoutError):
+            writer.write(packed(Goodbye()))
+            async with asyncio.timeout(LEAVE_WITHIN):
+                while await reader.read(1 << 12):
+                    pass
 
     def _greet(self) -> None:
         facts = self._inside.facts
@@ -144,13 +156,15 @@ class ShareClient:
         except (EOFError, OSError, NoMessage) as error:
             raise OwnerAway from error
         self._hear_life()
+        if isinstance(message, Goodbye):
+            self.quiet_until = self.heard + message.quiet
+            raise OwnerAway
         if isinstance(message, TurnedAway):
             raise NotShared(message.why)
         if not isinstance(message, Welcome):
             raise NotShared(f"{self._owner.program.text} owns the line and does not share it.")
-        self._note = f"Shared with {message.owner.text}."
         if not message.asked:
-            self._note += f" It is open as {message.label}."
+            self._news.note = f" It is open as {message.label}."
         self._gone, self.taken_in = message.gone, True
         self._claim()
 
@@ -165,6 +179,9 @@ class ShareClient:
                 facts.hear_denied(device, STOOD_STILL)
             else:
                 self._tell(Claim(device, True))
+        for device, (program, why) in facts.hushed.items():
+            if program == facts.me.id:
+                self._tell(Hush(device, why))
         if self._gone:
             self._inside.dispatcher.void_older(self._inside.clock(), STOOD_STILL)
 
@@ -228,13 +245,13 @@ class ShareClient:
         if self.frozen:
             self._past.leave()
             self._told = ""
-            self._tell_state()
+            self._news.tell_state()
 
     def _help_stops(self, silent: float) -> None:
         """Send stops past the frozen owner; tell others that they wait in vain."""
         if (told := self._past.told) != self._told:
             self._told = told
-            self._say(LineStatus.LOST, told)
+            self._say(LineStatus.LOST, told, None)
         self._asked.send_past()
         for job in self._inside.dispatcher.take_all():
             self._asked.send(job)
@@ -250,7 +267,7 @@ class ShareClient:
             case Answer() | Failed():
                 self._asked.answered(message)
             case News():
-                self._hear_news(message)
+                self._news.hear(message)
             case Facts():
                 self._hear_facts(message)
             case RollCall(number=number):
@@ -276,30 +293,12 @@ class ShareClient:
     def _hear_facts(self, told: Facts) -> None:
         facts = self._inside.facts
         facts.stops.learn_times(told.stopped)
-        unheard = facts.learn(told.programs, told.commanders, told.stops, told.hushed)
-        if unheard and self.again:
-            # given while this program was with no owner
+        unheard = facts.learn(
+            told.programs, told.commanders, told.stops, told.hushed, told.departed
+        )
+        if unheard and self.again:  # given while this program was with no owner
             facts.hear_stop(unheard, STOP_UNHEARD[self._gone], self._owner.program)
             self._inside.dispatcher.void()
-
-    def _hear_news(self, news: News) -> None:
-        inside = self._inside
-        for device, state in news.devices.items():
-            inside.devices.copy(device, state)
-        inside.around.tally.copy(news.counters, news.counted)
-        inside.pace.others = news.shares
-        for time, direction, data, note in news.frames:
-            inside.around.trace.append(
-                Frame(time, "out" if direction == "out" else "in", data, note)
-            )
-        if news.state != self._state:
-            self._state = news.state
-            self._tell_state()
-
-    def _tell_state(self) -> None:
-        if self._state is not None:
-            connected = self._state.status is LineStatus.CONNECTED
-            self._say(self._state.status, self._note if connected else self._state.reason)
 
     def _soon(self, message: AnyMessage) -> None:
         with suppress(RuntimeError):

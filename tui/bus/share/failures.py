@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
 from ..bounds import (
     MOST_BYTES,
@@ -25,10 +26,16 @@ from ..errors import (
     LineFailed,
     LineLost,
     NoAnswer,
+    PortBusy,
+    PortMissing,
+    PortRefused,
     RequestRefused,
     Superseded,
     WrongReply,
 )
+
+MOST_PORTS = 64
+"""Serial ports that a message names; more are left out."""
 
 
 class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -43,6 +50,10 @@ class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
     code: ByteValue = 0
     meaning: Text = ""
     register: RegisterAddress = 0
+    path: Text = ""
+    holder: Text | None = None
+    ports: Annotated[tuple[Text, ...], Meta(max_length=MOST_PORTS)] = ()
+    reason: Text = ""
     retry_in: Seconds | None = None
 
 
@@ -59,6 +70,9 @@ _MADE: Mapping[str, Callable[[ErrorForm], LineError]] = {
         e.device, e.function, e.address, e.code, e.meaning
     ),
     "Superseded": lambda e: Superseded(e.device, e.register),
+    "PortBusy": lambda e: PortBusy(e.path, e.holder),
+    "PortMissing": lambda e: PortMissing(e.path, e.ports),
+    "PortRefused": lambda e: PortRefused(e.path, e.reason),
 }
 """How each error with fields of its own is made anew."""
 
@@ -78,6 +92,8 @@ def failure_told(error: BaseException) -> tuple[str, ErrorForm]:
 
 def _clipped(value: Any) -> Any:
     """A text or bytes without its beginning, if it is longer than a message may carry."""
+    if isinstance(value, tuple):
+        return value[:MOST_PORTS]
     return value[-MOST_BYTES:] if isinstance(value, str | bytes) else value
 
 

@@ -23,9 +23,10 @@ class Listening:
     """Listens for programs of one line; lives in the line's loop."""
 
     def __init__(
-        self, place: SharePlace, lock: OwnerLock, facts: SharedFacts, welcome: TakeIn
+        self, place: SharePlace, lock: OwnerLock, facts: SharedFacts, line: str, welcome: TakeIn
     ) -> None:
         self._place = place
+        self._line = line
         self._lock = lock
         self._facts = facts
         self._stopped: dict[int, float] = {}
@@ -97,7 +98,9 @@ class Listening:
     def _tell(self) -> None:
         """Write down where this program listens, and what was stopped, for who comes after it."""
         self._stopped = self._facts.stops.late_times
-        self._lock.tell(Owner(VERSION, self._facts.me, str(self._path), 0.0, self._stopped))
+        self._lock.tell(
+            Owner(VERSION, self._facts.me, str(self._path), 0.0, self._stopped, self._line)
+        )
 
     def close(self) -> None:
         """Listen no more, and leave no socket behind."""

@@ -36,7 +36,7 @@ from ..program import Program
 from ..trace import FrameDirection
 from .failures import ErrorForm
 
-VERSION = 3
+VERSION = 4
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; more is no message of ours."""
@@ -230,6 +230,8 @@ class Facts(Message, frozen=True):
     """Who leaves which device alone, and why."""
     stopped: StopTimes = {}
     """When each device was stopped last."""
+    departed: Annotated[tuple[Program, ...], Meta(max_length=MOST_PROGRAMS)] = ()
+    """Programs that have left the line, the last ones last."""
 
 
 class News(Message, frozen=True):
@@ -241,15 +243,21 @@ class News(Message, frozen=True):
     """Those that have changed."""
     shares: Shares
     """The share of the line's time that all other programs' polls take, by device."""
+    failure: tuple[Word, ErrorForm] | None = None
+    """The error of a line that is lost, by its kind."""
     frames: Annotated[tuple[SeenFrame, ...], Meta(max_length=MOST_FRAMES)] = ()
     counted: Annotated[dict[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = {}
     """Counts of the devices whose counts have changed."""
 
 
 class Goodbye(Message, frozen=True):
-    """The owner ends; a reply may still come for `quiet` seconds."""
+    """The owner ends, and a reply may still come for `quiet` seconds; or a client leaves.
 
-    quiet: Seconds
+    The owner closes the connection of a client that leaves: after the port, if it was the last.
+    In place of a Hello it asks a keeper that serves nobody to end.
+    """
+
+    quiet: Seconds = 0.0
 
 
 AnyMessage = (

@@ -16,18 +16,24 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from time import monotonic
+from typing import IO, Annotated
 
 import msgspec
+from msgspec import Meta
 
 from ..bounds import MonotonicTime, Number, StopTimes, Text
-from ..program import Program
+from ..program import KEEPER, Program
 
 log = logging.getLogger(__name__)
 
 PRIVATE_FOLDER, PRIVATE_FILE, SHARED_FILE = 0o700, 0o600, 0o660
 LONGEST_SOCKET_PATH = 100
 OPEN_FOLDERS = Path("/proc/self/fd")
+STARTING = "starting"
+"""The id of a keeper that does not listen yet, as the program writes it that starts it."""
+MOST_DEATHS, DEATHS_WITHIN = 3, 60.0
+"""Keepers that may die in so many seconds before a program holds the line itself."""
 LONGEST_LOCK = 1 << 14
 """Bytes of a lock file that are read; ours hold some hundred, and some ten for each stop."""
 
@@ -43,6 +49,20 @@ class Owner(msgspec.Struct, frozen=True):
     """Monotonic time until which a reply to an owner that has ended may come."""
     stopped: StopTimes = {}
     """When each device was stopped of late (monotonic)."""
+    line: Text = ""
+    """The line as it is open, while its owner listens."""
+    deaths: Annotated[tuple[MonotonicTime, ...], Meta(max_length=MOST_DEATHS)] = ()
+    """When keepers of the line died of late (monotonic)."""
+
+    @property
+    def is_dead(self) -> bool:
+        """True for a keeper whose lock is free, though it has not given it back."""
+        return self.program.name == KEEPER and bool(self.socket or self.program.id == STARTING)
+
+    @property
+    def starts(self) -> bool:
+        """True for a keeper that does not listen yet."""
+        return self.program.name == KEEPER and not self.socket and not has_ended(self.program)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +107,8 @@ class OwnerLock:
     def __init__(self, place: SharePlace) -> None:
         self._place = place
         self._file: IO[bytes] | None = None
+        self.deaths: tuple[float, ...] = ()
+        """When keepers of the line died of late, as the lock file knows."""
 
     @property
     def held(self) -> bool:
@@ -122,12 +144,38 @@ class OwnerLock:
             file.close()
             raise
         self._file = file
+        self._learn_deaths()
         return True
+
+    def _learn_deaths(self) -> None:
+        before = owner_of(self._place)
+        if before is not None:
+            now, died = monotonic(), before.is_dead
+            recent = [one for one in before.deaths if now - one < DEATHS_WITHIN]
+            self.deaths = (*recent, *([now] if died else ()))[-MOST_DEATHS:]
+
+    @property
+    def descriptor(self) -> int:
+        """The open lock file; the process that inherits it holds the lock, too."""
+        assert self._file is not None
+        return self._file.fileno()
+
+    def adopt(self, descriptor: int) -> None:
+        """Hold the lock by a file that was inherited."""
+        self._file = os.fdopen(descriptor, "r+b", buffering=0)
+        before = owner_of(self._place)
+        self.deaths = before.deaths if before is not None else ()
+
+    def hand_over(self) -> None:
+        """Leave the lock to the process that has inherited it."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
     def tell(self, owner: Owner) -> None:
         """Write down who owns the line and where it listens."""
         if self._file is not None:
-            data = msgspec.json.encode(owner)
+            data = msgspec.json.encode(msgspec.structs.replace(owner, deaths=self.deaths))
             os.pwrite(self._file.fileno(), data, 0)
             os.ftruncate(self._file.fileno(), len(data))
 
@@ -169,11 +217,30 @@ class OwnerLock:
 
 def owner_of(place: SharePlace) -> Owner | None:
     """Who owns a line, as its lock file tells; None where it tells nothing that is understood."""
+    return owner_of_lock(place.lock_path)
+
+
+def owner_of_lock(path: Path) -> Owner | None:
+    """The same, by the path of the lock file."""
     try:
-        with place.lock_path.open("rb") as file:
+        with path.open("rb") as file:
             return msgspec.json.decode(file.read(LONGEST_LOCK), type=Owner)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return None
+
+
+def is_locked(path: Path) -> bool:
+    """True while a process holds the lock in a file."""
+    import fcntl
+
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
 
 
 @contextmanager

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 from contextlib import suppress
 
-from ..bounds import MOST_PROGRAMS
 from ..limits import CAUTIOUS
 from ..link import label
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
+from ..schedule.queue import Job
 from .attached import Client
 from .commanding import Commanding
+from .greeting import Greeting, LineHolder
 from .listening import Listening
 from .messages import (
-    VERSION,
     Alive,
     AnyMessage,
     AskedFor,
@@ -27,27 +26,23 @@ from .messages import (
     Facts,
     Goodbye,
     Granting,
-    Hello,
     Here,
     Hush,
     NoMessage,
     PollWish,
     StopGiven,
     Told,
-    TurnedAway,
     Welcome,
     Withdraw,
     next_message,
-    packed,
 )
-from .place import OwnerLock, SharePlace, has_ended, user_of
+from .place import OwnerLock, SharePlace, has_ended
 from .signs import SignsOfLife
 from .stops_past import StopsPast
 from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
 
-HELLO_WITHIN = 2.0
 BACK_WITHIN = 2.0
 """Seconds in which the programs of an owner before come back, unless they are gone, too."""
 
@@ -55,19 +50,22 @@ BACK_WITHIN = 2.0
 class ShareServer:
     """Serves the programs that attach; lives in the line's loop, and is its facts' voice."""
 
-    def __init__(self, place: SharePlace, lock: OwnerLock, inside: LineInside) -> None:
+    def __init__(
+        self, place: SharePlace, lock: OwnerLock, inside: LineInside, holder: LineHolder
+    ) -> None:
         self._inside = inside
+        self._holder = holder
         self._loop = asyncio.get_running_loop()
         self._clients: dict[str, Client] = {}
-        self._group = place.group
-        self._listening = Listening(place, lock, inside.facts, self._welcome)
+        self._greeting = Greeting(inside, place.group, holder)
+        self._listening = Listening(place, lock, inside.facts, label(inside.link), self._welcome)
         self._commanding = Commanding(inside.facts, self._clients, self._tell_facts)
         self._signs = SignsOfLife(
             inside, self._all, self._tell_news, self._stopped, StopsPast(place)
         )
-        self._gone_before: set[str] = set()
-        """Programs whose going was looked after."""
+        self._gone_before: set[str] = set()  # looked after
         self._handling: set[asyncio.Task[None]] = set()
+        self._stops_left: list[Job] = []
         self._missed: asyncio.TimerHandle | None = None
 
     async def start(self, before: Program | None) -> None:
@@ -101,6 +99,16 @@ class ShareServer:
 
     # Clients
 
+    @property
+    def serves(self) -> bool:
+        """True while a program is attached."""
+        return bool(self._clients)
+
+    @property
+    def stops_wait(self) -> bool:
+        """True while a stop is not sent yet that a program has left behind."""
+        return not all(one.answer.done() for one in self._stops_left)
+
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
@@ -122,20 +130,19 @@ class ShareServer:
             log.exception("serving a program on the line failed")
         finally:
             self._handling.discard(task)
-            with suppress(OSError, RuntimeError):
-                writer.close()
-            if client is not None:
-                self._gone(client)
+            try:
+                if client is not None:
+                    self._gone(client)
+                    await self._holder.port_left()
+            finally:
+                with suppress(OSError, RuntimeError):
+                    writer.close()
 
     async def _hello(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> Client | None:
-        async with asyncio.timeout(HELLO_WITHIN):
-            message = await next_message(reader)
-        if not isinstance(message, Hello) or message.program.id == self._inside.facts.me.id:
-            raise NoMessage("no greeting, or one in the name of the owner")
-        if why := self._refusal(message, writer):
-            writer.write(packed(TurnedAway(why)))
+        message = await self._greeting.heard(reader, writer, self._clients)
+        if message is None:
             return None
         facts, inside = self._inside.facts, self._inside
         client = Client(message.program, writer, heard=inside.clock())
@@ -152,29 +159,18 @@ class ShareServer:
         client.frames = inside.around.trace.count
         log.info("%s shares the line", client.program.text)
         facts.stops.learn_times(message.stopped)
-        present = [one.id for one in facts.programs]
-        if unheard := facts.stops.learn_greeting(client.program.id, message.stops, present):
+        ids = [one.id for one in facts.programs]
+        if unheard := facts.stops.learn_greeting(client.program.id, message.stops, ids):
             # given while nobody owned the line
             self._hear_stops(unheard, "a stop while nobody owned the line", client.program)
+        self._holder.moved(arrived=True)
         self._tell_facts()
         self._tell_line(client)
         return client
 
-    def _refusal(self, hello: Hello, writer: asyncio.StreamWriter) -> str:
-        """Why a program may not share the line, or empty; its user as by the socket's mode."""
-        mine = (os.getuid(), 0, None)
-        if self._group is None and user_of(writer.get_extra_info("socket")) not in mine:
-            return "This line is shared with other users only."
-        if hello.version != VERSION:
-            who = f"{self._inside.facts.me.text} owns the line, in another version of Drive Panel."
-            return f"{who} Close it, or use the same version."
-        if len({*self._clients, hello.program.id}) >= MOST_PROGRAMS:
-            return "Too many programs share this line. Close some."
-        return ""
-
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
-        client.drop()
+        self._stops_left += client.forget()
         if self._clients.get(client.program.id) is not client:
             return
         del self._clients[client.program.id]
@@ -182,6 +178,7 @@ class ShareServer:
         facts = self._inside.facts
         self._missing(client.program)
         facts.stops.fold({one.id for one in facts.departed if has_ended(one)})
+        self._holder.moved(arrived=False)
         self._tell_facts()
 
     def _miss_departed(self) -> None:
@@ -191,6 +188,7 @@ class ShareServer:
         for program in facts.departed:
             if program.id not in here | self._gone_before:
                 self._missing(program)
+        self._holder.moved(arrived=False)
         self._tell_facts()
 
     def _missing(self, program: Program) -> None:
@@ -205,8 +203,8 @@ class ShareServer:
     def _tell_facts(self) -> None:
         facts = self._inside.facts
         given, times = facts.stops.plain, facts.stops.late_times
-        hushed = dict(facts.hushed)
-        self._tell_all(Facts(facts.programs, dict(facts.commanders), given, hushed, times))
+        commanders, hushed, gone = dict(facts.commanders), dict(facts.hushed), facts.departed
+        self._tell_all(Facts(facts.programs, commanders, given, hushed, times, gone))
 
     # What clients say
 
@@ -215,6 +213,8 @@ class ShareServer:
         match message:
             case Alive():
                 pass
+            case Goodbye():
+                raise EOFError
             case Asking():
                 client.ask(self._inside, message)
             case Withdraw(number=number):

@@ -5,33 +5,60 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 from ..errors import NotShared
-from ..schedule.inside import LineInside
-from .client import OwnerAway, Say, ShareClient
+from ..link import label
+from ..model import LineStatus
+from ..program import KEEPER, Program
+from ..schedule.inside import LineInside, Say, SharedLine
+from .client import OwnerAway, ShareClient
+from .keeping import KeeperOrder, KeeperStarter
 from .messages import VERSION
 from .past_owner import PastOwner
-from .place import Owner, OwnerLock, SharePlace, owner_of, owner_text
+from .place import (
+    MOST_DEATHS,
+    STARTING,
+    Owner,
+    OwnerLock,
+    SharePlace,
+    owner_of,
+    owner_text,
+)
 from .server import ShareServer
 from .stops_past import StopsPast
 from .turn import Turn
 
 log = logging.getLogger(__name__)
 
+ShareLine = Callable[[SharePlace, LineInside], SharedLine]
+"""Makes the sharing of a line by the programs that meet at a place."""
 OWNER_INTERVAL = 0.02
 """Seconds between two looks for an owner that is just beginning, or has just ended."""
 LONGEST_QUIET = 30.0
 """Seconds that a line is left quiet at most, should a lock file tell of a later time."""
 NO_OWNER = 3.0
 """Seconds after which a locked line without an owner that answers is given up."""
+AWAY_FOR = 0.5
+"""Seconds without an owner after which that is shown."""
+HOLDER_AWAY = "The process that held the line has ended; the next one starts."
+KEEPER_STARTS = 20.0
+"""Seconds that the keeper of a line has to listen: a small computer starts it slowly."""
 
 
 class Sharing:
     """How one program shares one line; lives in the line's loop."""
 
-    def __init__(self, place: SharePlace, inside: LineInside) -> None:
+    keeps = False
+
+    def __init__(
+        self, place: SharePlace, inside: LineInside, start_keeper: KeeperStarter | None = None
+    ) -> None:
+        """`start_keeper` starts a process that owns the line; without, this program does."""
+        self._start_keeper = start_keeper
+        self._keeper_lives: Callable[[], bool] = bool
         self._place = place
         self._inside = inside
         self._lock = OwnerLock(place)
@@ -39,12 +66,19 @@ class Sharing:
         self._server: ShareServer | None = None
         self._client: ShareClient | None = None
         self._off = False
+        self._starts_until = 0.0
         self._quiet_until = 0.0
 
     @property
     def stops_only(self) -> bool:
         """Whether the owner is frozen, so that nothing but stops goes out."""
         return self._client is not None and self._client.frozen
+
+    @property
+    def starts(self) -> bool:
+        """True while a keeper starts, for some time."""
+        attached = self._client is not None and self._client.taken_in
+        return not attached and self._inside.clock() < self._starts_until
 
     async def own(self, say: Say) -> None:
         """Return when this program owns the line; until then serve it as a client.
@@ -56,6 +90,7 @@ class Sharing:
         inside = self._inside
         away_since: float | None = None
         served: Owner | None = None
+        shown = False
         while True:
             try:
                 taken = self._lock.take()
@@ -64,23 +99,53 @@ class Sharing:
                 log.error("the line cannot be shared: %s", error)
                 self._off = True
                 return
-            if taken:
-                break
             owner = owner_of(self._place)
+            if taken and not self._give_to_keeper():
+                break
             try:
                 if owner is None:
                     raise OwnerAway
                 await self._attend(owner, say)
-                served, away_since = owner, None
+                served, away_since, shown = owner, None, False
             except OwnerAway:
                 now = inside.clock()
                 away_since = away_since or now
-                if now - away_since > NO_OWNER:
+                begins = self._keeper_lives() or (owner is not None and owner.starts)
+                self._starts_until = away_since + KEEPER_STARTS if begins else 0.0
+                if served is not None and now - away_since > AWAY_FOR and not shown:
+                    shown = True
+                    say(LineStatus.CONNECTING, HOLDER_AWAY, None)
+                if now - away_since > (KEEPER_STARTS if begins else NO_OWNER):
                     raise NotShared(
                         f"{owner_text(owner)} holds the line and cannot be reached. Close it."
                     ) from None
                 await asyncio.sleep(OWNER_INTERVAL)
         await self._begin(served)
+
+    def _give_to_keeper(self) -> bool:
+        """Start the line's keeper, which has the lock from then on; False where it cannot be."""
+        now = self._inside.clock()
+        self._keeper_lives = bool
+        if self._start_keeper is None or len(self._lock.deaths) >= MOST_DEATHS:
+            return False
+        facts, place = self._inside.facts, self._place
+        self._learn_of_before()
+        before = (*facts.departed, *facts.programs)
+        order = KeeperOrder.of(place, label(self._inside.link), before)
+
+        def started(pid: int) -> None:
+            keeper = Program(STARTING, KEEPER, pid)
+            stopped = facts.stops.late_times
+            self._lock.tell(Owner(VERSION, keeper, "", self._quiet_until, stopped))
+
+        try:
+            self._keeper_lives = self._start_keeper(order, self._lock.descriptor, started)
+        except OSError as error:
+            log.error("the keeper of the line could not be started: %s", error)
+            return False
+        self._starts_until = now + KEEPER_STARTS
+        self._lock.hand_over()
+        return True
 
     async def _attend(self, owner: Owner, say: Say) -> None:
         """Be a client of an owner until it ends."""
@@ -94,25 +159,64 @@ class Sharing:
             self._client = None
             self._attached = self._attached or client.taken_in
         log.info("%s does not own the line any more", owner.program.text)
+        self._keeper_lives()  # takes note of its end, if this program has started it
+        self._keeper_lives, self._starts_until = bool, 0.0
         latest = inside.clock() + LONGEST_QUIET
         self._quiet_until = max(self._quiet_until, min(client.quiet_until, latest))
 
     async def _begin(self, served: Owner | None) -> None:
         """Listen as the owner, and wait until no reply to an owner before may come."""
+        await self._listen(served.program if served is not None else None)
+        await self._until_quiet()
+
+    async def _listen(self, before: Program | None) -> bool:
+        inside = self._inside
+        self._learn_of_before()
+        # should this program end before it listens
+        stopped = inside.facts.stops.late_times
+        self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until, stopped))
+        self._server = server = ShareServer(self._place, self._lock, inside, self)
+        try:
+            await server.start(before)
+        except OSError as error:
+            log.error("the line cannot be shared: %s", error)
+            return False
+        return True
+
+    def _learn_of_before(self) -> None:
+        """Heed the times that the last owner has left in the lock file."""
         inside = self._inside
         if (before := owner_of(self._place)) is not None:
             inside.facts.stops.learn_times(before.stopped)
             left = _left_of(before, inside.timing.late_reply, inside.clock())
             self._quiet_until = max(self._quiet_until, inside.clock() + left)
-        # should this program end before it listens
-        stopped = inside.facts.stops.late_times
-        self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until, stopped))
-        self._server = server = ShareServer(self._place, self._lock, inside)
-        try:
-            await server.start(served.program if served is not None else None)
-        except OSError as error:
-            log.error("the line cannot be shared: %s", error)
-        await asyncio.sleep(max(0.0, self._quiet_until - inside.clock()))
+
+    async def _until_quiet(self) -> None:
+        """Wait until no reply to an earlier request may come."""
+        await asyncio.sleep(max(0.0, self._quiet_until - self._inside.clock()))
+
+    async def unwanted(self) -> None:
+        """Never: the line is open for this program, too."""
+        await asyncio.Event().wait()
+
+    def moved(self, *, arrived: bool) -> None:
+        """A program came, or one has gone."""
+
+    async def port_left(self) -> None:
+        """Return once a program that leaves may count on it that the port is closed, or in use."""
+
+    async def makes_way(self) -> bool:
+        """End if nobody is served; True then. This program is served itself."""
+        return False
+
+    async def pause(self, seconds: float) -> None:
+        """Wait before a lost line is tried again."""
+        await asyncio.sleep(seconds)
+
+    def rest(self, quiet: float) -> None:
+        """The port is closed; a reply may still come for `quiet` seconds."""
+        if quiet > 0:
+            self._quiet_until = max(self._quiet_until, self._inside.clock() + quiet)
 
     def pass_on(self, message: bytes) -> bool:
         """Send a finished message to the owner; False if none takes it."""

@@ -71,6 +71,10 @@ def _is_no_port(path: str) -> bool:
     return sys.platform.startswith("linux") and os.major(found.st_rdev) == MEMORY
 
 
+OURS = {"tui": "drivepanel", "tui.keeper": "drivepanel, the keeper of the line"}
+"""Modules of this package that are run by their names, and what people call them."""
+
+
 def holder(path: str) -> str | None:
     """Name and process id of the program that holds a port, None where the system does not tell.
 
@@ -129,7 +133,8 @@ def _name(pid: int) -> str:
     except OSError:
         return "a program"
     scripts = [part for part in arguments[1:] if part and not part.startswith("-")]
-    return os.path.basename(scripts[0]) if scripts else name
+    script = os.path.basename(scripts[0]) if scripts else name
+    return OURS.get(script, script)
 
 
 def other_openers(path: str) -> str:

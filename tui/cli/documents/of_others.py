@@ -58,6 +58,14 @@ class LeftOnLineDocument(LeftBehindDocument, kw_only=True):
     device: int
 
 
+class OpenLineDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A line that is open, and the process that holds it: `keeper` as a rule."""
+
+    line: str
+    program: str
+    pid: int
+
+
 class LinesTold(DocumentTold, kw_only=True):
     """`lines`: the names, what is wrong with the settings file, and what is remembered."""
 
@@ -66,6 +74,7 @@ class LinesTold(DocumentTold, kw_only=True):
     faults: list[str]
     lines: list[NamedLineTold]
     known: list[KnownLineTold]
+    open: list[OpenLineDocument]
     left_behind: list[LeftOnLineDocument]
 
 

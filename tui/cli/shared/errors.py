@@ -173,7 +173,7 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
             status = status_of(error)
             if status is None:
                 logging.getLogger(__name__).exception("unforeseen error")
-                from .logs import log_file
+                from tui.session.logs import log_file
 
                 raise Failure(
                     f"An error of drivepanel itself: {type(error).__name__}: {error}\n"

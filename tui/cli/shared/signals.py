@@ -125,12 +125,6 @@ def never_suspended(tell: Callable[[str], None] | None = None) -> Iterator[None]
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def take_no_signals() -> None:
-    """Leave every signal to other threads; for a thread that starts before `never_suspended`."""
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
-
-
 def _complain(text: str) -> None:
     from .say import say_beside  # the panel does without click
 

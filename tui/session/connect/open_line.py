@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
@@ -89,13 +90,21 @@ def open_line(
             parse_drives(text[len(SIMULATED_PREFIX) :]), read_only=read_only, wait=wait
         )
     from tui.bus.line import Line
-    from tui.bus.link import parse_link
+    from tui.bus.link import absolute, parse_link
+    from tui.bus.share.sharing import Sharing
 
+    from . import keepers
     from .share_place import share_place, this_program
 
-    link = parse_link(text, usual)
+    link = absolute(parse_link(text, usual))
     place = share_place(text) if program else None
-    line = Line(link, read_only=read_only, place=place, program=this_program(program))
+    line = Line(
+        link,
+        read_only=read_only,
+        place=place,
+        program=this_program(program),
+        share=partial(Sharing, start_keeper=keepers.start),
+    )
 
     def again(other: SerialLink) -> ModbusLine:
         return Line(other, read_only=read_only)

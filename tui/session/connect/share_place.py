@@ -17,12 +17,14 @@ from ..paths import state_folder
 from .line_key import line_key
 
 if TYPE_CHECKING:
-    from tui.bus.share.place import SharePlace
+    from tui.bus.share.place import Owner, SharePlace
 
 PROGRAM = "drivepanel"
 SHARE_GROUP_SETTING = "DRIVEPANEL_SHARE_GROUP"
 """Environment variable: the group of users that may attach to lines opened from here."""
 FOLDER_SETTING = "DRIVEPANEL_SHARE_FOLDER"
+LOCKS = "lines"
+"""The folder of the locks, in the state folder."""
 USUAL_GROUP_FOLDER = "/run/drivepanel"
 """Where users of a group meet, unless the environment names another; the administrator makes it."""
 
@@ -56,7 +58,7 @@ def share_place(text: str) -> SharePlace | None:
     folders = [state / "run"]
     if runtime := os.environ.get("XDG_RUNTIME_DIR"):
         folders.insert(0, Path(runtime) / PROGRAM)
-    return SharePlace(key, state / "lines", tuple(folders))
+    return SharePlace(key, state / LOCKS, tuple(folders))
 
 
 def group_number(group: str, folder: Path) -> int:
@@ -95,3 +97,18 @@ def _terminal() -> str:
         with suppress(OSError, ValueError, AttributeError):
             return os.ttyname(stream.fileno()).removeprefix("/dev/")  # type: ignore[union-attr]
     return ""
+
+
+def owners() -> list[Owner]:
+    """The processes that hold lines of this user and of the group at present."""
+    if os.name != "posix":
+        return []
+    from tui.bus.share.place import is_locked, owner_of_lock
+
+    found = []
+    for folder in (state_folder() / LOCKS, group_folder()):
+        for lock in sorted(folder.glob("*.lock")):
+            owner = owner_of_lock(lock)
+            if owner is not None and owner.line and is_locked(lock):
+                found.append(owner)
+    return found

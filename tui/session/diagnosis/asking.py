@@ -157,8 +157,9 @@ def _last(frames: Sequence[Frame]) -> float:
 
 
 def _attached(line: ModbusLine) -> bool:
-    """Whether another program owns the line."""
-    return line.facts.voice is not None and bool(line.facts.others)
+    """True if another program holds the line."""
+    facts = line.facts
+    return facts.voice is not None and facts.programs[0].id != facts.me.id
 
 
 def _errors_counted(line: ModbusLine) -> PortErrors:

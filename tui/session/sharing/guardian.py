@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
-from tui.bus.api import ModbusLine
+from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.link import label
 from tui.bus.share.lease import SILENT_CLIENT
@@ -22,6 +24,7 @@ from tui.drive.profile import library
 from ..clock import REAL_CLOCK, Clock
 from ..command.stop import Stopper
 from ..command.stop_report import Phase
+from ..connect.line_key import line_key
 from ..drive import DriveSession
 from ..journal import Journal
 from ..starts.keeper import pids_absent
@@ -41,6 +44,9 @@ LONGEST_GRACE = 10.0
 GONE, ABSENT = "is gone", "is not on the line any more"
 """What is told of a program that has ended, and of one that lives: frozen, or gone by itself."""
 BY_KEYS = "a and T take it over here"
+LINE_BACK_WITHIN = 600.0
+"""Seconds for which a motor on a lost line is still to be stopped once that is back."""
+LINE_STAYS_LOST = "NOT STOPPED: the line stays lost. Stop the motor at the machine."
 ENDS_WITHIN = 1.0
 """Seconds that a program takes to be gone from the list of processes."""
 LOOK_INTERVAL = 0.05
@@ -68,18 +74,29 @@ class Guardian:
         self._person = person
         self._starts = starts or Starts()
         self._stopper = Stopper(line, journal, events)
+        self._key = line_key(label(line.link))
+        """The line by its adapter, also while that is unplugged."""
+        self._workers: list[LineWorker] = []
+        self._changing = threading.Lock()
         self._leave = line.facts.on_gone(self.gone)
 
+    @property
+    def busy(self) -> bool:
+        """True until the motors of each program that is gone are stopped, or were taken over."""
+        with self._changing:
+            self._workers = [one for one in self._workers if not one.done()]
+            return bool(self._workers)
+
     def close(self) -> None:
-        """Look after nothing any more."""
+        """Look after nothing any more; waits a moment for what is still to be removed."""
         self._leave()
+        self._starts.close()
 
     def gone(self, program: Program) -> None:
         """A program left the line; called in the line's thread."""
-        try:
-            self._line.spawn(partial(self._look_after, program), f"motors of {program.text}")
-        except LineClosed:
-            return
+        work = partial(self._look_after, program)
+        with suppress(LineClosed), self._changing:
+            self._workers.append(self._line.spawn(work, f"motors of {program.text}"))
 
     async def _look_after(self, program: Program) -> None:
         """Stop each motor that it has started and that nobody takes over in time."""
@@ -100,7 +117,8 @@ class Guardian:
         A program that lives has as long to look after it again, as if nobody asked its drive on.
         """
         device, frozen = record.device, self._starts.is_alive(record)
-        grace = min(self._timeout_of(device) or TAKEN_OVER_WITHIN, LONGEST_GRACE)
+        timeout = self._timeout_of(device) or record.acts_after or TAKEN_OVER_WITHIN
+        grace = min(timeout, LONGEST_GRACE)
         # one that is frozen had been silent before it was let go
         begun = left - SILENT_CLIENT if frozen else self._clock.monotonic()
         end = begun + grace if frozen or takers else begun
@@ -113,11 +131,25 @@ class Guardian:
                 self._tell(device, f"The motor that {program.text} started was taken over.")
                 return
             await self._clock.sleep(LOOK_INTERVAL)
-        session = self._session(record)
-        if session is not None and await self._is_left(device, program):
-            why = ABSENT if frozen else GONE
+        session, why = self._session(record), ABSENT if frozen else GONE
+        while session is not None and await self._is_left(device, program):
             self._stopper.stop([session], by=f"{program.text} {why}")
-            await self._until_stopped(session)
+            await self._until_ended(session)
+            if self._is_connected():
+                return
+            # nothing was heard of it on a line that is lost: once more when that is back
+            lost = self._clock.monotonic()
+            while not self._is_connected():
+                if self._clock.monotonic() - lost > LINE_BACK_WITHIN:
+                    self._tell(device, LINE_STAYS_LOST)
+                    return
+                await self._clock.sleep(LOOK_INTERVAL)
+            if frozen and self._is_back(program):
+                self._tell(device, f"{program.text} is back: its motor runs on.")
+                return
+
+    def _is_connected(self) -> bool:
+        return self._line.state.status is LineStatus.CONNECTED
 
     def _announce(
         self, device: int, program: Program, end: float, *, frozen: bool, takers: bool
@@ -144,19 +176,27 @@ class Guardian:
         end = self._clock.monotonic() + ENDS_WITHIN
         while True:
             found = await asyncio.to_thread(self._found, program)
-            mine = [one for one in found if one.pid == program.pid and not one.left_running]
+            mine = [one for one in found if self._is_of(one, program) and not one.left_running]
             late = self._clock.monotonic() > end
             if late and self._is_back(program):
                 return []
-            if late or (mine and not any(self._starts.is_alive(one) for one in mine)):
+            if not any(self._starts.is_alive(one) for one in mine) or late:
                 return mine
             await self._clock.sleep(LOOK_INTERVAL)
 
+    def _is_of(self, record: StartRecord, program: Program) -> bool:
+        """True for a start by this program; one before a reboot had its number by chance."""
+        return record.pid == program.pid and self._starts.processes.is_same_boot(record.boot_id)
+
     def _found(self, program: Program) -> list[StartRecord]:
         absent = pids_absent(self._line.facts) | {program.pid}
-        return self._starts.all_found(label(self._line.link), absent)
+        text = label(self._line.link)
+        if self._is_connected():
+            self._key = line_key(text)
+        # an adapter that is unplugged has no name but the one that it had
+        return self._starts.all_found(text, absent) or self._starts.all_found(self._key, absent)
 
-    async def _until_stopped(self, session: DriveSession) -> None:
+    async def _until_ended(self, session: DriveSession) -> None:
         """Take the record away once the motor stands; one that does not stop keeps it."""
         device = session.device
         while True:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
 
     from ..connect.identify import DriveIdentity
+    from ..timeout_told import Timeout
     from ..work import Permit
 
 log = logging.getLogger(__name__)
@@ -33,6 +34,7 @@ class Startable(Protocol):
     profile: Profile
     identity: DriveIdentity | None
     starts: StartKeeper | None
+    timeout: Timeout | None
     line: ModbusLine
     guessed: bool
 
@@ -82,6 +84,7 @@ class StartKeeper:
 
     def begin(self, session: Startable, order: Literal["forward", "reverse"]) -> None:
         """Put a start on the disk. Raises StartNotRecorded."""
+        watch = session.timeout.watch if session.timeout is not None else None
         record = self._starts.record(
             session.line_text,
             session.known_identity,
@@ -90,6 +93,7 @@ class StartKeeper:
             program=self._program,
             left_running=self.left_running,
             guessed=session.guessed,
+            acts_after=watch.timeout if watch is not None else None,
         )
         self._put(session, record)
 

@@ -50,10 +50,14 @@ class Processes:
             return ""
         return None if fields[_STATE] in ENDED else fields[_START]
 
+    def is_same_boot(self, boot_id: str) -> bool:
+        """False if the computer was started since; True where it does not say."""
+        here = self.boot_id()
+        return not (boot_id and here) or boot_id == here
+
     def lives(self, boot_id: str, pid: int, started: str) -> bool:
         """Whether the program still lives that was noted so; in doubt it does."""
-        here = self.boot_id()
-        if boot_id and here and boot_id != here:
+        if not self.is_same_boot(boot_id):
             return False
         now = self.started(pid)
         return now is not None and (not now or not started or now == started)

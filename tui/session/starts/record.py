@@ -37,6 +37,8 @@ class StartRecord:
     """When the start was ordered: ISO with zone, to the millisecond."""
     guessed: bool = False
     """True if the profile was a guess; it names the drive's family to nobody."""
+    acts_after: float | None = None
+    """Seconds of the drive's communication timeout, if it was known."""
 
     @property
     def begun(self) -> datetime | None:

@@ -64,7 +64,7 @@ class Starts:
     ) -> None:
         self._clock = clock
         self._files = start_records(folder)
-        self._processes = processes or Processes()
+        self.processes = processes or Processes()
         self._changed = threading.Condition()
         """Guards all below; never held over disk work."""
         self._waiting: deque[_Task] = deque()
@@ -88,6 +88,7 @@ class Starts:
         program: str,
         left_running: bool = False,
         guessed: bool = False,
+        acts_after: float | None = None,
     ) -> StartRecord:
         """A start by this program, now; begin() puts it on the disk."""
         return StartRecord(
@@ -99,21 +100,22 @@ class Starts:
             version=identity.version,
             name=identity.name,
             order=order,
-            boot_id=self._processes.boot_id(),
+            boot_id=self.processes.boot_id(),
             pid=os.getpid(),
-            started=self._processes.started(os.getpid()) or "",
+            started=self.processes.started(os.getpid()) or "",
             program=program,
             left_running=left_running,
             wall=datetime.now().astimezone().isoformat(timespec="milliseconds"),
             guessed=guessed,
+            acts_after=acts_after,
         )
 
     def taken_over(
         self, found: StartRecord, line: str, *, program: str, left_running: bool = False
     ) -> StartRecord:
         """The start of a program that ended, as this program's; begin() puts it on the disk."""
-        boot_id, pid = self._processes.boot_id(), os.getpid()
-        started = self._processes.started(pid) or ""
+        boot_id, pid = self.processes.boot_id(), os.getpid()
+        started = self.processes.started(pid) or ""
         return replace(
             found, line=line, boot_id=boot_id, pid=pid, started=started, program=program,
             left_running=left_running,
@@ -305,4 +307,4 @@ class Starts:
 
     def is_alive(self, record: StartRecord) -> bool:
         """Whether the program of a start lives; in doubt it does."""
-        return self._processes.lives(record.boot_id, record.pid, record.started)
+        return self.processes.lives(record.boot_id, record.pid, record.started)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import logging
 import os
+import signal
 from contextlib import suppress
 from io import TextIOWrapper
 from logging.handlers import QueueHandler, RotatingFileHandler
@@ -13,10 +14,9 @@ from queue import Full, Queue
 from threading import Thread
 
 from tui.drive.plain import plain
-from tui.session.paths import state_folder
-from tui.session.stored import make_folder
 
-from .signals import take_no_signals
+from .paths import state_folder
+from .stored import make_folder
 
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
@@ -55,7 +55,9 @@ class Later(QueueHandler):
         super().close()
 
     def _work(self) -> None:
-        take_no_signals()
+        if hasattr(signal, "pthread_sigmask"):
+            # it may start before the threads that wait for signals
+            signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
         while (entry := self._entries.get()) is not None:
             self._to.handle(entry)
         self._to.close()
@@ -88,7 +90,7 @@ class PlainFormatter(logging.Formatter):
 
 
 def log_file() -> Path:
-    """Where the log is."""
+    """The path of the log."""
     return state_folder() / "drivepanel.log"
 
 

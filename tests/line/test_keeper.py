@@ -1,0 +1,275 @@
+"""The process that holds a line for the programs on it: how it begins, serves, dies and ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from tests.programs import (
+    DRIVEPANEL,
+    PATIENCE,
+    Served,
+    drivepanel,
+    end_keepers,
+    is_running,
+    keepers,
+    served,
+    wait_until,
+)
+from tui.bus.share.keeper_share import LINGERS
+from tui.keeper.starting import start_keeper
+from tui.session.connect import keepers as connect_keepers
+from tui.session.connect.open_line import open_line
+from tui.simulator import DriveSpec, Simulation
+
+from .terminal import Terminal
+from .test_commands import bench, stands, turns
+from .test_shared_programs import left_over, motor_run, on_record, runs_a_motor, stopped_by_commands
+
+NOTHING = "/dev/null"
+
+
+@pytest.fixture
+def programs() -> Iterator[ExitStack]:
+    """Programs that end with the test."""
+    with ExitStack() as stack:
+        yield stack
+
+
+def keeper() -> int:
+    """The one keeper of this test's lines."""
+    (pid,) = keepers()
+    return pid
+
+
+def read(line: str) -> subprocess.CompletedProcess[str]:
+    return drivepanel("read", line, "ETA", "-d", "1", "-p", "atv71")
+
+
+def holders(path: str) -> list[int]:
+    """Processes that have a port open, this one aside."""
+    found = []
+    for one in Path("/proc").glob("[0-9]*/fd/*"):
+        try:
+            pid = int(one.parts[2])
+            if pid != os.getpid() and os.readlink(one) == os.path.realpath(path):
+                found.append(pid)
+        except OSError:
+            continue
+    return found
+
+
+def times_of_good_values(recorder: Served, seconds: float) -> list[float]:
+    """When a recorder printed good values, on the monotonic clock."""
+    assert recorder.process.stdout is not None
+    end, found = time.monotonic() + seconds, []
+    while time.monotonic() < end:
+        printed = json.loads(recorder.process.stdout.readline())
+        if '"good"' in json.dumps(printed):
+            found.append(time.monotonic())
+    return found
+
+
+def test_it_inherits_nothing_and_outlives_its_command() -> None:
+    with bench() as (_, line):
+        # the command substitution of a shell waits for whoever has its output open
+        assert read(line).returncode == 0
+        pid = keeper()
+        process = Path("/proc", str(pid))
+        assert [os.readlink(process / "fd" / str(one)) for one in range(3)] == [NOTHING] * 3
+        assert os.readlink(process / "cwd") == "/"
+        assert os.getsid(pid) == pid
+        assert b"-P\0-m\0tui.keeper\0" in (process / "cmdline").read_bytes()
+
+
+def test_the_port_is_free_when_the_last_program_has_ended() -> None:
+    with bench() as (_, line):
+        port = line.removeprefix("serial:").partition(",")[0]
+        assert read(line).returncode == 0
+        pid = keeper()
+        assert holders(port) == []
+        # the process waits for the next program, which needs not start another
+        assert read(line).returncode == 0
+        assert keeper() == pid
+        wait_until(lambda: not is_running(pid), "it ends", LINGERS + 20.0)
+        assert left_over() == []
+
+
+def test_another_program_opens_the_port_between_two_commands() -> None:
+    with bench() as (_, line):
+        assert read(line).returncode == 0
+        alone = subprocess.run(
+            [*DRIVEPANEL, "read", line, "ETA", "-d", "1", "-p", "atv71"],
+            env={**os.environ, "DRIVEPANEL_STATE": os.environ["DRIVEPANEL_STATE"] + "2"},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+        assert alone.returncode == 0, alone.stderr
+
+
+def test_other_settings_of_the_line_need_no_wait() -> None:
+    with Simulation([DriveSpec("atv71", 1)]) as simulation:
+        path = simulation.serve_pty()
+        assert read(f"serial:{path},9600,8N1").returncode == 3
+        before = keeper()
+        assert read(f"serial:{path},19200,8N1").returncode == 0
+        assert keeper() != before
+
+
+def test_a_port_that_is_not_there_is_reported_at_once() -> None:
+    done = read("serial:/dev/ttyNONE0")
+    assert done.returncode == 3
+    assert "/dev/ttyNONE0 does not exist." in done.stderr
+    assert "was not connected within" not in done.stderr
+
+
+def test_a_port_that_is_in_use_is_reported_with_its_holder() -> None:
+    with bench() as (_, line):
+        path = line.removeprefix("serial:").partition(",")[0]
+        with served([*DRIVEPANEL, "watch", line, "ETA", "-d", "1", "-p", "atv71"], ready="ETA"):
+            other = subprocess.run(
+                [*DRIVEPANEL, "read", f"serial:{path}", "ETA", "-d", "1", "-p", "atv71"],
+                env={**os.environ, "DRIVEPANEL_STATE": os.environ["DRIVEPANEL_STATE"] + "2"},
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE,
+                check=False,
+            )
+        assert other.returncode == 3
+        assert "in use by drivepanel, the keeper of the line (pid" in other.stderr
+
+
+def test_one_that_serves_nobody_makes_way_for_a_listener() -> None:
+    with bench() as (_, line):
+        assert read(line).returncode == 0
+        pid = keeper()
+        done = drivepanel("listen", line, "--for", "1")
+        assert "keeper" not in done.stderr, done.stderr
+        wait_until(lambda: not is_running(pid), "it has ended")
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_the_motor_runs_on_when_the_keeper_ends_and_its_program_lives(
+    programs: ExitStack, number: signal.Signals
+) -> None:
+    with motor_run(programs, "run") as (simulation, line, runner, recorder):
+        before = keeper()
+        os.kill(before, number)
+        wait_until(lambda: keepers() not in ([], [before]), "another one is started")
+        times_of_good_values(recorder, 3.0)
+        assert turns(simulation)
+        assert simulation.drive(1).fault is None
+        assert runner.process.poll() is None
+        # and whoever wants to, stops it
+        assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
+        assert stopped_by_commands(simulation)
+        assert runner.process.wait(PATIENCE) == 6
+
+
+def test_the_motor_stops_when_its_program_dies_with_the_keeper(programs: ExitStack) -> None:
+    with motor_run(programs, "watch") as (simulation, _, runner, recorder):
+        os.kill(keeper(), signal.SIGSTOP)
+        runner.process.kill()
+        os.kill(keeper(), signal.SIGKILL)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+        wait_until(lambda: on_record() == [], "the record of the start goes")
+        _, said = recorder.end()
+        assert "is gone: its motor is stopped" in said
+
+
+def test_a_stop_goes_past_a_frozen_keeper(programs: ExitStack) -> None:
+    with motor_run(programs, "watch") as (simulation, line, _, _):
+        frozen = keeper()
+        os.kill(frozen, signal.SIGSTOP)
+        try:
+            done = drivepanel("stop", line, "-d", "1", "-p", "atv71")
+            assert done.returncode == 0, done.stderr
+            assert stopped_by_commands(simulation)
+        finally:
+            os.kill(frozen, signal.SIGKILL)
+
+
+def test_after_three_deaths_the_programs_hold_the_line_themselves(programs: ExitStack) -> None:
+    with motor_run(programs, "watch") as (simulation, _, _, recorder):
+        for _ in range(3):
+            wait_until(lambda: len(keepers()) == 1, "a keeper is there")
+            times_of_good_values(recorder, 1.0)
+            os.kill(keeper(), signal.SIGKILL)
+        times_of_good_values(recorder, 4.0)
+        assert keepers() == []
+        assert turns(simulation)
+
+
+def test_a_program_that_died_before_the_keeper_is_not_forgotten(
+    programs: ExitStack, terminal_with: Callable[[list[str]], Terminal]
+) -> None:
+    """A person at the other panel has time to take the motor over; then the keeper dies, too."""
+    with motor_run(programs, "run", time_out=50) as (simulation, line, runner, _):
+        panel = terminal_with([*DRIVEPANEL, line, "-d", "1"])
+        panel.wait_for("FORWARD")
+        runner.process.kill()
+        panel.wait_for("its motor is stopped in")
+        os.kill(keeper(), signal.SIGKILL)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+
+
+def test_a_motor_is_stopped_when_its_lost_line_is_back(tmp_path: Path) -> None:
+    with Simulation([DriveSpec("atv71", 1, sets={"SLL": 0})]) as simulation:
+        line = f"serial:{simulation.serve_pty(str(tmp_path / 'line'))},19200,8N1"
+        with served(runs_a_motor(line), ready="running forward") as runner:
+            simulation.unplug()
+            runner.process.kill()
+            time.sleep(2.0)
+            assert turns(simulation)
+            simulation.replug()
+            wait_until(lambda: stands(simulation), "the motor stops")
+
+
+def test_programs_hold_the_line_themselves_where_no_keeper_can_listen(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "file"))
+    (tmp_path / "file").touch()
+    (tmp_path / "state").mkdir(exist_ok=True)
+    (tmp_path / "state" / "run").touch()
+    with bench() as (_, line):
+        done = read(line)
+        assert done.returncode == 0, done.stderr
+        wait_until(lambda: keepers() == [], "no keeper stays")
+
+
+def test_paths_from_the_folder_of_the_program_hold_for_its_keeper(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DRIVEPANEL_STATE", "own state")
+    with Simulation([DriveSpec("atv71", 1)]) as simulation:
+        simulation.serve_pty(str(tmp_path / "line"))
+        with served(runs_a_motor("serial:./line,19200,8N1"), ready="running forward") as runner:
+            wait_until(lambda: turns(simulation), "the motor turns")
+            runner.process.kill()
+            wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+    end_keepers()
+
+
+def test_the_port_is_free_as_soon_as_a_line_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connect_keepers, "start", start_keeper)
+    with bench() as (_, line):
+        for _ in range(5):
+            opened = open_line(line, wait=PATIENCE, program="panel")
+            assert holders(line.removeprefix("serial:").partition(",")[0]) == [keeper()]
+            opened.close()
+            assert holders(line.removeprefix("serial:").partition(",")[0]) == []
+            other = open_line(line.replace("19200", "9600"), wait=PATIENCE, program="panel")
+            assert "9600" not in other.line.state.reason, "it is open as it was meant"
+            other.close()

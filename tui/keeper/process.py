@@ -1,0 +1,105 @@
+"""The life of a keeper, from its start to its end; tui.bus.share.keeper_share has its line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from contextlib import closing
+from functools import partial
+
+import msgspec
+
+from tui.bus.line import Line
+from tui.bus.link import parse_link
+from tui.bus.model import LineStatus
+from tui.bus.program import KEEPER
+from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
+from tui.bus.share.keeping import KeeperOrder
+from tui.session.connect.share_place import this_program
+from tui.session.journal import Journal
+from tui.session.logs import start_logging
+from tui.session.sharing.guardian import Guardian
+
+ENDING_SIGNALS = ("SIGTERM", "SIGINT", "SIGQUIT")
+IGNORED_SIGNALS = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGTSTP", "SIGTTIN", "SIGTTOU")
+"""Signals that end or suspend a process by default; a keeper goes on."""
+
+LEAVE_TIME = 10.0
+"""Seconds that programs have to stop their motors and leave, once a keeper is to end."""
+STOP_TIME = 60.0
+"""Seconds that motors have to stop, once a keeper is to end."""
+LOST_TIME = 2.0
+"""The same on a line that is lost."""
+
+
+class Keeper:
+    """Holds one line until no program needs it, and stops motors of programs that are gone."""
+
+    def __init__(self, order: KeeperOrder, lock: int) -> None:
+        self._ended = threading.Event()
+        self._ordered = False
+        """True once a signal has ordered the end."""
+        keeping = Keeping(lock, order.before, self._ended.set, self.cares)
+        self._line = Line(
+            parse_link(order.line),
+            place=order.place,
+            program=this_program(KEEPER),
+            share=partial(KeeperShare, keeping),
+        )
+        self._journal = Journal()
+        self._guardian = Guardian(self._line, self._journal)
+
+    def cares(self) -> bool:
+        """True while a motor is still to be stopped."""
+        return self._guardian.busy
+
+    def end(self) -> None:
+        """End soon: the computer may be shut down, and programs that are attached end as well."""
+        self._ordered = True
+        self._ended.set()
+
+    def work(self) -> None:
+        """Hold the line until the end."""
+        with closing(self._journal), closing(self._guardian):
+            self._line.open()
+            self._until_unneeded()
+            self._line.close()
+
+    def _until_unneeded(self) -> None:
+        """Return when this keeper is to end, and no motor is still to be stopped.
+
+        Programs that stay start the next keeper.
+        """
+        self._ended.wait()
+        while self._line.facts.others and not self._ordered:
+            self._ended.clear()  # one came just then
+            self._ended.wait()
+        begun = time.monotonic()
+        while self._is_needed(time.monotonic() - begun):
+            time.sleep(CARE_INTERVAL)
+
+    def _is_needed(self, waited: float) -> bool:
+        """True while something is to be waited for; a line that stays lost is not, for long."""
+        lost = self._line.state.status is not LineStatus.CONNECTED
+        others = self._line.facts.others  # before the look at those that have just gone
+        if self.cares() and waited < (LOST_TIME if lost else STOP_TIME):
+            return True
+        return bool(others) and self._ordered and waited < LEAVE_TIME
+
+
+def main() -> None:
+    """Keep the line that standard input describes; the lock is inherited."""
+    order = msgspec.json.decode(sys.stdin.buffer.read(), type=KeeperOrder)
+    with open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), sys.stdin.fileno())
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    for name in IGNORED_SIGNALS:
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
+    start_logging(0)
+    keeper = Keeper(order, int(sys.argv[1]))
+    for name in ENDING_SIGNALS:
+        signal.signal(getattr(signal, name), lambda *_: keeper.end())
+    keeper.work()
