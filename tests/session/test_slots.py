@@ -31,6 +31,7 @@ from .fake_clock import FakeClock
 
 INPUTS = next(b.address for b in library.load("atv71").data.blocks if b.direction == "read")
 """Where the words of the scanner's inputs begin."""
+TRIES = 5
 SCATTERED = {"NCV": 7, "VCAL": 2, "INV": 120, "LSP": 41, "HSP": 523, "ACC": 37, "DEC": 59}
 """Words of an Altivar 71 that lie apart from each other and stay as they are set."""
 
@@ -185,11 +186,14 @@ async def test_what_was_read_by_oneself_is_read_again_and_by_another_is_not(
     reads = len(shared.line.trace)
     assert await shared.read() == {}
     assert len(shared.line.trace) > reads
-    await shared.another_reads(INPUTS)
-    await shared.another_reads(library.load("atv71")["NMA1"].address)
-    reads = len(shared.line.trace)
-    assert await shared.read() == {}
-    assert len(shared.line.trace) == reads
+    for _ in range(TRIES):  # on a busy machine what was read may be old by then
+        await shared.another_reads(INPUTS)
+        await shared.another_reads(library.load("atv71")["NMA1"].address)
+        reads = len(shared.line.trace)
+        assert await shared.read() == {}
+        if len(shared.line.trace) == reads:
+            return
+    raise AssertionError("what another program has just read was read again")
 
 
 async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(start: Start) -> None:
