@@ -12,6 +12,7 @@ import pytest
 
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
+from tui.bus.leases import WriteLease
 from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR, CommandedElsewhere
@@ -48,6 +49,12 @@ class Told:
 
     def hushed(self, device: int, why: str) -> None:
         self.said.append(("hushed", device, why))
+
+    def armed(self, device: int, lease: WriteLease) -> None:
+        self.said.append(("armed", device))
+
+    def disarmed(self, device: int) -> None:
+        self.said.append(("disarmed", device))
 
     def told(self, device: int, text: str) -> None:
         self.said.append(("told", device, text))
@@ -120,7 +127,12 @@ async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench)
     assert bench.facts.commanders == {1: bench.facts.me.id}
     bench.session.arming.disarm()
     assert bench.facts.commanders == {}
-    assert bench.voice.said == [("claim", 1, True), ("claim", 1, False)]
+    assert bench.voice.said == [
+        ("claim", 1, True),
+        ("armed", 1),
+        ("claim", 1, False),
+        ("disarmed", 1),
+    ]
 
 
 async def test_a_drive_commanded_elsewhere_is_not_armed_and_says_by_whom(
@@ -137,7 +149,7 @@ async def test_an_arming_that_ends_by_itself_gives_the_drive_back(bench: Bench) 
     bench.session.arming.arm()
     bench.clock.advance(ARMED_FOR + 1)
     assert not bench.session.arming.armed
-    assert bench.voice.said[-1] == ("claim", 1, False)
+    assert bench.voice.said[-2:] == [("claim", 1, False), ("disarmed", 1)]
 
 
 async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Bench) -> None:

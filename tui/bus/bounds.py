@@ -17,6 +17,8 @@ MOST_STOPPERS = 4 * MOST_PROGRAMS
 """Programs whose stops of one device are counted by name; the owner keeps to fewer."""
 MOST_FRAMES, MOST_BYTES = 200, 4096
 """Frames in one message, and bytes of one of them."""
+MOST_CARE = 1 << 20
+"""Bytes that tell what stops a device."""
 MOST_SHARE = 1000.0
 """The share of a line's time that polls of one device may request."""
 
@@ -38,5 +40,6 @@ Word = Annotated[str, Meta(max_length=200)]
 Notice = Annotated[str, Meta(max_length=MOST_NOTICE)]
 Text = Annotated[str, Meta(max_length=MOST_TEXT)]
 ByteString = Annotated[bytes, Meta(max_length=MOST_BYTES)]
+CareBytes = Annotated[bytes, Meta(max_length=MOST_CARE)]
 StopTimes = Annotated[dict[DeviceId, MonotonicTime], Meta(max_length=MOST_DEVICES)]
 """When each device was stopped last."""

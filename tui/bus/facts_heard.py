@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from .leases import WriteLease
 from .program import Program
+
+if TYPE_CHECKING:
+    from .model import Reply
+    from .requests import Request
 
 log = logging.getLogger(__name__)
 
@@ -31,6 +37,12 @@ class LineVoice(Protocol):
     def hushed(self, device: int, why: str) -> None:
         """A device is left alone by this program, or with no reason no longer."""
 
+    def armed(self, device: int, lease: WriteLease) -> None:
+        """This program may write to a device, or may so for longer."""
+
+    def disarmed(self, device: int) -> None:
+        """This program writes to a device no more."""
+
     def told(self, device: int, text: str) -> None:
         """Something that everybody on the line is to read."""
 
@@ -42,6 +54,9 @@ ReplyListener = Callable[[int, bool, str], None]
 GoneListener = Callable[[Program], None]
 TextListener = Callable[[int, str], None]
 ChangeListener = Callable[[], None]
+CareListener = Callable[[int, bytes], bool]
+LeftListener = Callable[[Program, "Request", "Future[Reply]"], None]
+DueListener = Callable[[tuple[int, ...], str], None]
 
 
 class FactsHeard:
@@ -55,6 +70,9 @@ class FactsHeard:
         self._on_gone: list[GoneListener] = []
         self._on_text: list[TextListener] = []
         self._on_change: list[ChangeListener] = []
+        self._on_care: list[CareListener] = []
+        self._on_left: list[LeftListener] = []
+        self._on_due: list[DueListener] = []
 
     def on_change(self, listener: ChangeListener) -> Callable[[], None]:
         """Call `listener` when programs or commanders are others than before."""
@@ -103,6 +121,39 @@ class FactsHeard:
     def on_reply(self, listener: ReplyListener) -> Callable[[], None]:
         """Call `listener` with device, yes or no, and why, when a question was answered."""
         return _subscribed(self._on_reply, listener)
+
+    def on_care(self, listener: CareListener) -> Callable[[], None]:
+        """Call `listener`, in the holder only, with what stops a device; it returns if it can."""
+        return _subscribed(self._on_care, listener)
+
+    def hear_care(self, device: int, care: bytes) -> bool:
+        """A program tells what stops a device; False if a listener cannot make use of it."""
+        taken = [listener(device, care) for listener in tuple(self._on_care)]
+        return all(taken)
+
+    def on_left(self, listener: LeftListener) -> Callable[[], None]:
+        """Call `listener`, in the holder only, with writes whose program ended before the answer.
+
+        Each may have been sent; the future tells what became of it.
+        """
+        return _subscribed(self._on_left, listener)
+
+    def hear_left(self, program: Program, request: Request, answer: Future[Reply]) -> None:
+        """A program has ended that had asked for a write."""
+        for listener in tuple(self._on_left):
+            heard(listener, program, request, answer)
+
+    def on_stop_due(self, listener: DueListener) -> Callable[[], None]:
+        """Call `listener`, in the holder only, with devices and by whom, when it is to stop them.
+
+        Their stop was given by a program that is gone, or that leaves the rest to the holder.
+        """
+        return _subscribed(self._on_due, listener)
+
+    def hear_stop_due(self, devices: tuple[int, ...], by: str) -> None:
+        """A stop was given that no program carries out."""
+        for listener in tuple(self._on_due):
+            heard(listener, devices, by)
 
     def on_gone(self, listener: GoneListener) -> Callable[[], None]:
         """Call `listener`, in the owner only, when a program left without saying so, or ended."""

@@ -48,6 +48,7 @@ class Keeper:
             place=order.place,
             program=this_program(KEEPER),
             share=partial(KeeperShare, keeping),
+            gated=True,
         )
         self._journal = Journal()
         self._guardian = Guardian(self._line, self._journal)

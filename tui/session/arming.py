@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from tui.bus.api import LineStatus, ModbusLine
 from tui.drive.orders import OrderRefused
@@ -28,10 +29,16 @@ class Arming:
     """Lets writes to one drive through for a while; whatever writes asks here."""
 
     def __init__(
-        self, line: ModbusLine, clock: Clock = REAL_CLOCK, device: int | None = None
+        self,
+        line: ModbusLine,
+        clock: Clock = REAL_CLOCK,
+        device: int | None = None,
+        care: Callable[[], bytes] = bytes,
     ) -> None:
+        """`care` is told the holder of the line: how the drive is stopped without this program."""
         self._line = line
         self._device = device
+        self._care = care
         self._clock = clock
         self._until: float | None = None
         self._span = ARMED_FOR
@@ -52,6 +59,8 @@ class Arming:
             raise OrderRefused(why)
         if self._device is not None and (why := self._line.facts.claim(self._device)):
             raise CommandedElsewhere(why)
+        if self._device is not None:
+            self._line.facts.arm(self._device, _finite(seconds), self._care())
         self._span, self._why = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds
@@ -69,11 +78,14 @@ class Arming:
         self._why = why
         if self._device is not None:
             self._line.facts.release(self._device)
+            self._line.facts.disarm(self._device)
 
     def touch(self) -> None:
         """A key was pressed, or work goes on: an armed drive stays armed."""
         if self.armed_for is not None:
             self._until = self._clock.monotonic() + self._span
+            if self._device is not None:
+                self._line.facts.stay_armed(self._device, _finite(self._span))
 
     @property
     def armed_for(self) -> float | None:
@@ -105,3 +117,7 @@ class Arming:
     def refusal(self) -> str:
         """Why nothing may be written now; empty where it may."""
         return "" if self.armed else self._why or "Not armed: a arms this drive."
+
+
+def _finite(seconds: float) -> float | None:
+    return None if seconds == math.inf else seconds

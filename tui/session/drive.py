@@ -12,6 +12,7 @@ from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 
 from .arming import Arming
+from .care_data import packed_care
 from .clock import REAL_CLOCK, Clock
 from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
@@ -52,7 +53,7 @@ class DriveSession:
         """What everything that is done with the drive counts by."""
         self.image = RegisterImage(profile, clock)
         """What is known of its registers."""
-        self.arming = Arming(line, clock, device)
+        self.arming = Arming(line, clock, device, self.care)
         """Whether it may be written to from here."""
         self.guessed = False
         """True if its family was neither named nor told by the drive: never told as stopped."""
@@ -109,6 +110,10 @@ class DriveSession:
         facts = self.line.facts
         for leave in (facts.on_stop(stopped), facts.on_denied(denied)):
             weakref.finalize(self, leave)
+
+    def care(self) -> bytes:
+        """How the drive is stopped by another process, should this one end."""
+        return packed_care(self.family, self.identity, guessed=self.guessed)
 
     @property
     def known_identity(self) -> DriveIdentity:

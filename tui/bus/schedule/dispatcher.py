@@ -8,7 +8,7 @@ from collections.abc import Callable
 from ..errors import LineClosed, LineError, LineFailed, LineLost, NoAnswer, RequestRefused
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
-from ..requests import Read
+from ..requests import Diagnose, Read
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
@@ -190,7 +190,8 @@ class Dispatcher:
             return hushed[1]
         if not job.commands:
             return ""
-        return self.facts.refusal(job.program, job.request.device, job.stamp)
+        writes = job.request.function != Diagnose.function
+        return self.facts.refusal(job.program, job.request.device, job.stamp, writes=writes)
 
     def forbidden(self, job: Job) -> str:
         """Why a request must not go out, by all, and by the one who asks."""

@@ -11,6 +11,7 @@ from functools import partial
 
 from ..bounds import MOST_BYTES, MOST_FRAMES
 from ..errors import RequestRefused
+from ..facts_heard import LeftListener
 from ..limits import CAUTIOUS, Limits
 from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
@@ -44,6 +45,8 @@ class Client:
 
     program: Program
     writer: asyncio.StreamWriter
+    left: LeftListener
+    """Told of each write that may be on the wire when it goes."""
     shares: dict[int, float] = field(default_factory=dict)
     trace: bool = False
     frames: int = 0
@@ -51,6 +54,8 @@ class Client:
     limits: dict[int, Limits] = field(default_factory=dict)
     stops_left: list[Job] = field(default_factory=list)
     """Stops that it had asked when it went."""
+    stops_due: set[int] = field(default_factory=set)
+    """Devices that it has stopped, and that have not answered a word of it yet."""
     asked: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
     counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
@@ -93,6 +98,8 @@ class Client:
         """Drop what it asked, except stops: they are sent although no program waits for them."""
         asked, self.asked = self.asked, {}
         for job in asked.values():
+            if job.request.changes and (job.begun or job.priority is Priority.STOP):
+                self.left(self.program, job.request, job.answer)
             if job.priority is Priority.STOP:
                 self.stops_left.append(job)
             else:
@@ -118,9 +125,12 @@ class Client:
             inside.submit(job)
 
     def _answered(self, number: int, answer: Future[Reply]) -> None:
-        if self.asked.pop(number, None) is None or answer.cancelled():
+        job = self.asked.pop(number, None)
+        if job is None or answer.cancelled():
             return
         error = answer.exception()
+        if error is None and job.priority is Priority.STOP and job.request.changes:
+            self.stops_due.discard(job.request.device)
         if error is not None:
             self.say(Failed(number, *failure_told(error)))
         else:

@@ -22,7 +22,6 @@ from .messages import (
     Answer,
     AnyMessage,
     AskedFor,
-    Claim,
     Denied,
     Facts,
     Failed,
@@ -30,7 +29,6 @@ from .messages import (
     Granting,
     Hello,
     Here,
-    Hush,
     News,
     NoMessage,
     PollWish,
@@ -45,7 +43,7 @@ from .messages import (
 from .news_heard import NewsHeard
 from .past_owner import PastOwner
 from .place import Owner, short_path
-from .voices import ProgramVoice
+from .voices import ProgramVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)
 
@@ -171,17 +169,9 @@ class ShareClient:
     def _claim(self) -> None:
         """Tell the owner what this program commands, or give it up where it was taken for gone."""
         facts = self._inside.facts
-        for device, holder in facts.commanders.items():
-            if holder != facts.me.id:
-                continue
-            if self._gone:
-                facts.release(device)
-                facts.hear_denied(device, STOOD_STILL)
-            else:
-                self._tell(Claim(device, True))
-        for device, (program, why) in facts.hushed.items():
-            if program == facts.me.id:
-                self._tell(Hush(device, why))
+        if self._gone:
+            give_up_own(facts, STOOD_STILL)
+        tell_own(facts, self._tell)
         if self._gone:
             self._inside.dispatcher.void_older(self._inside.clock(), STOOD_STILL)
 

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from ..leases import WriteLease
 from ..program import Program
 from ..shared_facts import SharedFacts, commanded_by
 from .attached import Client
-from .messages import AskedFor, Claim, Denied, Granting
+from .messages import (
+    AnyMessage,
+    Armed,
+    AskedFor,
+    Claim,
+    Denied,
+    Disarmed,
+    Granting,
+    Hush,
+)
 
 
 class Commanding:
@@ -22,6 +32,30 @@ class Commanding:
         self._facts = facts
         self._clients = clients
         self._tell_facts = tell_facts
+
+    def hears(self, program: Program, message: AnyMessage) -> bool:
+        """Do what a program, perhaps this one, says of a device; False if it is something else."""
+        facts = self._facts
+        match message:
+            case Claim():
+                self.claimed(program, message)
+            case AskedFor(device=device):
+                self.asked_for(program, device)
+            case Granting():
+                self.replied(program, message)
+            case Hush(device=device, why=why):
+                facts.note_hush(device, program.id, why)
+                self._tell_facts()
+            case Armed() | Disarmed() if program.id == facts.me.id:
+                pass  # noted already
+            case Armed(device=device):
+                lease = WriteLease(message.stamp, message.until, message.care)
+                facts.note_lease(program.id, device, lease)
+            case Disarmed(device=device):
+                facts.leases.end(program.id, device)
+            case _:
+                return False
+        return True
 
     def claimed(self, program: Program, claim: Claim) -> None:
         """A program wants to command a device, or no longer."""

@@ -17,6 +17,7 @@ from ..bounds import (
     MOST_PROGRAMS,
     MOST_STOPPERS,
     ByteString,
+    CareBytes,
     DeviceId,
     MonotonicTime,
     Notice,
@@ -36,7 +37,7 @@ from ..program import Program
 from ..trace import FrameDirection
 from .failures import ErrorForm
 
-VERSION = 4
+VERSION = 5
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; more is no message of ours."""
@@ -171,6 +172,24 @@ class Claim(Message, frozen=True):
     take: bool
 
 
+class Armed(Message, frozen=True):
+    """A program may write to a device; told again while it stays armed."""
+
+    device: DeviceId
+    stamp: StopCount
+    """The count of stops of the device when it was armed."""
+    until: MonotonicTime | None = None
+    """When it ends; None: when the program leaves the line."""
+    care: CareBytes = b""
+    """What stops the device; empty where that was told before."""
+
+
+class Disarmed(Message, frozen=True):
+    """A program writes to a device no more."""
+
+    device: DeviceId
+
+
 class Denied(Message, frozen=True):
     """Another program commands the device."""
 
@@ -263,7 +282,7 @@ class Goodbye(Message, frozen=True):
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
     | Alive | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | Hush | PollWish
-    | Facts | News | Goodbye
+    | Facts | News | Goodbye | Armed | Disarmed
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

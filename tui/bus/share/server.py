@@ -19,15 +19,11 @@ from .listening import Listening
 from .messages import (
     Alive,
     AnyMessage,
-    AskedFor,
     Asking,
-    Claim,
     Describe,
     Facts,
     Goodbye,
-    Granting,
     Here,
-    Hush,
     NoMessage,
     PollWish,
     StopGiven,
@@ -145,7 +141,7 @@ class ShareServer:
         if message is None:
             return None
         facts, inside = self._inside.facts, self._inside
-        client = Client(message.program, writer, heard=inside.clock())
+        client = Client(message.program, writer, facts.hear_left, heard=inside.clock())
         own = label(inside.link)
         gone = client.program.id in self._gone_before
         client.say(Welcome(facts.me, own, own == message.label, gone))
@@ -171,6 +167,9 @@ class ShareServer:
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
         self._stops_left += client.forget()
+        if client.stops_due:
+            facts = self._inside.facts
+            facts.hear_stop_due(tuple(client.stops_due), client.program.text)
         if self._clients.get(client.program.id) is not client:
             return
         del self._clients[client.program.id]
@@ -234,20 +233,12 @@ class ShareServer:
     def _hear_of_devices(self, client: Client, message: AnyMessage) -> None:
         match message:
             case StopGiven() if message.program.id == client.program.id:
+                client.stops_due.update(message.devices)
                 self._stopped(message)
-            case Claim():
-                self._commanding.claimed(client.program, message)
-            case AskedFor(device=device):
-                self._commanding.asked_for(client.program, device)
-            case Granting():
-                self._commanding.replied(client.program, message)
-            case Hush(device=device, why=why):
-                self._inside.facts.note_hush(device, client.program.id, why)
-                self._tell_facts()
             case Told(device=device, text=text):
                 self._inside.facts.hear_text(device, text)
                 self._tell_all(message, but=client.program.id)
-            case _:
+            case _ if not self._commanding.hears(client.program, message):
                 raise NoMessage(type(message).__name__)
 
     # What this program says
@@ -258,17 +249,10 @@ class ShareServer:
             self._loop.call_soon_threadsafe(self._said, message)
 
     def _said(self, message: AnyMessage) -> None:
-        me = self._inside.facts.me
         match message:
             case StopGiven():
                 self._tell_stop(message)
-            case Claim() | Hush():
-                self._tell_facts()
-            case AskedFor(device=device):
-                self._commanding.asked_for(me, device)
-            case Granting():
-                self._commanding.replied(me, message)
-            case _:
+            case _ if not self._commanding.hears(self._inside.facts.me, message):
                 self._tell_all(message)
 
     def _stopped(self, stop: StopGiven) -> None:

@@ -5,8 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..bounds import MOST_NOTICE, MOST_TEXT
+from ..leases import WriteLease
 from ..shared_facts import SharedFacts
-from .messages import AnyMessage, AskedFor, Claim, Granting, Hush, StopGiven, Told
+from .messages import (
+    AnyMessage,
+    Armed,
+    AskedFor,
+    Claim,
+    Disarmed,
+    Granting,
+    Hush,
+    StopGiven,
+    Told,
+)
 
 
 class ProgramVoice:
@@ -38,6 +49,40 @@ class ProgramVoice:
         """A device is left alone by this program, or with no reason no longer."""
         self._send(Hush(device, why[:MOST_NOTICE]))
 
+    def armed(self, device: int, lease: WriteLease) -> None:
+        """This program may write to a device, or may so for longer."""
+        self._send(Armed(device, lease.stamp, lease.until, lease.care))
+
+    def disarmed(self, device: int) -> None:
+        """This program writes to a device no more."""
+        self._send(Disarmed(device))
+
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""
         self._send(Told(device, text[:MOST_TEXT]))
+
+
+def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
+    """Tell the holder of a line what is this program's: drives that are armed, commanded, hushed.
+
+    For a holder that does not know it yet.
+    """
+    me = facts.me.id
+    for device, lease in facts.leases.of(me).items():
+        send(Armed(device, lease.stamp, lease.until, lease.care))
+    for device, holder in facts.commanders.items():
+        if holder == me:
+            send(Claim(device, True))
+    for device, (program, why) in facts.hushed.items():
+        if program == me:
+            send(Hush(device, why))
+
+
+def give_up_own(facts: SharedFacts, why: str) -> None:
+    """Command and write to no drive any more: this program was taken for gone."""
+    me = facts.me.id
+    facts.leases.end(me)
+    for device, holder in facts.commanders.items():
+        if holder == me:
+            facts.release(device)
+            facts.hear_denied(device, why)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
+import zlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from functools import cached_property, lru_cache
 
-from ..errors import UnknownParameter
+import msgspec
+
+from ..errors import ProfileError, UnknownParameter
 from ..teaching import TaughtScale
 from .guide import FaultGuide
 from .schema import (
@@ -31,6 +34,19 @@ UNVERIFIED = frozenset({"analogy", "unverified"})
 def is_verified(parameter: Parameter) -> bool:
     """Whether a manual or a public document of this family confirms the parameter."""
     return parameter.confidence not in UNVERIFIED
+
+
+LONGEST_UNPACKED = 1 << 24
+"""Bytes of a packed profile once it is unpacked."""
+
+
+def unpacked_profile(packed: bytes) -> Profile:
+    """The profile that another process has packed. Raises ProfileError."""
+    try:
+        text = zlib.decompressobj().decompress(packed, LONGEST_UNPACKED)
+        return Profile(msgspec.json.decode(text, type=ProfileData))
+    except (zlib.error, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise ProfileError(f"Another program sent a damaged profile: {error}") from error
 
 
 class Profile:
@@ -110,6 +126,11 @@ class Profile:
     def fault(self, raw: int) -> FaultCode | None:
         """The fault a raw fault code stands for, or None if the profile does not know it."""
         return self._faults.get(raw)
+
+    @cached_property
+    def packed(self) -> bytes:
+        """All that it says but its help, for another process; see `unpacked_profile`."""
+        return zlib.compress(msgspec.json.encode(self.data), 1)
 
     @cached_property
     def groups(self) -> tuple[str, ...]:

@@ -99,17 +99,24 @@ class Stopper:
         return self._reports
 
     def stop(
-        self, sessions: Iterable[DriveSession], order: OrderId = "stop", by: str = "the stop key"
+        self,
+        sessions: Iterable[DriveSession],
+        order: OrderId = "stop",
+        by: str = "the stop key",
+        *,
+        given: bool = False,
     ) -> None:
         """Order drives to stop; ends their work and their arming. Raises LineClosed.
 
+        True `given` for a stop that all programs have heard of already.
         A stop whose word has not gone out yet is not begun anew: a key that is held down would
         keep every one of them from going out.
         """
         wanted = list(sessions)
         ordered = _now(wanted[0]) if wanted else 0.0
         # first: what other programs meant for them before is void from here on
-        carried_on(lambda: self._line.facts.give_stop([one.device for one in wanted], by))
+        if not given:
+            carried_on(lambda: self._line.facts.give_stop([one.device for one in wanted], by))
         for session in wanted:
             carried_on(partial(end_work, session, by))
         wave = None

@@ -104,10 +104,11 @@ def open_line(
         place=place,
         program=this_program(program),
         share=partial(Sharing, start_keeper=keepers.start),
+        gated=True,
     )
 
     def again(other: SerialLink) -> ModbusLine:
-        return Line(other, read_only=read_only)
+        return Line(other, read_only=read_only, gated=True)
 
     return _opened(OpenLine(text, line, again=again), wait)
 
@@ -173,12 +174,12 @@ def _simulated(
     simulation = Simulation(specs)
     # drives in this very program are late when the computer is: no reason to call them silent
     timing = Timing(min_timeout=1.0)
-    line = Line(_serve(simulation), timing=timing, read_only=read_only)
+    line = Line(_serve(simulation), timing=timing, read_only=read_only, gated=True)
     text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
     profiles = {spec.address: spec.profile for spec in specs}
 
     def again(other: SerialLink) -> ModbusLine:
-        return Line(other, timing=timing, read_only=read_only)
+        return Line(other, timing=timing, read_only=read_only, gated=True)
 
     opened = OpenLine(text, line, simulation, tuple(profiles), profiles, again=again)
     return _opened(opened, wait)

@@ -45,6 +45,8 @@ from .rules import GatewayRules
 log = logging.getLogger(__name__)
 
 ENDED_BEFORE_ANSWER = "serve ended: not known whether it was taken"
+ARMED_FOR_ONE = 10.0
+"""Seconds in which one write of a client may wait for the line."""
 JUST_READ = 2.0
 """Seconds up to which a word counts as read just now."""
 
@@ -223,6 +225,8 @@ class GatewayWrite:
     async def _exchange(self, priority: Priority, parameters: list[Parameter]) -> bytes:
         session, asked = self._session, self._asked
         forbidden = None if priority is Priority.STOP else self._voided
+        if forbidden is not None:
+            session.line.facts.arm(session.device, ARMED_FOR_ONE, session.care())
         for one in parameters:
             session.image.doubt(one.code)
         if asked.function == 23:

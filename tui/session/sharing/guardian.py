@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineClosed
@@ -30,6 +30,7 @@ from ..journal import Journal
 from ..starts.keeper import pids_absent
 from ..starts.record import StartRecord
 from ..starts.starts import Starts
+from .care import DrivesInCare
 
 if TYPE_CHECKING:
     from tui.bus.program import Program
@@ -76,9 +77,11 @@ class Guardian:
         self._stopper = Stopper(line, journal, events)
         self._key = line_key(label(line.link))
         """The line by its adapter, also while that is unplugged."""
+        self._care = DrivesInCare(line, journal)
         self._workers: list[LineWorker] = []
         self._changing = threading.Lock()
-        self._leave = line.facts.on_gone(self.gone)
+        facts = line.facts
+        self._leave = (facts.on_gone(self.gone), facts.on_stop_due(self._stop_due))
 
     @property
     def busy(self) -> bool:
@@ -89,14 +92,23 @@ class Guardian:
 
     def close(self) -> None:
         """Look after nothing any more; waits a moment for what is still to be removed."""
-        self._leave()
+        for leave in self._leave:
+            leave()
+        self._care.close()
         self._starts.close()
 
     def gone(self, program: Program) -> None:
         """A program left the line; called in the line's thread."""
-        work = partial(self._look_after, program)
+        self._spawn(partial(self._look_after, program), f"motors of {program.text}")
+
+    def _spawn(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
         with suppress(LineClosed), self._changing:
-            self._workers.append(self._line.spawn(work, f"motors of {program.text}"))
+            self._workers.append(self._line.spawn(work, name))
+
+    def _stop_due(self, devices: tuple[int, ...], by: str) -> None:
+        """A stop was given that no program carries out; called in the line's thread."""
+        for session in filter(None, map(self._known, devices)):
+            self._spawn(partial(self._stop, session, by), f"stop {session.device} for {by}")
 
     async def _look_after(self, program: Program) -> None:
         """Stop each motor that it has started and that nobody takes over in time."""
@@ -134,19 +146,33 @@ class Guardian:
         session, why = self._session(record), ABSENT if frozen else GONE
         while session is not None and await self._is_left(device, program):
             self._stopper.stop([session], by=f"{program.text} {why}")
-            await self._until_ended(session)
-            if self._is_connected():
+            if not await self._ended_by_loss(session):
                 return
-            # nothing was heard of it on a line that is lost: once more when that is back
-            lost = self._clock.monotonic()
-            while not self._is_connected():
-                if self._clock.monotonic() - lost > LINE_BACK_WITHIN:
-                    self._tell(device, LINE_STAYS_LOST)
-                    return
-                await self._clock.sleep(LOOK_INTERVAL)
             if frozen and self._is_back(program):
                 self._tell(device, f"{program.text} is back: its motor runs on.")
                 return
+
+    async def _stop(self, session: DriveSession, by: str) -> None:
+        """Carry a stop out that all programs have heard of."""
+        self._stopper.stop([session], by=by, given=True)
+        while await self._ended_by_loss(session):
+            self._stopper.stop([session], by=by, given=True)
+
+    async def _ended_by_loss(self, session: DriveSession) -> bool:
+        """Wait for the end of a stop; True if the line was lost, and is back.
+
+        Nothing was heard of the motor then: it has to be stopped once more.
+        """
+        await self._until_ended(session)
+        lost = self._clock.monotonic()
+        if self._is_connected():
+            return False
+        while not self._is_connected():
+            if self._clock.monotonic() - lost > LINE_BACK_WITHIN:
+                self._tell(session.device, LINE_STAYS_LOST)
+                return False
+            await self._clock.sleep(LOOK_INTERVAL)
+        return True
 
     def _is_connected(self) -> bool:
         return self._line.state.status is LineStatus.CONNECTED
@@ -212,8 +238,12 @@ class Guardian:
         """Have every person on the line read it."""
         self._line.facts.tell_all(device, text)
 
+    def _known(self, device: int) -> DriveSession | None:
+        """A drive that this program has open, or that another one has armed on the line."""
+        return self._session_of(device) or self._care.session(device)
+
     def _session(self, record: StartRecord) -> DriveSession | None:
-        session = self._session_of(record.device)
+        session = self._known(record.device)
         if session is not None:
             return session
         try:

@@ -1,0 +1,130 @@
+"""The drives that programs on a line have armed, each with what stops it without its program."""
+
+from __future__ import annotations
+
+import logging
+from concurrent.futures import Future
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from tui.bus.api import ModbusLine
+from tui.bus.link import label
+from tui.bus.requests import ReadWrite, Request, WriteMany, WriteOne
+from tui.drive.errors import DriveError
+from tui.drive.profile.profile import Profile, unpacked_profile
+
+from ..care_data import CareData
+from ..drive import DriveSession
+from ..journal import Entry, Journal, now_text
+
+if TYPE_CHECKING:
+    from tui.bus.model import Reply
+    from tui.bus.program import Program
+
+log = logging.getLogger(__name__)
+
+MOST_PROFILES = 16
+"""Profiles that are kept unpacked for the next drive of their family."""
+
+
+class DrivesInCare:
+    """Keeps a session for each of them; called in the line's thread.
+
+    Also keeps in the journal what became of writes whose program ended before the answer came.
+    """
+
+    def __init__(self, line: ModbusLine, journal: Journal) -> None:
+        self._line = line
+        self._journal = journal
+        self._profiles: dict[bytes, Profile] = {}
+        self._sessions: dict[int, tuple[bytes, DriveSession]] = {}
+        facts = line.facts
+        self._leave = (facts.on_care(self._registered), facts.on_left(self._left))
+
+    def close(self) -> None:
+        """Keep nothing more."""
+        for leave in self._leave:
+            leave()
+
+    def session(self, device: int) -> DriveSession | None:
+        """The drive as the program knew it that has armed it last; None if none has."""
+        _, session = self._sessions.get(device, (b"", None))
+        return session
+
+    def _registered(self, device: int, care: bytes) -> bool:
+        """A program arms a drive; False if what it tells stops none."""
+        before, _ = self._sessions.get(device, (b"", None))
+        if before == care:
+            return True
+        try:
+            data = msgspec.msgpack.decode(care, type=CareData)
+            profile = self._profiles.get(data.profile) or unpacked_profile(data.profile)
+            session = DriveSession(self._line, device, profile, data.identity)
+        except (msgspec.MsgspecError, DriveError, ValueError) as error:
+            log.error("drive %s cannot be taken into care: %s", device, error)
+            return False
+        except Exception:
+            # a profile that only its sender has checked
+            log.exception("drive %s cannot be taken into care", device)
+            return False
+        if not session.prepared:
+            return False
+        session.guessed = data.guessed
+        if len(self._profiles) >= MOST_PROFILES:
+            self._profiles.clear()
+        self._profiles[data.profile] = profile
+        self._sessions[device] = (care, session)
+        return True
+
+    # Writes that were left
+
+    def _left(self, program: Program, request: Request, answer: Future[Reply]) -> None:
+        """A program has ended that had asked for a write."""
+        entry = self._entry(program, request)
+        if entry is not None:
+            answer.add_done_callback(partial(self._keep, entry))
+
+    def _keep(self, entry: Entry, answer: Future[Reply]) -> None:
+        if answer.cancelled():
+            return  # it was not sent
+        error = answer.exception()
+        self._journal.add(replace(entry, answer="ok" if error is None else str(error)))
+
+    def _entry(self, program: Program, request: Request) -> Entry | None:
+        found = _first_word(request)
+        if found is None:
+            return None
+        address, words = found
+        session = self.session(request.device)
+        parameter = session.profile.at(address) if session is not None else None
+        return Entry(
+            time=now_text(),
+            line=label(self._line.link),
+            device=request.device,
+            profile=session.profile.id if session is not None else "",
+            code=parameter.code if parameter is not None else str(address),
+            address=address,
+            old_raw=None,
+            old="",
+            new_raw=words[0],
+            new=" ".join(f"16#{one:04X}" for one in words),
+            answer="",
+            read_back=None,
+            why=f"sent for {program.text}, which has ended",
+        )
+
+
+def _first_word(request: Request) -> tuple[int, tuple[int, ...]] | None:
+    """The first address that a request writes, and its words; None if it writes no register."""
+    match request:
+        case WriteOne(address=address, value=value):
+            return address, (value,)
+        case WriteMany(address=address, values=values):
+            return address, values
+        case ReadWrite(write_address=address, values=values):
+            return address, values
+        case _:
+            return None
