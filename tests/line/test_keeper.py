@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -273,3 +274,38 @@ def test_the_port_is_free_as_soon_as_a_line_is_closed(monkeypatch: pytest.Monkey
             other = open_line(line.replace("19200", "9600"), wait=PATIENCE, program="panel")
             assert "9600" not in other.line.state.reason, "it is open as it was meant"
             other.close()
+
+
+DIES = """
+import os, signal, sys, time
+from tui.drive.profile import library
+from tui.keeper.starting import start_keeper
+from tui.session.connect import keepers
+from tui.session.connect.open_line import open_line
+from tui.session.drive import DriveSession
+
+keepers.start = start_keeper
+opened = open_line(sys.argv[1], wait=20, program="run")
+drive = DriveSession(opened.line, 1, library.load("atv71"))
+drive.arming.arm()
+time.sleep(0.5)
+if sys.argv[2] == "stop":
+    opened.line.facts.give_stop([1], "the stop key")
+    time.sleep(0.5)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+"""A program that ends when it has given a stop, and has sent no word of it; or before."""
+
+
+@pytest.mark.parametrize("gives", ["stop", "nothing"])
+def test_a_stop_is_carried_out_whose_program_ends_before_its_word(gives: str) -> None:
+    with Simulation([DriveSpec("atv71", 1, run_hz=30.0, sets={"SLL": 0})]) as simulation:
+        line = f"serial:{simulation.serve_pty()},19200,8N1"
+        subprocess.run([sys.executable, "-c", DIES, line, gives], check=False, timeout=PATIENCE)
+        if gives == "stop":
+            wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+            entries = json.loads(drivepanel("journal", "--json").stdout)
+            assert "CMD" in [one["code"] for one in entries["entries"]]
+        else:
+            time.sleep(3.0)
+            assert turns(simulation), "nobody has stopped it"
