@@ -285,10 +285,6 @@ async def test_who_has_long_asked_nothing_makes_room_for_a_further_client(
         await _asked(writer, number, number, bytes([3, 0, 0, 0, 1]))
         if number > 1:
             await _answer(reader)
-    early, early_writer = await asyncio.open_connection(*place)
-    assert await early.read() == b"", "all three asked lately: nobody makes room"
-
-    monkeypatch.setattr(server, "KEEPS_ITS_PLACE", 0.0)
     for number in (4, 5):
         reader, writer = await asyncio.open_connection(*place)
         clients.append((reader, writer))
@@ -298,8 +294,62 @@ async def test_who_has_long_asked_nothing_makes_room_for_a_further_client(
     assert gone == names[1:3], "in the order of their last requests, and not the one that waits"
     await gateway.close()
     assert sorted(gone) == sorted(names)
-    for writer in (early_writer, *(writer for _, writer in clients)):
+    for _, writer in clients:
         writer.close()
+
+
+async def test_no_number_of_connections_from_elsewhere_keeps_a_client_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(server, "MOST_CLIENTS", 4)
+    go_on = asyncio.Event()
+
+    async def answer(request: TcpRequest) -> bytes:
+        await go_on.wait()
+        return request.pdu
+
+    gateway = TcpGateway(answer)
+    place = await gateway.listen("127.0.0.1", 0)
+
+    async def client(host: str, function: int) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        made = await asyncio.open_connection(*place, local_addr=(host, 0))
+        await _asked(made[1], 1, 1, bytes([function, 0, 0, 0, 1]))
+        await asyncio.sleep(0.05)
+        return made
+
+    busy = [await client("127.0.0.2", function) for function in (3, 6, 3, 3)]
+    other = await client("127.0.0.3", 6)
+    assert await busy[0][0].read() == b"", "the address with the most gives one"
+    third = await client("127.0.0.2", 3)
+    assert await busy[2][0].read() == b"", "for one more of its own, too; not one that writes"
+    go_on.set()
+    for reader, _ in (busy[1], busy[3], other, third):
+        assert (await _answer(reader))[0] == 1
+    for _, writer in (*busy, other, third):
+        writer.close()
+    await gateway.close()
+
+
+async def test_a_client_is_turned_away_only_where_all_wait_for_writes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(server, "MOST_CLIENTS", 2)
+
+    async def answer(request: TcpRequest) -> bytes:
+        await asyncio.Event().wait()
+        return request.pdu
+
+    gateway = TcpGateway(answer)
+    place = await gateway.listen("127.0.0.1", 0)
+    writers = [(await asyncio.open_connection(*place))[1] for _ in range(2)]
+    for writer in writers:
+        await _asked(writer, 1, 1, bytes([6, 0, 0, 0, 1]))
+    await asyncio.sleep(0.2)
+    late, late_writer = await asyncio.open_connection(*place)
+    assert await late.read() == b""
+    for writer in (*writers, late_writer):
+        writer.close()
+    await gateway.close()
 
 
 async def test_answers_for_who_has_gone_are_dropped_without_a_word(

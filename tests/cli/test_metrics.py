@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+import socket
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from decimal import Decimal
@@ -149,7 +150,7 @@ async def asked(port: int, request: bytes) -> bytes:
 
 
 async def test_metrics_are_told_and_nothing_else(served: int) -> None:
-    answer = await asked(served, b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n")
+    answer = await asked(served, b"GET /metrics HTTP/1.1\r\nHost: LOCALHOST:1\r\n\r\n")
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4;")
     assert body == b"drivepanel_x 1\n"
@@ -181,8 +182,31 @@ async def test_a_client_that_asks_too_much_is_let_go(served: int) -> None:
     assert (await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
 
 
-async def test_clients_are_counted(served: int) -> None:
+async def test_idle_connections_keep_nobody_out(served: int) -> None:
     idle = [await asyncio.open_connection("127.0.0.1", served) for _ in range(MOST_SCRAPES)]
-    assert await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n") == b""
+    assert (await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    assert await idle[0][0].read() == b"", "the oldest one has made room"
     for _, writer in idle:
         writer.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        (b"127.0.0.1", 200),
+        (b"127.0.0.1:9101", 200),
+        (socket.gethostname().encode(), 200),
+        (b"evil.example", 421),
+        (b"127.0.0.1.evil.example:9101", 421),
+        (b"10.0.0.1", 421),
+        (b"[::1]:9101", 421),
+        (b"", 421),
+        (b"127.0.0.1\r\nHost: evil.example", 421),
+    ],
+)
+async def test_metrics_are_for_who_asks_by_a_name_of_this_server(
+    served: int, host: bytes, status: int
+) -> None:
+    """A web page in a browser of this network could read them under a name of its own."""
+    answer = await asked(served, b"GET /metrics HTTP/1.1\r\nhost: " + host + b"\r\n\r\n")
+    assert answer.startswith(b"HTTP/1.1 %d " % status)

@@ -18,15 +18,14 @@ from typing import Any, SupportsIndex
 
 from .awake import Awake
 from .pdu import BUSY, DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
+from .room import Place, host_of, makes_room
 
 log = logging.getLogger(__name__)
 
 HEADER = struct.Struct(">HHHB")
 LONGEST_PDU = 253
 MOST_CLIENTS = 64
-"""Connections at a time; one more takes the place of the one that has asked nothing for longest."""
-KEEPS_ITS_PLACE = 10.0
-"""Seconds since its last request for which a connection makes room for no other."""
+"""Connections at a time; for one more another one makes room, see `makes_room`."""
 MOST_AT_ONCE = 128
 """Requests of one connection that may be under way; a further read is told to come again."""
 IDLE_CLIENT_ENDS_AFTER = 600.0
@@ -137,7 +136,7 @@ class TcpGateway:
     async def _serve(self, reader: _Incoming, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
-        if not self._has_room():
+        if not self._has_room(host_of(writer.get_extra_info("peername"))):
             log.warning("a further Modbus TCP client was turned away: %d are here", MOST_CLIENTS)
             writer.close()
             return
@@ -157,16 +156,17 @@ class TcpGateway:
             with suppress(OSError, RuntimeError):
                 writer.close()
 
-    def _has_room(self) -> bool:
-        """Whether one more client may stay; who has long asked nothing goes for it."""
-        here = {task: talk for task, talk in self._talks.items() if not talk.makes_room}
+    def _has_room(self, host: str) -> bool:
+        """Whether one more client may stay; another one may have to go for it."""
+        here = {task: talk.place for task, talk in self._talks.items() if not talk.goes}
         if len(here) < MOST_CLIENTS:
             return True
-        task = max(here, key=lambda one: here[one].idle)
-        if here[task].idle < KEEPS_ITS_PLACE:
+        task = makes_room(host, here)
+        if task is None:
             return False
-        log.warning("Modbus TCP client %s was idle and makes room", here[task].client.peer)
-        here[task].makes_room = True
+        talk = self._talks[task]
+        log.warning("Modbus TCP client %s makes room for one from %s", talk.client.peer, host)
+        talk.goes = True
         task.cancel()
         return True
 
@@ -244,7 +244,7 @@ class _Talk:
         self.reads = asyncio.Lock()
         self.asked = asyncio.get_running_loop().time()
         """When a request came last, on the loop's clock."""
-        self.makes_room = False
+        self.goes = False
         """Whether it is about to end for another one."""
         self._under_way: set[asyncio.Task[None]] = set()
         self._writes: set[asyncio.Task[None]] = set()
@@ -255,9 +255,11 @@ class _Talk:
         return len(self._under_way) >= MOST_AT_ONCE
 
     @property
-    def idle(self) -> float:
-        """Seconds since its last request; 0 while one is under way."""
-        return 0.0 if self._under_way else asyncio.get_running_loop().time() - self.asked
+    def place(self) -> Place:
+        """As it counts when one more client comes."""
+        idle = 0.0 if self._under_way else asyncio.get_running_loop().time() - self.asked
+        host = host_of(self.writer.get_extra_info("peername"))
+        return Place(host, idle, writes=bool(self._writes))
 
     def turn(self) -> Callable[[], Awaitable[None]]:
         """The turn of a write that comes now."""

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 from http import HTTPStatus
+from socket import gethostname
+
+from tui.bus.gateway.room import Place, host_of, makes_room
 
 from .metrics import METRICS_TYPE
 
@@ -17,7 +20,7 @@ LONGEST_REQUEST = 8192
 ANSWERED_WITHIN = 10.0
 """Seconds in which a client has asked and taken its answer; then it is let go."""
 MOST_SCRAPES = 16
-"""Connections at a time; one more is closed at once."""
+"""Connections at a time; for one more the oldest of the busiest address is closed."""
 
 
 class MetricsServer:
@@ -26,10 +29,15 @@ class MetricsServer:
     def __init__(self, text: Callable[[], str]) -> None:
         self._text = text
         self._server: asyncio.Server | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: dict[asyncio.Task[None], tuple[str, float]] = {}
+        """Host and time of each connection."""
+        self._names: frozenset[str] = frozenset()
+        """Names by which this server may be asked for, besides the address of each connection."""
 
     async def listen(self, host: str, port: int) -> tuple[str, int]:
         """Listen at an address; returns it with the port that was found for 0. Raises OSError."""
+        own = gethostname().casefold()
+        self._names = frozenset({host.casefold(), own, f"{own}.local", "localhost"})
         self._server = await asyncio.start_server(self._serve, host, port, limit=LONGEST_REQUEST)
         found = self._server.sockets[0].getsockname()
         return found[0], found[1]
@@ -46,14 +54,18 @@ class MetricsServer:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
+        now, host = asyncio.get_running_loop().time(), host_of(writer.get_extra_info("peername"))
         if len(self._tasks) >= MOST_SCRAPES:
-            writer.close()
-            return
-        self._tasks.add(task)
+            here = {one: Place(its, now - since) for one, (its, since) in self._tasks.items()}
+            if (oldest := makes_room(host, here)) is not None:
+                del self._tasks[oldest]
+                oldest.cancel()
+        self._tasks[task] = host, now
         try:
             async with asyncio.timeout(ANSWERED_WITHIN):
                 head = await reader.readuntil(b"\r\n\r\n")
-                writer.write(self._answer(head))
+                own = host_of(writer.get_extra_info("sockname")).casefold()
+                writer.write(self._answer(head, self._names | {own}))
                 await writer.drain()
         except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError) as error:
             log.info("who asked for metrics was let go: %s", error or "too slow")
@@ -61,14 +73,20 @@ class MetricsServer:
             # closing the server is no error of this connection
             return
         finally:
-            self._tasks.discard(task)
+            self._tasks.pop(task, None)
             with suppress(OSError, RuntimeError):
                 writer.close()
 
-    def _answer(self, head: bytes) -> bytes:
-        """Headers and body for a request."""
-        method, _, rest = head.partition(b"\r\n")[0].decode("latin-1").partition(" ")
+    def _answer(self, head: bytes, names: Collection[str]) -> bytes:
+        """Headers and body for a request to a server of these names."""
+        first, *headers = head.decode("latin-1").split("\r\n")
+        method, _, rest = first.partition(" ")
         path = rest.partition(" ")[0].partition("?")[0]
+        # a web page may have this computer ask under a name of its own (DNS rebinding)
+        if any(one not in names for one in _hosts(headers)):
+            return _http(
+                HTTPStatus.MISDIRECTED_REQUEST, "Ask by the host's address.\n"
+            )
         if method not in ("GET", "HEAD"):
             return _http(HTTPStatus.METHOD_NOT_ALLOWED, "Nothing is taken here.\n")
         if path != PATH:
@@ -80,6 +98,16 @@ class MetricsServer:
             log.exception("the metrics were not told")
             return _http(HTTPStatus.INTERNAL_SERVER_ERROR, "The log says what is wrong.\n")
         return _http(HTTPStatus.OK, text, METRICS_TYPE, body=method == "GET")
+
+
+def _hosts(headers: Iterable[str]) -> Iterator[str]:
+    """The hosts that a request names, without their ports, in small letters."""
+    for header in headers:
+        name, _, value = header.partition(":")
+        if name.strip().casefold() == "host":
+            host = value.strip().casefold()
+            bracketed = host.startswith("[")
+            yield host[1:].partition("]")[0] if bracketed else host.partition(":")[0].rstrip(".")
 
 
 def _http(

@@ -1,0 +1,45 @@
+"""Which connection makes room for a further one, where only so many are served at a time.
+
+Each address that clients come from has a share: the one with the most connections gives one of
+its own. So no number of connections from elsewhere keeps a client out that comes to stop a motor.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+K = TypeVar("K")
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A connection that is served."""
+
+    address: str
+    """The host that it comes from."""
+    idle: float
+    """Seconds since its last request, or since it came; 0 while it waits for an answer."""
+    writes: bool = False
+    """True while a write of it is not answered yet: it never makes room."""
+
+
+def makes_room(address: str, here: Mapping[K, Place]) -> K | None:
+    """The connection that goes for a further one from an address; None if none can.
+
+    Of the address that would have the most connections it is the one that was idle for longest.
+    """
+    counts = Counter(one.address for one in here.values())
+    counts[address] += 1
+    most = max(counts.values())
+    idle = {
+        key: one.idle for key, one in here.items() if counts[one.address] == most and not one.writes
+    }
+    return max(idle, key=idle.__getitem__, default=None)
+
+
+def host_of(peer: object) -> str:
+    """The host of a connection's other end."""
+    return str(peer[0]) if isinstance(peer, tuple) and peer else ""
