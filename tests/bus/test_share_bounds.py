@@ -50,6 +50,7 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.share.place import Owner
+from tui.bus.shared_facts import SharedFacts
 from tui.bus.stop_counts import StopCounts
 
 from .conftest import Share
@@ -389,3 +390,17 @@ async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
             eventually(lambda: [one.name for one in owner.facts.others] == ["watch"], 30)
             await voided_and_stopped(lines, peer, other, owner)
     assert other.state.status is LineStatus.CONNECTED
+
+
+def test_what_another_program_says_is_shown_plain_and_not_endless() -> None:
+    facts, heard = SharedFacts(), list[str]()
+    facts.on_text(lambda _, text: heard.append(text))
+    facts.on_stop(lambda _, by, program: heard.extend((by, program.text)))
+    program = Program("x", "\x1b[31m" + "n" * 100, 7, "", "pts/\x07" + "3" * 100)
+    facts.hear_text(1, "stopped\x1b]0;title\x07\n" + "t" * 4000)
+    facts.hear_stop((1,), "\u202ekey\r" + "k" * 4000, program)
+    assert [len(one) for one in heard] == [500, 500, 40 + len(" on ") + 40 + len(" (pid 7)")]
+    assert all(one.isprintable() for one in heard)
+    assert heard[0].startswith("stopped?]0;title??ttt")
+    assert heard[2] == f"?[31m{'n' * 34}… on pts/?{'3' * 34}… (pid 7)"
+    assert Program("x", "panel", 7, "", "pts/3").text == "panel on pts/3 (pid 7)"

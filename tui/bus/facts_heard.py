@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from .leases import WriteLease
-from .program import Program
+from .program import Program, readable
 
 if TYPE_CHECKING:
     from .model import Reply
@@ -89,7 +89,7 @@ class FactsHeard:
     def hear_text(self, device: int, text: str) -> None:
         """Something is to be read."""
         for listener in tuple(self._on_text):
-            heard(listener, device, text)
+            heard(listener, device, readable(text))
 
     def on_stop(self, listener: StopListener) -> Callable[[], None]:
         """Call `listener` when another program stops devices; returns how to end that."""
@@ -98,7 +98,7 @@ class FactsHeard:
     def hear_stop(self, devices: tuple[int, ...], by: str, program: Program) -> None:
         """Another program has stopped devices."""
         for listener in tuple(self._on_stop):
-            heard(listener, devices, by, program)
+            heard(listener, devices, readable(by), program)
 
     def on_denied(self, listener: DeniedListener) -> Callable[[], None]:
         """Call `listener` with device and reason when a claim was refused or ended."""

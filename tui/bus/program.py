@@ -10,6 +10,16 @@ KEEPER = "keeper"
 """The name of the process that holds a line for the programs on it."""
 
 
+LONGEST_NAME, LONGEST_SAID = 40, 500
+"""Characters of a name, and of a sentence, of another program that a person is shown."""
+
+
+def readable(text: str, longest: int = LONGEST_SAID) -> str:
+    """A text of another program as it may be shown: not endless, and nothing for the terminal."""
+    plain = "".join(one if one.isprintable() else "?" for one in text[:longest])
+    return plain if len(text) <= longest else f"{plain[:-1]}…"
+
+
 class Program(msgspec.Struct, frozen=True):
     """A program on the line, as others name it."""
 
@@ -25,5 +35,5 @@ class Program(msgspec.Struct, frozen=True):
     @property
     def text(self) -> str:
         """How people are told of it: `panel on pts/3 (pid 812)`."""
-        where = f" on {self.where}" if self.where else ""
-        return f"{self.name}{where} (pid {self.pid})"
+        where = f" on {readable(self.where, LONGEST_NAME)}" if self.where else ""
+        return f"{readable(self.name, LONGEST_NAME)}{where} (pid {self.pid})"

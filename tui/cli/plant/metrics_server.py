@@ -84,9 +84,7 @@ class MetricsServer:
         path = rest.partition(" ")[0].partition("?")[0]
         # a web page may have this computer ask under a name of its own (DNS rebinding)
         if any(one not in names for one in _hosts(headers)):
-            return _http(
-                HTTPStatus.MISDIRECTED_REQUEST, "Ask by the host's address.\n"
-            )
+            return _http(HTTPStatus.MISDIRECTED_REQUEST, "Ask by the host's address.\n")
         if method not in ("GET", "HEAD"):
             return _http(HTTPStatus.METHOD_NOT_ALLOWED, "Nothing is taken here.\n")
         if path != PATH:
