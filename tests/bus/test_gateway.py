@@ -24,6 +24,7 @@ from tui.bus.gateway.pdu import (
     words_pdu,
     written_pdu,
 )
+from tui.bus.gateway.room import ServedConnection, makes_room
 from tui.bus.gateway.server import HEADER, MOST_AT_ONCE, TcpGateway, TcpRequest, peer_text
 
 
@@ -380,3 +381,17 @@ async def test_answers_for_who_has_gone_are_dropped_without_a_word(
     await asyncio.wait_for(gone.wait(), 30)
     await gateway.close()
     assert not [one for one in caplog.records if one.name == "asyncio"]
+
+
+def test_the_address_with_the_most_connections_makes_room() -> None:
+    here = {
+        1: ServedConnection("a", 1.0),
+        2: ServedConnection("a", 2.0),
+        3: ServedConnection("b", 9.0),
+        4: ServedConnection("a", 8.0, writes=True),
+    }
+    assert makes_room("c", here) == 2
+    assert makes_room("a", here) == 2
+    del here[1]
+    assert makes_room("b", here) == 3, "each would have two: it was idle for longest"
+    assert makes_room("c", {4: here[4]}) is None

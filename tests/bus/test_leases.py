@@ -13,9 +13,9 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.bounds import MOST_CARE
 from tui.bus.errors import RequestRefused
+from tui.bus.leases import RENEWED_EACH
 from tui.bus.line import Line
 from tui.bus.program import Program
-from tui.bus.shared_facts import RENEWED_EACH
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, reply
@@ -51,7 +51,7 @@ def pair(share: Share, peer: PtyPeer) -> tuple[Line, Line]:
     return lines.open("keeper", gated=True), lines.open("run")
 
 
-async def test_what_is_not_armed_is_not_written_and_a_stop_is(share: Share) -> None:
+async def test_only_a_stop_is_sent_to_a_drive_that_is_not_armed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
         for one in (holder, program):
@@ -66,25 +66,25 @@ async def test_an_armed_drive_is_written_until_it_is_disarmed(share: Share) -> N
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
         for one in (holder, program):
-            one.facts.arm(1, 60.0, CARE)
+            one.facts.leases.arm(1, 60.0, CARE)
             await one.write(1, 1, [RUN])
-            one.facts.disarm(1)
-            assert "not armed by this program" in await refusal(one)
-        program.facts.arm(2, 60.0, CARE)
-        assert "drive 1 is not armed by this program" in await refusal(program)
+            one.facts.leases.disarm(1)
+            assert "drive 1 is not armed" in await refusal(one)
+        program.facts.leases.arm(2, 60.0, CARE)
+        assert "drive 1 is not armed any more" in await refusal(program)
         assert written(peer) == [RUN, RUN]
 
 
 async def test_a_stop_ends_it_for_every_program(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        program.facts.arm(1, 60.0, CARE)
+        program.facts.leases.arm(1, 60.0, CARE)
         await program.write(1, 1, [RUN])
         holder.facts.give_stop([1], "the stop key")
         await asyncio.to_thread(eventually, lambda: program.facts.stops.stamp(1) == 1)
         # it knows the stop, and believes that its drive is armed all the same
         assert await refusal(program) == "Not sent: drive 1 was stopped after it was armed."
-        program.facts.arm(1, 60.0, CARE)
+        program.facts.leases.arm(1, 60.0, CARE)
         await program.write(1, 1, [RUN])
         assert written(peer) == [RUN, RUN]
 
@@ -92,12 +92,12 @@ async def test_a_stop_ends_it_for_every_program(share: Share) -> None:
 async def test_it_ends_with_its_time_unless_it_is_renewed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         _, program = pair(share, peer)
-        program.facts.arm(1, -RENEWED_EACH - 0.01, CARE)
+        program.facts.leases.arm(1, -RENEWED_EACH - 0.01, CARE)
         assert await refusal(program) == "Not sent: drive 1 is not armed any more."
-        program.facts.stay_armed(1, 60.0)
+        program.facts.leases.stay_armed(1, 60.0)
         await program.write(1, 1, [RUN])
-        program.facts.arm(1, None, CARE)
-        program.facts.stay_armed(1, -60.0)
+        program.facts.leases.arm(1, None, CARE)
+        program.facts.leases.stay_armed(1, -60.0)
         await program.write(1, 1, [RUN])
         assert written(peer) == [RUN, RUN]
 
@@ -111,24 +111,24 @@ async def test_a_drive_that_the_holder_cannot_stop_is_not_written(share: Share) 
 
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        holder.facts.on_care(take)
+        holder.facts.holder.on_care(take)
         for care in (b"", b"garbage", bytes(MOST_CARE + 1)):
-            program.facts.arm(1, 60.0, care)
+            program.facts.leases.arm(1, 60.0, care)
             assert "does not know how to stop drive 1" in await refusal(program)
-        program.facts.arm(1, 60.0, CARE)
+        program.facts.leases.arm(1, 60.0, CARE)
         await program.write(1, 1, [RUN])
-        program.facts.arm(1, 60.0, b"garbage")
+        program.facts.leases.arm(1, 60.0, b"garbage")
         assert "does not know how to stop drive 1" in await refusal(program)
         assert heard == [(1, b"garbage"), (1, CARE), (1, b"garbage")]
         assert written(peer) == [RUN]
 
 
-async def test_the_next_holder_is_told_of_it(share: Share) -> None:
+async def test_the_next_holder_learns_of_it(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
         first, *others = (lines.open(name, gated=True) for name in ("first", "second", "third"))
         for one in others:
-            one.facts.arm(1, 60.0, CARE)
+            one.facts.leases.arm(1, 60.0, CARE)
         await asyncio.to_thread(first.close)
         await asyncio.to_thread(eventually, lambda: _meet(lines, others))
         for one in others:
@@ -144,7 +144,7 @@ def _meet(lines: SharedLines, programs: list[Line]) -> bool:
 async def test_it_ends_with_its_program(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        program.facts.arm(1, None, CARE)
+        program.facts.leases.arm(1, None, CARE)
         me = program.facts.me.id
         await asyncio.to_thread(eventually, lambda: 1 in holder.facts.leases.of(me))
         await asyncio.to_thread(program.close)
@@ -156,7 +156,7 @@ async def test_a_stop_without_a_word_is_due_once_its_program_is_gone(share: Shar
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
         holder = lines.open("keeper")
-        holder.facts.on_stop_due(lambda devices, _: due.append(devices))
+        holder.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
         for name in ("done", "gone"):
             program = lines.open(name)
             program.facts.give_stop([1], "the stop key")
@@ -167,16 +167,18 @@ async def test_a_stop_without_a_word_is_due_once_its_program_is_gone(share: Shar
         assert due == [(1,)]
 
 
-async def test_a_write_whose_program_is_gone_is_told_of_with_its_result(share: Share) -> None:
+async def test_a_write_whose_program_is_gone_reaches_the_holder_with_its_result(
+    share: Share,
+) -> None:
     left: list[tuple[Program, object, float]] = []
     with PtyPeer(slow) as peer:
         holder, program = pair(share, peer)
-        holder.facts.on_left(
+        holder.facts.holder.on_left(
             lambda who, what, answer: answer.add_done_callback(
                 lambda done: left.append((who, what, done.result().time))
             )
         )
-        program.facts.arm(1, None, CARE)
+        program.facts.leases.arm(1, None, CARE)
         writes = [asyncio.create_task(program.write(1, 1, [word])) for word in (RUN, RUN + 1)]
         await asyncio.to_thread(peer.await_requests, 1)
         await asyncio.to_thread(program.close)

@@ -392,7 +392,7 @@ async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
     assert other.state.status is LineStatus.CONNECTED
 
 
-def test_what_another_program_says_is_shown_plain_and_not_endless() -> None:
+def test_texts_of_other_programs_are_shown_plain_and_not_endless() -> None:
     facts, heard = SharedFacts(), list[str]()
     facts.on_text(lambda _, text: heard.append(text))
     facts.on_stop(lambda _, by, program: heard.extend((by, program.text)))

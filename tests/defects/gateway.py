@@ -19,10 +19,26 @@ DEFECTS = (
     Defect(
         "a-waiting-client-makes-room",
         "tui/bus/gateway/server.py",
-        "return 0.0 if self._under_way else asyncio",
-        "return asyncio",
+        "writes=bool(self._writes)",
+        "writes=False",
         "A client whose stop is still on its way is thrown out with it.",
         ("tests/bus/test_gateway.py",),
+    ),
+    Defect(
+        "one-address-takes-every-connection",
+        "tui/bus/gateway/room.py",
+        "if counts[one.address] == most and",
+        "if",
+        "Clients of one computer that connect again and again throw the others out.",
+        ("tests/bus/test_gateway.py",),
+    ),
+    Defect(
+        "metrics-under-any-name",
+        "tui/cli/plant/metrics_server.py",
+        "if any(one not in names for one in _hosts(headers)):",
+        "if False:",
+        "A web page reads the drives of a plant through a browser in its network.",
+        ("tests/cli/test_metrics.py",),
     ),
     Defect(
         "foreign-commands-unasked",

@@ -8,12 +8,62 @@ STOPS = "tests/bus/test_share_stops.py"
 GATEWAYS = "tests/bus/test_share_gateways.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
+LEASES = "tests/bus/test_leases.py"
+CARE = "tests/session/test_care.py"
 BOUNDS = "tests/bus/test_share_bounds.py"
 MAPPING = "tests/session/test_mapping.py"
 APPLYING = "tests/session/test_applying.py"
 BLOCK = "tests/cli/test_block.py"
 
 DEFECTS = (
+    Defect(
+        "keeper-sends-what-is-not-armed",
+        "tui/bus/shared_facts.py",
+        "if writes and self.gated else",
+        "if False else",
+        "A program that is wrong about itself writes to a drive that is not armed.",
+        (LEASES,),
+    ),
+    Defect(
+        "armed-through-a-stop",
+        "tui/bus/leases.py",
+        "if lease.stamp != self._stops.stamp(device):",
+        "if False:",
+        "A program starts a motor after a stop, without arming it again.",
+        (LEASES,),
+    ),
+    Defect(
+        "armed-for-ever",
+        "tui/bus/leases.py",
+        "if lease.until is not None and time.monotonic() > lease.until:",
+        "if False:",
+        "A program that hangs for an hour starts a motor when it goes on.",
+        (LEASES,),
+    ),
+    Defect(
+        "care-that-is-of-no-use",
+        "tui/bus/share/commanding.py",
+        "if care and not facts.holder.hear_care(device, care):",
+        "if False:",
+        "A motor is started that the keeper of the line cannot stop.",
+        (LEASES,),
+    ),
+    Defect(
+        "stop-dies-with-its-program",
+        "tui/bus/share/server.py",
+        "        if client.stops_due:\n",
+        "        if False:\n",
+        "A program is killed between the stop key and the first frame: the motor runs on.",
+        (LEASES, "tests/line/test_keeper.py"),
+    ),
+    Defect(
+        "due-stop-not-carried-out",
+        "tui/session/sharing/guardian.py",
+        "for session in filter(None, map(self._known, devices)):",
+        "for session in ():",
+        "The keeper hears of a stop that nobody sends, and does not send it.",
+        (CARE,),
+    ),
     Defect(
         "keeper-keeps-the-port",
         "tui/bus/share/keeper_share.py",

@@ -9,7 +9,6 @@ import msgspec
 import pytest
 
 from tui.bus.fake import FakeLine
-from tui.bus.leases import WriteLease
 from tui.bus.model import Reply
 from tui.bus.requests import Diagnose, ReadWrite, Request, WriteMany, WriteOne
 from tui.drive.errors import ProfileError
@@ -45,7 +44,7 @@ def guard(bench: Bench) -> Guardian:
 def arm(bench: Bench, device: int, family: str) -> None:
     """A program arms a drive."""
     care = packed_care(library.load(family), None, guessed=False)
-    bench.line.facts.note_lease(GONE.id, device, WriteLease(0, None, care))
+    assert bench.line.facts.holder.hear_care(device, care)
 
 
 @pytest.mark.parametrize("family", [one.id for one in library.listings()])
@@ -67,9 +66,9 @@ def test_care_that_stops_nothing_is_refused(
 ) -> None:
     care, line, _ = kept
     data = msgspec.msgpack.decode(CARE, type=CareData)
-    assert line.facts.hear_care(1, CARE)
+    assert line.facts.holder.hear_care(1, CARE)
     for wrong in (b"", b"\xc1", CARE[:-20], msgspec.msgpack.encode(replace_profile(data, b"{}"))):
-        assert not line.facts.hear_care(1, wrong)
+        assert not line.facts.holder.hear_care(1, wrong)
     session = care.session(1)
     assert session is not None
     assert session.profile.id == "atv71"
@@ -84,7 +83,7 @@ def test_a_guessed_family_stays_one(kept: tuple[DrivesInCare, FakeLine, Journal]
     care, line, _ = kept
     session = DriveSession(line, 1, library.load("varmeca"))
     session.guessed = True
-    assert line.facts.hear_care(1, session.care())
+    assert line.facts.holder.hear_care(1, session.care())
     found = care.session(1)
     assert found is not None
     assert found.guessed
@@ -94,11 +93,11 @@ def test_writes_left_by_a_program_are_in_the_journal_with_their_answers(
     kept: tuple[DrivesInCare, FakeLine, Journal],
 ) -> None:
     _, line, journal = kept
-    line.facts.hear_care(1, CARE)
+    line.facts.holder.hear_care(1, CARE)
 
     def left(request: Request) -> Future[Reply]:
         answer: Future[Reply] = Future()
-        line.facts.hear_left(GONE, request, answer)
+        line.facts.holder.hear_left(GONE, request, answer)
         return answer
 
     left(WriteOne(1, 8501, 15)).set_result(Reply((), 0.0, b""))
@@ -123,7 +122,7 @@ async def test_a_stop_that_is_due_is_carried_out(bench: Bench) -> None:
     arm(bench, 1, "atv71")
     loop = bench.line._engine._loop
     assert loop is not None
-    loop.call_soon_threadsafe(bench.line.facts.hear_stop_due, (1, 9), "drivepanel stop")
+    loop.call_soon_threadsafe(bench.line.facts.holder.hear_stop_due, (1, 9), "drivepanel stop")
     await come(lambda: guardian.busy)
     await bench.stopped(1)
     await come(lambda: not guardian.busy)

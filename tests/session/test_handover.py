@@ -51,10 +51,7 @@ class Told:
         self.said.append(("hushed", device, why))
 
     def armed(self, device: int, lease: WriteLease) -> None:
-        self.said.append(("armed", device))
-
-    def disarmed(self, device: int) -> None:
-        self.said.append(("disarmed", device))
+        self.said.append(("armed", device, lease.until != 0))
 
     def told(self, device: int, text: str) -> None:
         self.said.append(("told", device, text))
@@ -129,9 +126,9 @@ async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench)
     assert bench.facts.commanders == {}
     assert bench.voice.said == [
         ("claim", 1, True),
-        ("armed", 1),
+        ("armed", 1, True),
         ("claim", 1, False),
-        ("disarmed", 1),
+        ("armed", 1, False),
     ]
 
 
@@ -149,7 +146,7 @@ async def test_an_arming_that_ends_by_itself_gives_the_drive_back(bench: Bench) 
     bench.session.arming.arm()
     bench.clock.advance(ARMED_FOR + 1)
     assert not bench.session.arming.armed
-    assert bench.voice.said[-2:] == [("claim", 1, False), ("disarmed", 1)]
+    assert bench.voice.said[-2:] == [("claim", 1, False), ("armed", 1, False)]
 
 
 async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Bench) -> None:

@@ -245,7 +245,7 @@ async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None
     assert monitor.reader.seconds(["FD01", "FD00", "FE03", "FE05", "FE90"]) > 0
     # what is chosen now counts from the next reset on: the block goes on bringing the same
     for slot, raw in {"F875": 2, "F876": 1}.items():
-        opened.line.facts.arm(1, None, monitor.session.care())
+        opened.line.facts.leases.arm(1, None, monitor.session.care())
         await opened.line.write(1, monitor.profile[slot].address, [raw])
     await until(lambda: not {"F875", "F876"} & monitor.reader.in_force.keys())
     assert simulation.drive(1).raw("F875") == 2
@@ -277,7 +277,7 @@ async def test_a_pending_choice_is_never_proved(start: Start) -> None:
     monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
     # chosen since the last reset: the block brings what it brought before
     for slot, raw in {"F876": 3, "F877": 2}.items():
-        opened.line.facts.arm(1, None, monitor.session.care())
+        opened.line.facts.leases.arm(1, None, monitor.session.care())
         await opened.line.write(1, monitor.profile[slot].address, [raw])
     assert simulation.drive(1).raw("F876") == 3
     monitor.start(period=0.05)

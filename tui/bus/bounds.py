@@ -18,7 +18,7 @@ MOST_STOPPERS = 4 * MOST_PROGRAMS
 MOST_FRAMES, MOST_BYTES = 200, 4096
 """Frames in one message, and bytes of one of them."""
 MOST_CARE = 1 << 20
-"""Bytes that tell what stops a device."""
+"""Bytes of the description with which the holder of a line can stop a device."""
 MOST_SHARE = 1000.0
 """The share of a line's time that polls of one device may request."""
 
@@ -43,3 +43,7 @@ ByteString = Annotated[bytes, Meta(max_length=MOST_BYTES)]
 CareBytes = Annotated[bytes, Meta(max_length=MOST_CARE)]
 StopTimes = Annotated[dict[DeviceId, MonotonicTime], Meta(max_length=MOST_DEVICES)]
 """When each device was stopped last."""
+DeviceIds = Annotated[tuple[DeviceId, ...], Meta(max_length=MOST_DEVICES)]
+Shares = Annotated[dict[DeviceId, Share], Meta(max_length=MOST_DEVICES)]
+ByProgram = Annotated[dict[StopperId, StopCount], Meta(max_length=MOST_STOPPERS)]
+StopsByDevice = Annotated[dict[DeviceId, ByProgram], Meta(max_length=MOST_DEVICES)]

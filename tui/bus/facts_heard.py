@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from concurrent.futures import Future
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from .leases import WriteLease
 from .program import Program, readable
-
-if TYPE_CHECKING:
-    from .model import Reply
-    from .requests import Request
 
 log = logging.getLogger(__name__)
 
@@ -38,10 +33,7 @@ class LineVoice(Protocol):
         """A device is left alone by this program, or with no reason no longer."""
 
     def armed(self, device: int, lease: WriteLease) -> None:
-        """This program may write to a device, or may so for longer."""
-
-    def disarmed(self, device: int) -> None:
-        """This program writes to a device no more."""
+        """This program may write to a device until a time, or no more if that is over."""
 
     def told(self, device: int, text: str) -> None:
         """Something that everybody on the line is to read."""
@@ -54,9 +46,6 @@ ReplyListener = Callable[[int, bool, str], None]
 GoneListener = Callable[[Program], None]
 TextListener = Callable[[int, str], None]
 ChangeListener = Callable[[], None]
-CareListener = Callable[[int, bytes], bool]
-LeftListener = Callable[[Program, "Request", "Future[Reply]"], None]
-DueListener = Callable[[tuple[int, ...], str], None]
 
 
 class FactsHeard:
@@ -70,13 +59,10 @@ class FactsHeard:
         self._on_gone: list[GoneListener] = []
         self._on_text: list[TextListener] = []
         self._on_change: list[ChangeListener] = []
-        self._on_care: list[CareListener] = []
-        self._on_left: list[LeftListener] = []
-        self._on_due: list[DueListener] = []
 
     def on_change(self, listener: ChangeListener) -> Callable[[], None]:
         """Call `listener` when programs or commanders are others than before."""
-        return _subscribed(self._on_change, listener)
+        return subscribed(self._on_change, listener)
 
     def _changed(self) -> None:
         for listener in tuple(self._on_change):
@@ -84,7 +70,7 @@ class FactsHeard:
 
     def on_text(self, listener: TextListener) -> Callable[[], None]:
         """Call `listener` with what is to be read about a device."""
-        return _subscribed(self._on_text, listener)
+        return subscribed(self._on_text, listener)
 
     def hear_text(self, device: int, text: str) -> None:
         """Something is to be read."""
@@ -93,7 +79,7 @@ class FactsHeard:
 
     def on_stop(self, listener: StopListener) -> Callable[[], None]:
         """Call `listener` when another program stops devices; returns how to end that."""
-        return _subscribed(self._on_stop, listener)
+        return subscribed(self._on_stop, listener)
 
     def hear_stop(self, devices: tuple[int, ...], by: str, program: Program) -> None:
         """Another program has stopped devices."""
@@ -102,7 +88,7 @@ class FactsHeard:
 
     def on_denied(self, listener: DeniedListener) -> Callable[[], None]:
         """Call `listener` with device and reason when a claim was refused or ended."""
-        return _subscribed(self._on_denied, listener)
+        return subscribed(self._on_denied, listener)
 
     def hear_denied(self, device: int, why: str) -> None:
         """What this program claimed is not, or no longer, its own."""
@@ -111,7 +97,7 @@ class FactsHeard:
 
     def on_question(self, listener: QuestionListener) -> Callable[[], None]:
         """Call `listener` when a program asks for a device that is commanded from here."""
-        return _subscribed(self._on_question, listener)
+        return subscribed(self._on_question, listener)
 
     def hear_question(self, device: int, program: Program) -> None:
         """A program asks for a device that is commanded from here."""
@@ -120,47 +106,15 @@ class FactsHeard:
 
     def on_reply(self, listener: ReplyListener) -> Callable[[], None]:
         """Call `listener` with device, yes or no, and why, when a question was answered."""
-        return _subscribed(self._on_reply, listener)
-
-    def on_care(self, listener: CareListener) -> Callable[[], None]:
-        """Call `listener`, in the holder only, with what stops a device; it returns if it can."""
-        return _subscribed(self._on_care, listener)
-
-    def hear_care(self, device: int, care: bytes) -> bool:
-        """A program tells what stops a device; False if a listener cannot make use of it."""
-        taken = [listener(device, care) for listener in tuple(self._on_care)]
-        return all(taken)
-
-    def on_left(self, listener: LeftListener) -> Callable[[], None]:
-        """Call `listener`, in the holder only, with writes whose program ended before the answer.
-
-        Each may have been sent; the future tells what became of it.
-        """
-        return _subscribed(self._on_left, listener)
-
-    def hear_left(self, program: Program, request: Request, answer: Future[Reply]) -> None:
-        """A program has ended that had asked for a write."""
-        for listener in tuple(self._on_left):
-            heard(listener, program, request, answer)
-
-    def on_stop_due(self, listener: DueListener) -> Callable[[], None]:
-        """Call `listener`, in the holder only, with devices and by whom, when it is to stop them.
-
-        Their stop was given by a program that is gone, or that leaves the rest to the holder.
-        """
-        return _subscribed(self._on_due, listener)
-
-    def hear_stop_due(self, devices: tuple[int, ...], by: str) -> None:
-        """A stop was given that no program carries out."""
-        for listener in tuple(self._on_due):
-            heard(listener, devices, by)
+        return subscribed(self._on_reply, listener)
 
     def on_gone(self, listener: GoneListener) -> Callable[[], None]:
         """Call `listener`, in the owner only, when a program left without saying so, or ended."""
-        return _subscribed(self._on_gone, listener)
+        return subscribed(self._on_gone, listener)
 
 
-def _subscribed(listeners: list[T], listener: T) -> Callable[[], None]:
+def subscribed(listeners: list[T], listener: T) -> Callable[[], None]:
+    """Add a listener; returns how to end that."""
     listeners.append(listener)
 
     def leave() -> None:

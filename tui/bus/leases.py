@@ -8,11 +8,19 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
+from .bounds import MOST_CARE
 from .stop_counts import StopCounts
+
+if TYPE_CHECKING:
+    from .facts_heard import LineVoice
+
+RENEWED_EACH = 1.0
+"""Seconds after which the holder of a line hears that a device stays armed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,19 +32,59 @@ class WriteLease:
     until: float | None = None
     """When it ends (monotonic); None: when the program leaves the line."""
     care: bytes = b""
-    """What stops the device, should the program end: see tui.session.care_data."""
+    """The care for the device: see tui.session.care_data."""
 
 
 class WriteLeases:
-    """The leases of one line; for any thread."""
+    """The leases of one line: this program's, and in its holder those of all; for any thread."""
 
-    def __init__(self, stops: StopCounts) -> None:
+    def __init__(self, me: str, stops: StopCounts, voice: Callable[[], LineVoice | None]) -> None:
+        self._me = me
         self._stops = stops
+        self._voice = voice
         self._leases: Mapping[tuple[str, int], WriteLease] = MappingProxyType({})
         self._lock = threading.Lock()
 
+    # This program's
+
+    def arm(self, device: int, seconds: float | None, care: bytes) -> None:
+        """Write to a device for so many seconds; None: until this program leaves the line.
+
+        `care` is how to stop the device, should this program end.
+        """
+        # the holder's lease ends a moment later: what is refused is refused here, with its reason
+        until = None if seconds is None else time.monotonic() + seconds + RENEWED_EACH
+        known = care if len(care) <= MOST_CARE else b""
+        if not known:
+            self.disarm(device)  # or the care of before would count
+        self._say(device, self.grant(self._me, device, self._lease(device, until, known)))
+
+    def _lease(self, device: int, until: float | None, care: bytes) -> WriteLease:
+        return WriteLease(self._stops.stamp(device), until, care)
+
+    def stay_armed(self, device: int, seconds: float | None) -> None:
+        """Write on to a device that this program has armed, for so many seconds."""
+        lease = self._leases.get((self._me, device))
+        if lease is None or lease.until is None or seconds is None:
+            return
+        if (until := time.monotonic() + seconds + RENEWED_EACH) - lease.until >= RENEWED_EACH:
+            self.grant(self._me, device, replace(lease, until=until))
+            self._say(device, WriteLease(lease.stamp, until))
+
+    def disarm(self, device: int) -> None:
+        """Write to a device no more."""
+        if (self._me, device) in self._leases:
+            self.end(self._me, device)
+            self._say(device, WriteLease(self._stops.stamp(device), 0.0))
+
+    def _say(self, device: int, lease: WriteLease) -> None:
+        if (voice := self._voice()) is not None:
+            voice.armed(device, lease)
+
+    # Of all
+
     def grant(self, program: str, device: int, lease: WriteLease) -> WriteLease:
-        """Let a program write to a device; without `care` what it has registered before stays."""
+        """Let a program write to a device; without `care` that of before stays."""
         with self._lock:
             before = self._leases.get((program, device))
             if before is not None and not lease.care:
@@ -53,10 +101,6 @@ class WriteLeases:
                 if key[0] != program or device not in (None, key[1])
             }
             self._leases = MappingProxyType(rest)
-
-    def find(self, program: str, device: int) -> WriteLease | None:
-        """The lease of a program for a device."""
-        return self._leases.get((program, device))
 
     def of(self, program: str) -> dict[int, WriteLease]:
         """The leases of a program, by device."""

@@ -92,12 +92,11 @@ class Line:
         share: ShareLine = Sharing,
         gated: bool = False,
     ) -> None:
-        """With `gated` nothing is written to a device that its program has not armed."""
         self.link, self.read_only = link, read_only
         self.held = ""
         self.timing = timing or timing_of(link)
         self.facts = SharedFacts(program)
-        self.facts.gated = gated
+        self.facts.gated = gated  # nothing is written to a device that is not armed
         """What the programs on the line know of each other."""
         shared = partial(share, place) if place is not None else None
         self._engine = Engine(link, self.timing, clock, self.facts, shared)

@@ -7,21 +7,17 @@ from __future__ import annotations
 
 import os
 import threading
-import time
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
-from .bounds import MOST_CARE
 from .facts_heard import FactsHeard, LineVoice, heard
-from .leases import WriteLease, WriteLeases
+from .holder_heard import HolderHeard
+from .leases import WriteLeases
 from .program import KEEPER, Program
 from .stop_counts import GivenStops, StopCounts
 
 DEPARTED_KEPT = 16
 """How many programs that left are remembered."""
-RENEWED_EACH = 1.0
-"""Seconds after which the holder of a line is told that a device stays armed."""
 
 
 class SharedFacts(FactsHeard):
@@ -41,10 +37,12 @@ class SharedFacts(FactsHeard):
         """Devices that nobody asks now: by whose id, and why."""
         self.stops = StopCounts()
         """How many stops each device was given, by all programs."""
-        self.leases = WriteLeases(self.stops)
+        self.leases = WriteLeases(self.me.id, self.stops, lambda: self.voice)
         """Which program may write to which device."""
         self.gated = False
         """True on a line where nothing is written to a device that its program has not armed."""
+        self.holder = HolderHeard()
+        """Hears what only the holder of the line learns."""
         self.departed: tuple[Program, ...] = ()
         """Programs that have left the line, the last ones last."""
         self.voice: LineVoice | None = None
@@ -169,51 +167,6 @@ class SharedFacts(FactsHeard):
             self.note_commander(device, None)
         if self.voice is not None:
             self.voice.claim(device, False)
-
-    # Who may write
-
-    def arm(self, device: int, seconds: float | None, care: bytes) -> None:
-        """This program may write to a device for so many seconds; None: until it leaves the line.
-
-        `care` is what stops the device, should this program end.
-        """
-        # the holder's lease ends a moment later: what is refused is refused here, with its reason
-        until = None if seconds is None else time.monotonic() + seconds + RENEWED_EACH
-        known = care if len(care) <= MOST_CARE else b""
-        if not known:
-            self.disarm(device)  # or what was told before would count
-        lease = self.leases.grant(
-            self.me.id, device, WriteLease(self.stops.stamp(device), until, known)
-        )
-        if self.voice is not None:
-            self.voice.armed(device, lease)
-
-    def stay_armed(self, device: int, seconds: float | None) -> None:
-        """This program may write on to a device that it has armed, for so many seconds."""
-        lease = self.leases.find(self.me.id, device)
-        if lease is None or lease.until is None or seconds is None:
-            return
-        if (until := time.monotonic() + seconds + RENEWED_EACH) - lease.until >= RENEWED_EACH:
-            renewed = self.leases.grant(self.me.id, device, WriteLease(lease.stamp, until))
-            if self.voice is not None:
-                self.voice.armed(device, replace(renewed, care=b""))
-
-    def disarm(self, device: int) -> None:
-        """This program writes to a device no more."""
-        if self.leases.find(self.me.id, device) is not None:
-            self.leases.end(self.me.id, device)
-            if self.voice is not None:
-                self.voice.disarmed(device)
-
-    def note_lease(self, program: str, device: int, lease: WriteLease) -> None:
-        """A program that is attached has armed a device; called where this program holds the line.
-
-        Care that nobody here can make use of is none.
-        """
-        if lease.care and not self.hear_care(device, lease.care):
-            self.leases.end(program, device)
-            lease = replace(lease, care=b"")
-        self.leases.grant(program, device, lease)
 
     def note_commander(self, device: int, program: str | None) -> None:
         """A program commands a device; None: nobody does."""

@@ -60,7 +60,7 @@ class Arming:
         if self._device is not None and (why := self._line.facts.claim(self._device)):
             raise CommandedElsewhere(why)
         if self._device is not None:
-            self._line.facts.arm(self._device, _finite(seconds), self._care())
+            self._line.facts.leases.arm(self._device, _finite(seconds), self._care())
         self._span, self._why = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds
@@ -78,14 +78,14 @@ class Arming:
         self._why = why
         if self._device is not None:
             self._line.facts.release(self._device)
-            self._line.facts.disarm(self._device)
+            self._line.facts.leases.disarm(self._device)
 
     def touch(self) -> None:
         """A key was pressed, or work goes on: an armed drive stays armed."""
         if self.armed_for is not None:
             self._until = self._clock.monotonic() + self._span
             if self._device is not None:
-                self._line.facts.stay_armed(self._device, _finite(self._span))
+                self._line.facts.leases.stay_armed(self._device, _finite(self._span))
 
     @property
     def armed_for(self) -> float | None:

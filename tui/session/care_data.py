@@ -1,4 +1,4 @@
-"""How a drive is stopped by the process that holds its line, as its own program tells it there.
+"""The care for a drive: with it, the holder of a line can stop the drive without its program.
 
 The profile goes as data: the holder may have another folder of profiles, or the file may have
 changed since.
@@ -18,7 +18,7 @@ from .connect.identify import DriveIdentity
 
 
 class CareData(msgspec.Struct, frozen=True):
-    """What it takes to stop one drive."""
+    """The care for one drive, as it goes to the holder of its line."""
 
     profile: Annotated[bytes, Meta(max_length=MOST_CARE)]
     """As Profile.packed."""
@@ -27,5 +27,5 @@ class CareData(msgspec.Struct, frozen=True):
 
 
 def packed_care(profile: Profile, identity: DriveIdentity | None, *, guessed: bool) -> bytes:
-    """What the holder of a line is told of a drive."""
+    """The bytes of the care for a drive."""
     return msgspec.msgpack.encode(CareData(profile.packed, identity, guessed))

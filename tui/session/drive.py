@@ -112,7 +112,7 @@ class DriveSession:
             weakref.finalize(self, leave)
 
     def care(self) -> bytes:
-        """How the drive is stopped by another process, should this one end."""
+        """The care for the drive: how another process can stop it, should this one end."""
         return packed_care(self.family, self.identity, guessed=self.guessed)
 
     @property

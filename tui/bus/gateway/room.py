@@ -1,7 +1,7 @@
-"""Which connection makes room for a further one, where only so many are served at a time.
+"""Makes room for a further connection to a server that keeps a limited number.
 
 Each address that clients come from has a share: the one with the most connections gives one of
-its own. So no number of connections from elsewhere keeps a client out that comes to stop a motor.
+its own. So no number of connections from elsewhere keeps a client out that must stop a motor.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ K = TypeVar("K")
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ServedConnection:
     """A connection that is served."""
 
     address: str
@@ -26,7 +26,7 @@ class Place:
     """True while a write of it is not answered yet: it never makes room."""
 
 
-def makes_room(address: str, here: Mapping[K, Place]) -> K | None:
+def makes_room(address: str, here: Mapping[K, ServedConnection]) -> K | None:
     """The connection that goes for a further one from an address; None if none can.
 
     Of the address that would have the most connections it is the one that was idle for longest.

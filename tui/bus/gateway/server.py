@@ -18,7 +18,7 @@ from typing import Any, SupportsIndex
 
 from .awake import Awake
 from .pdu import BUSY, DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
-from .room import Place, host_of, makes_room
+from .room import ServedConnection, host_of, makes_room
 
 log = logging.getLogger(__name__)
 
@@ -255,11 +255,11 @@ class _Talk:
         return len(self._under_way) >= MOST_AT_ONCE
 
     @property
-    def place(self) -> Place:
+    def place(self) -> ServedConnection:
         """As it counts when one more client comes."""
         idle = 0.0 if self._under_way else asyncio.get_running_loop().time() - self.asked
         host = host_of(self.writer.get_extra_info("peername"))
-        return Place(host, idle, writes=bool(self._writes))
+        return ServedConnection(host, idle, writes=bool(self._writes))
 
     def turn(self) -> Callable[[], Awaitable[None]]:
         """The turn of a write that comes now."""

@@ -11,7 +11,7 @@ from functools import partial
 
 from ..bounds import MOST_BYTES, MOST_FRAMES
 from ..errors import RequestRefused
-from ..facts_heard import LeftListener
+from ..holder_heard import LeftListener
 from ..limits import CAUTIOUS, Limits
 from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program

@@ -14,7 +14,6 @@ from .messages import (
     AskedFor,
     Claim,
     Denied,
-    Disarmed,
     Granting,
     Hush,
 )
@@ -46,16 +45,21 @@ class Commanding:
             case Hush(device=device, why=why):
                 facts.note_hush(device, program.id, why)
                 self._tell_facts()
-            case Armed() | Disarmed() if program.id == facts.me.id:
-                pass  # noted already
-            case Armed(device=device):
-                lease = WriteLease(message.stamp, message.until, message.care)
-                facts.note_lease(program.id, device, lease)
-            case Disarmed(device=device):
-                facts.leases.end(program.id, device)
+            case Armed():
+                self._armed(program, message)
             case _:
                 return False
         return True
+
+    def _armed(self, program: Program, message: Armed) -> None:
+        """A program may write to a device; care that nobody here can make use of is none."""
+        facts, device, care = self._facts, message.device, message.care
+        if program.id == facts.me.id:
+            return  # granted already
+        if care and not facts.holder.hear_care(device, care):
+            facts.leases.end(program.id, device)
+            care = b""
+        facts.leases.grant(program.id, device, WriteLease(message.stamp, message.until, care))
 
     def claimed(self, program: Program, claim: Claim) -> None:
         """A program wants to command a device, or no longer."""

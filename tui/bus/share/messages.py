@@ -15,18 +15,18 @@ from ..bounds import (
     MOST_DEVICES,
     MOST_FRAMES,
     MOST_PROGRAMS,
-    MOST_STOPPERS,
     ByteString,
     CareBytes,
     DeviceId,
+    DeviceIds,
     MonotonicTime,
     Notice,
     Number,
     ProgramId,
     Seconds,
-    Share,
+    Shares,
     StopCount,
-    StopperId,
+    StopsByDevice,
     StopTimes,
     Text,
     Word,
@@ -43,11 +43,7 @@ LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; more is no message of ours."""
 LENGTH = 4
 
-DeviceIds = Annotated[tuple[DeviceId, ...], Meta(max_length=MOST_DEVICES)]
-Shares = Annotated[dict[DeviceId, Share], Meta(max_length=MOST_DEVICES)]
-ByProgram = Annotated[dict[StopperId, StopCount], Meta(max_length=MOST_STOPPERS)]
 SeenFrame = tuple[MonotonicTime, FrameDirection, ByteString, Word]
-StopsByDevice = Annotated[dict[DeviceId, ByProgram], Meta(max_length=MOST_DEVICES)]
 
 
 class Message(msgspec.Struct, frozen=True, tag=True):
@@ -104,7 +100,6 @@ class Asking(Message, frozen=True):
     stamp: StopCount
     """The count of stops of the device that the asker knew of."""
     asked: MonotonicTime
-    """When the program asked."""
     limits: Limits | None = None
     """Where they are not those of the device: of a broadcast."""
     within: Seconds | None = None
@@ -173,21 +168,14 @@ class Claim(Message, frozen=True):
 
 
 class Armed(Message, frozen=True):
-    """A program may write to a device; told again while it stays armed."""
+    """A program may write to a device until a time, or until it leaves the line."""
 
     device: DeviceId
     stamp: StopCount
     """The count of stops of the device when it was armed."""
     until: MonotonicTime | None = None
-    """When it ends; None: when the program leaves the line."""
     care: CareBytes = b""
-    """What stops the device; empty where that was told before."""
-
-
-class Disarmed(Message, frozen=True):
-    """A program writes to a device no more."""
-
-    device: DeviceId
+    """The care for the device; empty if that has not changed."""
 
 
 class Denied(Message, frozen=True):
@@ -282,7 +270,7 @@ class Goodbye(Message, frozen=True):
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
     | Alive | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | Hush | PollWish
-    | Facts | News | Goodbye | Armed | Disarmed
+    | Facts | News | Goodbye | Armed
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

@@ -141,7 +141,7 @@ class ShareServer:
         if message is None:
             return None
         facts, inside = self._inside.facts, self._inside
-        client = Client(message.program, writer, facts.hear_left, heard=inside.clock())
+        client = Client(message.program, writer, facts.holder.hear_left, heard=inside.clock())
         own = label(inside.link)
         gone = client.program.id in self._gone_before
         client.say(Welcome(facts.me, own, own == message.label, gone))
@@ -169,7 +169,7 @@ class ShareServer:
         self._stops_left += client.forget()
         if client.stops_due:
             facts = self._inside.facts
-            facts.hear_stop_due(tuple(client.stops_due), client.program.text)
+            facts.holder.hear_stop_due(tuple(client.stops_due), client.program.text)
         if self._clients.get(client.program.id) is not client:
             return
         del self._clients[client.program.id]

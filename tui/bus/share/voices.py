@@ -12,7 +12,6 @@ from .messages import (
     Armed,
     AskedFor,
     Claim,
-    Disarmed,
     Granting,
     Hush,
     StopGiven,
@@ -50,12 +49,8 @@ class ProgramVoice:
         self._send(Hush(device, why[:MOST_NOTICE]))
 
     def armed(self, device: int, lease: WriteLease) -> None:
-        """This program may write to a device, or may so for longer."""
+        """This program may write to a device until a time, or no more if that is over."""
         self._send(Armed(device, lease.stamp, lease.until, lease.care))
-
-    def disarmed(self, device: int) -> None:
-        """This program writes to a device no more."""
-        self._send(Disarmed(device))
 
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""
@@ -63,10 +58,7 @@ class ProgramVoice:
 
 
 def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
-    """Tell the holder of a line what is this program's: drives that are armed, commanded, hushed.
-
-    For a holder that does not know it yet.
-    """
+    """Send the holder of a line what this program has armed, commands or leaves alone."""
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
         send(Armed(device, lease.stamp, lease.until, lease.care))

@@ -9,7 +9,7 @@ from contextlib import suppress
 from http import HTTPStatus
 from socket import gethostname
 
-from tui.bus.gateway.room import Place, host_of, makes_room
+from tui.bus.gateway.room import ServedConnection, host_of, makes_room
 
 from .metrics import METRICS_TYPE
 
@@ -56,7 +56,9 @@ class MetricsServer:
         assert task is not None
         now, host = asyncio.get_running_loop().time(), host_of(writer.get_extra_info("peername"))
         if len(self._tasks) >= MOST_SCRAPES:
-            here = {one: Place(its, now - since) for one, (its, since) in self._tasks.items()}
+            here = {
+                one: ServedConnection(its, now - since) for one, (its, since) in self._tasks.items()
+            }
             if (oldest := makes_room(host, here)) is not None:
                 del self._tasks[oldest]
                 oldest.cancel()

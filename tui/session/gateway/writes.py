@@ -226,7 +226,7 @@ class GatewayWrite:
         session, asked = self._session, self._asked
         forbidden = None if priority is Priority.STOP else self._voided
         if forbidden is not None:
-            session.line.facts.arm(session.device, ARMED_FOR_ONE, session.care())
+            session.line.facts.leases.arm(session.device, ARMED_FOR_ONE, session.care())
         for one in parameters:
             session.image.doubt(one.code)
         if asked.function == 23:

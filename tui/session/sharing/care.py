@@ -1,4 +1,4 @@
-"""The drives that programs on a line have armed, each with what stops it without its program."""
+"""The drives that programs on a line have armed, as their holder can stop them."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ MOST_PROFILES = 16
 
 
 class DrivesInCare:
-    """Keeps a session for each of them; called in the line's thread.
+    """Keeps a session for each of them, and the journal of writes whose program ended too soon.
 
-    Also keeps in the journal what became of writes whose program ended before the answer came.
+    Called in the line's thread.
     """
 
     def __init__(self, line: ModbusLine, journal: Journal) -> None:
@@ -41,8 +41,8 @@ class DrivesInCare:
         self._journal = journal
         self._profiles: dict[bytes, Profile] = {}
         self._sessions: dict[int, tuple[bytes, DriveSession]] = {}
-        facts = line.facts
-        self._leave = (facts.on_care(self._registered), facts.on_left(self._left))
+        holder = line.facts.holder
+        self._leave = (holder.on_care(self._registered), holder.on_left(self._left))
 
     def close(self) -> None:
         """Keep nothing more."""
@@ -55,7 +55,7 @@ class DrivesInCare:
         return session
 
     def _registered(self, device: int, care: bytes) -> bool:
-        """A program arms a drive; False if what it tells stops none."""
+        """A program arms a drive; False if its care cannot be used."""
         before, _ = self._sessions.get(device, (b"", None))
         if before == care:
             return True

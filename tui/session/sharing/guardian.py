@@ -81,7 +81,7 @@ class Guardian:
         self._workers: list[LineWorker] = []
         self._changing = threading.Lock()
         facts = line.facts
-        self._leave = (facts.on_gone(self.gone), facts.on_stop_due(self._stop_due))
+        self._leave = (facts.on_gone(self.gone), facts.holder.on_stop_due(self._stop_due))
 
     @property
     def busy(self) -> bool:
