@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,8 @@ WIDE = Limits(
     subfunctions=frozenset({0, 10, 11}),
     broadcast_functions=frozenset({6, 16}),
 )
+NO_ECHO = replace(WIDE, functions=WIDE.functions - {8})
+"""The same for a device without diagnostics."""
 
 # generous: a loaded machine must not turn an answer into silence
 PATIENT = Timing(first_timeout=5.0, min_timeout=5.0, late_reply=6.0)

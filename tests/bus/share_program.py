@@ -1,8 +1,8 @@
 """A program on a shared line that does what it is told on standard input, until it is killed.
 
 `python -m tests.bus.share_program PORT FOLDER NAME LATE`; prints `ready`, then a line for each
-line it was told: `read REGISTER`, `write REGISTER VALUE`, `claim DEVICE`; does not wait for the end
-of a write.
+line it was told: `read REGISTER`, `ask REGISTER`, `write REGISTER VALUE`, `claim DEVICE`; does not
+wait for the answer of `ask`, nor for the end of a write.
 """
 
 from __future__ import annotations
@@ -32,11 +32,13 @@ async def main(port: str, folder: str, name: str, late: str) -> None:
     line.describe(1, WIDE)
     await asyncio.to_thread(line.open, wait=20)
     print("ready", flush=True)
-    works = []
+    works: list[asyncio.Task[object]] = []
     while told := (await asyncio.to_thread(sys.stdin.readline)).split():
         match told:
             case ["read", register]:
                 await line.read(1, int(register))
+            case ["ask", register]:
+                works.append(asyncio.create_task(line.read(1, int(register))))
             case ["write", register, value]:
                 works.append(asyncio.create_task(line.write(1, int(register), [int(value)])))
             case ["claim", device]:

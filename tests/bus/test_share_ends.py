@@ -35,7 +35,7 @@ from tui.bus.share.messages import (
 )
 from tui.bus.share.place import Owner, OwnerLock, short_path
 
-from .conftest import Share
+from .conftest import NO_ECHO, Share
 from .peer import PtyPeer, Step, eventually, honest, reply
 from .sharing import QUICK, SharedLines, frozen, in_loop, other_program, place_in
 
@@ -73,7 +73,8 @@ async def test_the_owners_end_hands_the_line_over_and_reads_are_asked_anew(share
         assert (await in_flight).words == (SLOW_REGISTER,)
         for task in waiting:
             assert (await task).words == (30,)
-        assert times_sent(peer, 3) == 2
+        # the same read may have been the first on the port, which tells of its adapter
+        assert times_sent(peer, 3) in (2, 3)
         eventually(lambda: {line.facts.programs[0].name for line in (other, third)} != {"panel"})
         assert other.facts.programs[0] == third.facts.programs[0]
         eventually(lambda: [len(line.facts.others) for line in (other, third)] == [1, 1])
@@ -123,6 +124,7 @@ async def test_a_killed_owner_is_followed_once_no_reply_to_it_may_come(
         owner.tell("read 1")
         lines = share(peer.path)
         line = lines.open("watch", timing=replace(QUICK, late_reply=1.0))
+        line.describe(1, NO_ECHO)
         gone: list[str] = []
         line.facts.on_gone(lambda program: gone.append(program.name))
         owner.tell(f"write {SLOW_REGISTER} 5")
@@ -160,6 +162,7 @@ async def test_one_that_comes_after_a_killed_owner_keeps_the_same_silence(
         await come(lambda: times_sent(peer, 6) == 1)
         await asyncio.to_thread(owner.kill)
         line = share(peer.path).open("watch", timing=replace(QUICK, late_reply=1.0))
+        line.describe(1, NO_ECHO)
         await line.read(1, 8)
         assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
 
@@ -179,6 +182,7 @@ async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Shar
         await asyncio.sleep(0.1)
         lines.opened[-1].close()
         line = lines.open("watch", timing=late)
+        line.describe(1, NO_ECHO)
         assert (await line.read(1, 8)).words == (8,)
         assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
         with pytest.raises(LineClosed):

@@ -10,6 +10,7 @@ FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
 LEASES = "tests/bus/test_leases.py"
 CARE = "tests/session/test_care.py"
+STEP = "tests/bus/test_step_proof.py"
 BOUNDS = "tests/bus/test_share_bounds.py"
 MAPPING = "tests/session/test_mapping.py"
 APPLYING = "tests/session/test_applying.py"
@@ -262,10 +263,26 @@ DEFECTS = (
     Defect(
         "successor-does-not-wait",
         "tui/bus/share/sharing.py",
-        "await asyncio.sleep(max(0.0, self._quiet_until - self._inside.clock()))",
+        "self._inside.dispatcher.proof.doubt(self._quiet_until)",
         "pass",
         "The answer to the killed program's request is taken for the next one's.",
-        (ENDS,),
+        (ENDS, STEP),
+    ),
+    Defect(
+        "any-reply-proves-the-step",
+        "tui/bus/schedule/step_proof.py",
+        "if (await self._exchange(master, job, echo)).kind is ResultKind.REPLY:",
+        "if await self._exchange(master, job, echo):",
+        "A drive that answers a dead program's requests is believed to answer this one's.",
+        (STEP,),
+    ),
+    Defect(
+        "a-stop-waits-for-the-proof",
+        "tui/bus/schedule/step_proof.py",
+        "return job.priority is not Priority.STOP or not job.request.changes",
+        "return True",
+        "After a keeper was killed, no stop goes out for two seconds.",
+        (STEP,),
     ),
     Defect(
         "newcomer-does-not-wait",

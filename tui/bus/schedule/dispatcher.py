@@ -8,14 +8,16 @@ from collections.abc import Callable
 from ..errors import LineClosed, LineError, LineFailed, LineLost, NoAnswer, RequestRefused
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
-from ..requests import Diagnose, Read
+from ..requests import Diagnose
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
+from .echo import resolve_echo
 from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
 from .patience import Devices
 from .queue import Job, JobQueue
+from .step_proof import StepProof
 
 HELD_LOOK = 0.01
 """Seconds between two looks whether requests are held back still."""
@@ -41,6 +43,8 @@ class Dispatcher:
         self._queue = JobQueue(timing.queue_length)
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
+        self.proof = StepProof(devices, self._outcomes, clock)
+        """Decides which replies are trusted after another process has used the line."""
         self.in_flight = False
         """Whether a request was sent whose end is not known yet."""
         self.held_back: Callable[[], bool] = bool
@@ -156,6 +160,8 @@ class Dispatcher:
         now = self._clock()
         if job.priority is not Priority.STOP and self.held_back():
             return now + HELD_LOOK
+        if (trusted := self.proof.not_before(job, now)) > now:
+            return trusted
         if self._devices.backed_off(job.request.device, job.priority, now, job.within) is not None:
             # taken out at once, to be told
             return 0.0
@@ -197,14 +203,24 @@ class Dispatcher:
         """Why a request must not go out, by all, and by the one who asks."""
         return self.refusal(job) or (job.forbidden() if job.forbidden is not None else "")
 
-    async def _run(self, master: Master, job: Job) -> None:
+    def _begins(self, job: Job) -> bool:
+        """Take a job up; False if nothing is to be sent for it."""
         if self._left_alone(job) or self._is_answered(job):
-            return
+            return False
         if not job.begun and not job.answer.set_running_or_notify_cancel():
-            return
+            return False
         job.begun = True
         if why := self.forbidden(job):
             job.fail(RequestRefused(why))
+            return False
+        return True
+
+    async def _run(self, master: Master, job: Job) -> None:
+        if not self._begins(job):
+            return
+        if self.proof.is_due(job):
+            self._queue.put_back(job)
+            await self.proof.prove(master, job)
             return
         if job.request.changes:
             self._outcomes.values.drop(job.request.device)
@@ -213,7 +229,7 @@ class Dispatcher:
         try:
             result = await master.exchange(self._sending(job))
             if result.kind is ResultKind.UNSURE:
-                await self._resolve_echo(master, job, result)
+                await resolve_echo(master, job, result, self._devices, self._outcomes)
             if self._is_repeat(job, result):
                 result = await self._ask_again(master, job, result)
         except _NotSent as reason:
@@ -269,23 +285,6 @@ class Dispatcher:
             skip,
             look,
         )
-
-    async def _resolve_echo(self, master: Master, job: Job, result: ExchangeResult) -> None:
-        """Tell an echo from an answer that repeats its request: see what a read comes back as."""
-        request = job.request
-        if Read.function in job.limits.functions:
-            probe = Read(request.device, request.register, 1)
-            await master.quiet()
-            time_out = self._devices.time_out(request.device, probe.function, job.priority)
-            probed = await master.exchange(
-                Sending(request.device, probe.pdu(), probe.expectation(), time_out)
-            )
-            self._outcomes.count_beside(request.device, probed)
-        if master.echo is False:
-            result.kind, result.pdu = ResultKind.REPLY, job.pdu
-        else:
-            result.kind = ResultKind.NOTHING
-            result.detail = "only the adapter's echo of it came back"
 
     def _is_repeat(self, job: Job, result: ExchangeResult) -> bool:
         """Whether a reply may be a copy of the one before."""

@@ -55,7 +55,7 @@ class KeeperShare(Sharing):
         self._lock.adopt(keeping.lock)
 
     async def own(self, say: Say) -> None:
-        """Return once a program needs the line, and it is quiet."""
+        """Return once a program needs the line."""
         self._say = say
         if self._server is None:
             self._inside.facts.set_programs(self._keeping.before)
@@ -67,7 +67,7 @@ class KeeperShare(Sharing):
                 self._keeping.end()
                 await asyncio.Event().wait()
         await self._until(lambda: self._needed)
-        await self._until_quiet()
+        self._doubt_replies()
         self._open = True
 
     async def _listens(self) -> bool:

@@ -165,9 +165,9 @@ class Sharing:
         self._quiet_until = max(self._quiet_until, min(client.quiet_until, latest))
 
     async def _begin(self, served: Owner | None) -> None:
-        """Listen as the owner, and wait until no reply to an owner before may come."""
+        """Listen as the owner; replies to an owner before are not trusted."""
         await self._listen(served.program if served is not None else None)
-        await self._until_quiet()
+        self._doubt_replies()
 
     async def _listen(self, before: Program | None) -> bool:
         inside = self._inside
@@ -191,9 +191,9 @@ class Sharing:
             left = _left_of(before, inside.timing.late_reply, inside.clock())
             self._quiet_until = max(self._quiet_until, inside.clock() + left)
 
-    async def _until_quiet(self) -> None:
-        """Wait until no reply to an earlier request may come."""
-        await asyncio.sleep(max(0.0, self._quiet_until - self._inside.clock()))
+    def _doubt_replies(self) -> None:
+        """Trust no reply of a drive that may be one to an earlier request."""
+        self._inside.dispatcher.proof.doubt(self._quiet_until)
 
     async def unwanted(self) -> None:
         """Never: the line is open for this program, too."""

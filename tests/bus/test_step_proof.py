@@ -1,0 +1,92 @@
+"""After a holder of the line was killed: late replies to it are never taken for others."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tui.bus.api import Priority
+from tui.bus.limits import Limits
+from tui.bus.line import Line
+
+from .conftest import NO_ECHO, WIDE, Share
+from .peer import PtyPeer, Step, eventually, reply
+from .sharing import QUICK, OtherProgram, other_program
+
+LATE = 1.5
+"""Seconds for which a reply may be late."""
+SLOW, OTHER = 77, 8
+
+
+def slow(request: bytes, _count: int) -> Sequence[Step]:
+    return [0.5, reply(request)] if request[3] == SLOW else [reply(request)]
+
+
+def never_echoes(request: bytes, count: int) -> Sequence[Step]:
+    return [] if request[1] == 8 else slow(request, count)
+
+
+def functions(peer: PtyPeer) -> list[int]:
+    return [one[1] for one in peer.requests]
+
+
+async def killed_while_it_waits(owner: OtherProgram, peer: PtyPeer) -> float:
+    """Kill the holder of a line while a reply to it is on its way; returns when."""
+    owner.tell("read 1")
+    owner.tell(f"ask {SLOW}")
+    await asyncio.to_thread(peer.await_requests, 2)
+    return await asyncio.to_thread(owner.kill)
+
+
+def next_program(share: Share, peer: PtyPeer, limits: Limits, patience: float = 1.5) -> Line:
+    """A program that comes after it, and waits so many seconds for a reply."""
+    timing = replace(QUICK, late_reply=LATE, first_timeout=patience, min_timeout=patience)
+    line = share(peer.path).open("watch", timing=timing)
+    line.describe(1, limits)
+    return line
+
+
+async def test_values_are_back_as_soon_as_the_drive_has_echoed_a_number(
+    share: Share, tmp_path: Path
+) -> None:
+    with PtyPeer(slow) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
+        killed = await killed_while_it_waits(owner, peer)
+        line = await asyncio.to_thread(next_program, share, peer, WIDE)
+        # the reply to the killed one comes first, and has the form of the one to this read
+        assert (await line.read(1, OTHER)).words == (OTHER,)
+        assert time.monotonic() - killed < 1.0
+        # the read between tells whether the adapter repeats what is sent
+        assert functions(peer) == [3, 3, 3, 8, 3]
+        await line.read(1, OTHER)
+        assert functions(peer) == [3, 3, 3, 8, 3, 3], "once is enough"
+
+
+@pytest.mark.parametrize("why", ["it has no echo", "it never echoes"])
+async def test_a_drive_that_proves_nothing_waits_until_no_reply_may_come(
+    share: Share, tmp_path: Path, why: str
+) -> None:
+    drive, limits = (slow, NO_ECHO) if why == "it has no echo" else (never_echoes, WIDE)
+    with PtyPeer(drive) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
+        killed = await killed_while_it_waits(owner, peer)
+        line = await asyncio.to_thread(next_program, share, peer, limits, 0.2)
+        assert (await line.read(1, OTHER)).words == (OTHER,)
+        assert time.monotonic() - killed >= LATE
+        assert functions(peer).count(8) <= 2
+
+
+async def test_the_words_of_a_stop_wait_for_no_proof(share: Share, tmp_path: Path) -> None:
+    with PtyPeer(slow) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
+        killed = await killed_while_it_waits(owner, peer)
+        line = await asyncio.to_thread(next_program, share, peer, NO_ECHO)
+        other = asyncio.create_task(line.write(1, 1, [15]))
+        stop = asyncio.create_task(line.write(1, 1, [0], priority=Priority.STOP))
+        await asyncio.to_thread(eventually, lambda: 6 in functions(peer))
+        assert time.monotonic() - killed < 1.0
+        assert peer.requests[-1][5] == 0
+        await asyncio.gather(stop, other, return_exceptions=True)
+        assert time.monotonic() - killed >= LATE
