@@ -24,6 +24,8 @@ from tui.session.events import EventLog
 from tui.session.journal import Journal
 from tui.session.sharing.guardian import (
     ENDS_WITHIN,
+    LINE_BACK_WITHIN,
+    LINE_STAYS_LOST,
     LONGEST_GRACE,
     TAKEN_OVER_WITHIN,
     Guardian,
@@ -33,7 +35,7 @@ from tui.session.starts.record import StartRecord
 from tui.session.starts.starts import Starts
 from tui.simulator import DriveSpec, Simulation
 
-from .fake_clock import FakeClock
+from .fake_clock import FakeClock, let_go_until
 
 GONE = Program("gone", "run", 900_002, "", "pts/3")
 LIVING = 900_001
@@ -362,3 +364,26 @@ async def test_a_guardian_that_was_closed_hears_nothing(bench: Bench) -> None:
     bench.gone()
     await asyncio.sleep(0.3)
     assert bench.told == []
+
+
+async def test_a_line_that_comes_and_goes_is_given_up_like_one_that_stays_lost(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A number of a port that others get, a gateway that hangs up: connected for a moment."""
+    bench.started(1)
+    guardian = bench.guardian()
+    bench.simulation.stop()
+    looks = {0: 0}
+
+    def is_connected(_: Guardian) -> bool:
+        stops = bench.line.facts.stops.stamp(1)
+        looks[stops] = looks.get(stops, 0) + 1
+        return looks[stops] == 8
+
+    monkeypatch.setattr(Guardian, "_is_connected", is_connected)
+    bench.gone()
+    await come(lambda: guardian.busy)
+    await let_go_until(bench.clock, lambda: not guardian.busy, step=LINE_BACK_WITHIN / 20)
+    assert len(looks) > 2, "it was connected in the meantime"
+    assert bench.says(LINE_STAYS_LOST)
+    assert bench.records == [1]

@@ -78,6 +78,8 @@ class Guardian:
         self._key = line_key(label(line.link))
         """The line by its adapter, also while that is unplugged."""
         self._care = DrivesInCare(line, journal)
+        self._lost: dict[int, float] = {}
+        """By device, when its line was lost before a stop; it may have come and gone since."""
         self._workers: list[LineWorker] = []
         self._changing = threading.Lock()
         facts = line.facts
@@ -164,11 +166,13 @@ class Guardian:
         Nothing was heard of the motor then: it has to be stopped once more.
         """
         await self._until_ended(session)
-        lost = self._clock.monotonic()
         if self._is_connected():
+            self._lost.pop(session.device, None)
             return False
+        lost = self._lost.setdefault(session.device, self._clock.monotonic())
         while not self._is_connected():
             if self._clock.monotonic() - lost > LINE_BACK_WITHIN:
+                self._lost.pop(session.device, None)
                 self._tell(session.device, LINE_STAYS_LOST)
                 return False
             await self._clock.sleep(LOOK_INTERVAL)
