@@ -24,7 +24,7 @@ from tui.session.logs import start_logging
 from tui.session.sharing.guardian import Guardian
 
 ENDING_SIGNALS = ("SIGTERM", "SIGINT", "SIGQUIT")
-IGNORED_SIGNALS = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGTSTP", "SIGTTIN", "SIGTTOU")
+IGNORED_SIGNALS = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGTSTP", "SIGTTIN", "SIGTTOU")
 """Signals that end or suspend a process by default; a keeper goes on."""
 
 LEAVE_TIME = 10.0
@@ -42,7 +42,8 @@ class Keeper:
         self._ended = threading.Event()
         self._ordered = False
         """True once a signal has ordered the end."""
-        keeping = Keeping(lock, order.before, self._ended.set, self.cares)
+        alarm = partial(signal.setitimer, signal.ITIMER_REAL)
+        keeping = Keeping(lock, order.before, self._ended.set, self.cares, alarm)
         self._line = Line(
             parse_link(order.line),
             place=order.place,
@@ -99,6 +100,7 @@ def main() -> None:
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for name in IGNORED_SIGNALS:
         signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process whose line's loop hangs
     start_logging(0)
     keeper = Keeper(order, int(sys.argv[1]))
     for name in ENDING_SIGNALS:

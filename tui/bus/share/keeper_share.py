@@ -21,6 +21,11 @@ log = logging.getLogger(__name__)
 
 LINGERS = 10.0
 """Seconds that a keeper waits for the next program, its port closed."""
+ALARM_AFTER, ALARM_RENEWED = 2.0, 0.25
+"""Seconds for which the loop of the line may stand still before its process is ended, and seconds
+between two signs that it does not."""
+ENDS_WITHIN = 20.0
+"""Seconds that the process has to end once that loop has."""
 CARE_INTERVAL = 0.005
 """Seconds between two looks whether a motor is still to be stopped."""
 
@@ -37,6 +42,8 @@ class Keeping:
     """Called in the line's thread when no program needs this keeper any more."""
     cares: Callable[[], bool]
     """True while a motor is still to be stopped."""
+    alarm: Callable[[float], object]
+    """Ends this process after so many seconds, unless it is called again."""
 
 
 class KeeperShare(Sharing):
@@ -52,6 +59,7 @@ class KeeperShare(Sharing):
         self._ending: asyncio.TimerHandle | None = None
         self._say: Say = lambda _status, _text, _error: None
         self._open = False
+        self._alarm: asyncio.Task[None] | None = None
         self._lock.adopt(keeping.lock)
 
     async def own(self, say: Say) -> None:
@@ -66,9 +74,19 @@ class KeeperShare(Sharing):
                 self._lock.hand_over()
                 self._keeping.end()
                 await asyncio.Event().wait()
+            self._alarm = asyncio.create_task(self._renew_alarm(), name="alarm")
         await self._until(lambda: self._needed)
         self._doubt_replies()
         self._open = True
+
+    async def _renew_alarm(self) -> None:
+        """Have this process ended if this loop hangs, or was frozen: what it would send is old."""
+        try:
+            while True:
+                self._keeping.alarm(ALARM_AFTER)
+                await asyncio.sleep(ALARM_RENEWED)
+        finally:
+            self._keeping.alarm(ENDS_WITHIN)
 
     async def _listens(self) -> bool:
         try:
