@@ -7,6 +7,9 @@ import logging
 import os
 import socket
 from collections.abc import Callable
+from functools import partial
+
+import serial
 
 from ..errors import LineError, LineFailed, LineLost
 from ..link import Link, RtuTcpLink, SerialLink, TcpLink, label
@@ -15,6 +18,7 @@ from ..model import LineState, LineStatus
 from ..rtu.master import RtuMaster
 from ..tcp.master import TcpMaster
 from ..transport.base import Transport
+from ..transport.opening import opened_beside
 from ..transport.port_errors import PortErrors
 from ..transport.ports import is_pseudo_terminal, open_serial, other_openers
 from ..transport.serial_posix import PosixSerial
@@ -28,11 +32,18 @@ from .last_way import LastWay
 log = logging.getLogger(__name__)
 
 
-def open_port(link: SerialLink, *, alone: bool = True) -> Transport:
+async def open_port(link: SerialLink, *, alone: bool = True) -> Transport:
     """Open a serial port for Modbus; not `alone`: beside a program that holds it.
 
-    Raises PortBusy, PortMissing, PortRefused.
+    Raises PortBusy, PortMissing, PortRefused, LineLost.
     """
+    opened = partial(_open_port, link, alone=alone)
+    port, note = await opened_beside(link.path, opened, lambda opened: opened[0].close())
+    return PosixSerial(port, note) if os.name == "posix" else ThreadedSerial(port, note)
+
+
+def _open_port(link: SerialLink, *, alone: bool) -> tuple[serial.Serial, str]:
+    """The open port, and what is to be said of it."""
     port = open_serial(link.path, link.baud, link.format, alone=alone)
     note = ""
     if is_pseudo_terminal(link.path):
@@ -40,7 +51,7 @@ def open_port(link: SerialLink, *, alone: bool = True) -> Transport:
             note = f"A pseudo-terminal has no parity: opened with {port.parity}."
     elif alone and (others := other_openers(link.path)):
         note = f"{others} has the port open too; requests of two programs disturb each other."
-    return PosixSerial(port, note) if os.name == "posix" else ThreadedSerial(port, note)
+    return port, note
 
 
 async def connect_tcp(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
@@ -61,7 +72,7 @@ async def connect_tcp(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
 async def open_transport(link: Link, around: LineContext, *, alone: bool = True) -> Transport:
     """Open the port of a line, or connect to it. Raises the line's errors."""
     if isinstance(link, SerialLink):
-        return open_port(link, alone=alone)
+        return await open_port(link, alone=alone)
     return await connect_tcp(link, around.timing.connect_timeout)
 
 

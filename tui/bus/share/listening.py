@@ -16,6 +16,9 @@ from .place import PRIVATE_FILE, SHARED_FILE, Owner, OwnerLock, SharePlace, make
 
 log = logging.getLogger(__name__)
 
+KEEPING_ENDS = 0.5
+"""Seconds that a note on the disk has to end before the next owner writes its own."""
+
 TakeIn = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
 
@@ -33,6 +36,7 @@ class Listening:
         self._welcome = welcome
         self._server: asyncio.Server | None = None
         self._path: Path | None = None
+        self._keeping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Listen in the first folder that takes a socket. Raises OSError where none does."""
@@ -70,26 +74,36 @@ class Listening:
         self._path = path
         self._tell()
 
-    async def keep(self) -> None:
-        """Note a sign of life on the socket; made anew where its folder was taken away.
+    def keep(self) -> None:
+        """Begin to note a sign of life on the socket; a disk that hangs is not waited for."""
+        if self._keeping is None or self._keeping.done():
+            self._keeping = asyncio.create_task(self._keep(), name="socket of the line")
+
+    async def _keep(self) -> None:
+        """Note it; make the socket anew where its folder was taken away.
 
         As at the end of a log-in. The lock is taken anew where its file was taken away.
         """
-        if not self._lock.stands:
-            await self._renew_lock()
-        if self._path is not None:
-            if self._facts.stops.late_times != self._stopped:
-                with suppress(OSError):
-                    self._tell()
-            with suppress(OSError):
-                os.utime(self._path)  # the last sign of life, should this program be killed
-                return
+        if not await asyncio.to_thread(lambda: self._lock.stands):
+            self._renew_lock()
+        if self._path is not None and await asyncio.to_thread(self._note, self._path):
+            return
         if self._server is not None:
             self._server.close()
         with suppress(OSError):
             await self.start()
 
-    async def _renew_lock(self) -> None:
+    def _note(self, path: Path) -> bool:
+        """Note a sign of life, and what was stopped since; False if the socket is gone."""
+        if self._facts.stops.late_times != self._stopped:
+            with suppress(OSError):
+                self._tell()
+        with suppress(OSError):
+            os.utime(path)  # the last sign of life, should this program be killed
+            return True
+        return False
+
+    def _renew_lock(self) -> None:
         with suppress(OSError):
             if self._lock.renew() and self._path is not None:
                 log.error("the lock of the line was taken away, and is made anew")
@@ -102,8 +116,11 @@ class Listening:
             Owner(VERSION, self._facts.me, str(self._path), 0.0, self._stopped, self._line)
         )
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Listen no more, and leave no socket behind."""
+        if self._keeping is not None:
+            await asyncio.wait((self._keeping,), timeout=KEEPING_ENDS)
+            self._keeping.cancel()
         if self._server is not None:
             self._server.close()
         if self._path is not None:

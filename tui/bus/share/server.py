@@ -84,7 +84,7 @@ class ShareServer:
         self._signs.close()
         if self._missed is not None:
             self._missed.cancel()
-        self._listening.close()
+        await self._listening.close()
         for client in list(self._clients.values()):
             client.say(Goodbye(quiet))
             with suppress(OSError, RuntimeError):
@@ -277,8 +277,8 @@ class ShareServer:
     def _all(self) -> list[Client]:
         return list(self._clients.values())
 
-    async def _tell_news(self) -> None:
-        await self._listening.keep()
+    def _tell_news(self) -> None:
+        self._listening.keep()
         self.tell_state()
 
     def tell_state(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Collection
+from collections.abc import Callable, Collection
 
 from ..schedule.inside import LineInside
 from .attached import Client
@@ -34,7 +34,7 @@ class SignsOfLife:
         self,
         inside: LineInside,
         clients: Callable[[], Collection[Client]],
-        tell: Callable[[], Awaitable[None]],
+        tell: Callable[[], None],
         stopped: Callable[[StopGiven], None],
         stops_past: StopsPast,
     ) -> None:
@@ -49,7 +49,8 @@ class SignsOfLife:
 
     def start(self) -> None:
         """Begin to tell."""
-        self._hear_past()
+        for stop in self._stops_past.take():
+            self._stopped(stop)
         self._lease.renew(self._inside.clock())
         self._inside.dispatcher.held_back = lambda: self._lease.lapsed
         self._task = asyncio.get_running_loop().create_task(self._work(), name="signs of life")
@@ -69,7 +70,7 @@ class SignsOfLife:
                 if self._lease.lapsed:
                     await self._call_roll()
                     said = self._inside.clock()
-                await self._tell()
+                self._tell()
             except Exception:
                 # without signs of life the line would be held back for good
                 log.exception("telling the news of the line failed")
@@ -102,10 +103,15 @@ class SignsOfLife:
         end = self._inside.clock() + ROLL_WITHIN
         while self._inside.clock() < end and not self._all_present():  # noqa: ASYNC110 - few turns
             await asyncio.sleep(ROLL_LOOK)
-        self._hear_past()
+        await self._hear_past()
 
-    def _hear_past(self) -> None:
-        for stop in self._stops_past.take():
+    async def _hear_past(self) -> None:
+        """Hear of stops that went past this program; all know that it is well meanwhile."""
+        taking = asyncio.ensure_future(asyncio.to_thread(self._stops_past.take))
+        while not taking.done():
+            await asyncio.wait((taking,), timeout=NEWS_INTERVAL)
+            self._tell()
+        for stop in taking.result():
             self._stopped(stop)
 
     def _all_present(self) -> bool:

@@ -145,7 +145,7 @@ class Guardian:
                 self._tell(device, f"The motor that {program.text} started was taken over.")
                 return
             await self._clock.sleep(LOOK_INTERVAL)
-        session, why = self._session(record), ABSENT if frozen else GONE
+        session, why = await self._session(record), ABSENT if frozen else GONE
         while session is not None and await self._is_left(device, program):
             self._stopper.stop([session], by=f"{program.text} {why}")
             if not await self._ended_by_loss(session):
@@ -246,15 +246,16 @@ class Guardian:
         """A drive that this program has open, or that another one has armed on the line."""
         return self._session_of(device) or self._care.session(device)
 
-    def _session(self, record: StartRecord) -> DriveSession | None:
+    async def _session(self, record: StartRecord) -> DriveSession | None:
         session = self._known(record.device)
         if session is not None:
             return session
         try:
-            session = DriveSession(self._line, record.device, library.load(record.profile))
+            profile = await asyncio.to_thread(library.load, record.profile)
         except DriveError as error:
             log.error("drive %s cannot be stopped: %s", record.device, error)
             self._tell(record.device, f"Not stopped: {error} Stop it at the machine.")
             return None
+        session = DriveSession(self._line, record.device, profile)
         session.guessed = record.guessed
         return session

@@ -1,0 +1,80 @@
+"""A serial port that the system takes long to open: the loop of its line goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from tui.bus.errors import LineLost, PortMissing
+from tui.bus.transport import opening
+from tui.bus.transport.opening import opened_beside
+
+from .peer import eventually
+
+
+class SlowPort:
+    """A port that is opened once it may be."""
+
+    def __init__(self) -> None:
+        self.may_open = threading.Event()
+        self.closed = threading.Event()
+
+    def open(self) -> SlowPort:
+        assert self.may_open.wait(20)
+        return self
+
+    async def opened(self) -> SlowPort:
+        return await opened_beside("port", self.open, lambda port: port.closed.set())
+
+
+@pytest.fixture
+def port() -> Iterator[SlowPort]:
+    made = SlowPort()
+    yield made
+    made.may_open.set()
+    eventually(lambda: not opening._ABANDONED)
+
+
+async def test_the_loop_goes_on_while_a_port_is_opened(port: SlowPort) -> None:
+    waiting = asyncio.create_task(port.opened())
+    await asyncio.sleep(0.05)
+    assert not waiting.done()
+    port.may_open.set()
+    assert await waiting is port
+    assert not port.closed.is_set()
+
+
+async def test_what_a_port_is_refused_for_is_raised() -> None:
+    def missing() -> SlowPort:
+        raise PortMissing("port")
+
+    with pytest.raises(PortMissing):
+        await opened_beside("port", missing, lambda _: None)
+
+
+async def test_a_port_that_is_opened_too_late_is_closed(
+    port: SlowPort, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "OPENS_WITHIN", 0.05)
+    with pytest.raises(LineLost, match="the system does not answer"):
+        await port.opened()
+    # not one more thread for each try
+    before = threading.active_count()
+    with pytest.raises(LineLost, match="the system does not answer"):
+        await port.opened()
+    assert threading.active_count() == before
+    port.may_open.set()
+    assert await asyncio.to_thread(port.closed.wait, 20)
+
+
+async def test_a_port_whose_line_was_closed_meanwhile_is_closed(port: SlowPort) -> None:
+    waiting = asyncio.create_task(port.opened())
+    await asyncio.sleep(0.05)
+    waiting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+    port.may_open.set()
+    assert await asyncio.to_thread(port.closed.wait, 20)

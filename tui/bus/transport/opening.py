@@ -1,0 +1,57 @@
+"""Opening a serial port in a thread of its own: the system may take seconds for it, or for ever."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import TypeVar
+
+from ..errors import LineLost
+
+T = TypeVar("T")
+
+OPENS_WITHIN = 10.0
+"""Seconds that the system has to open a port."""
+
+_ABANDONED: set[str] = set()
+"""Paths of ports that are still being opened, though nothing waits for them."""
+
+
+async def opened_beside(path: str, open_port: Callable[[], T], drop: Callable[[T], object]) -> T:
+    """Open a port while the loop goes on; `drop` closes one that nothing waits for any more.
+
+    Raises LineLost if the system does not open it in time, and what `open_port` raises.
+    """
+    hangs = f"{path} cannot be opened: the system does not answer. Plug its adapter in again."
+    if path in _ABANDONED:
+        raise LineLost(hangs)
+    opening: Future[T] = Future()
+    opening.set_running_or_notify_cancel()
+    threading.Thread(target=_open, args=(opening, open_port), name="open", daemon=True).start()
+    taken = False
+    try:
+        async with asyncio.timeout(OPENS_WITHIN):
+            port = await asyncio.wrap_future(opening)
+        taken = True
+    except TimeoutError:
+        raise LineLost(hangs) from None
+    finally:
+        if not taken:
+            _ABANDONED.add(path)
+            opening.add_done_callback(lambda _: _end(path, opening, drop))
+    return port
+
+
+def _open(opening: Future[T], open_port: Callable[[], T]) -> None:
+    try:
+        opening.set_result(open_port())
+    except BaseException as error:
+        opening.set_exception(error)
+
+
+def _end(path: str, opening: Future[T], drop: Callable[[T], object]) -> None:
+    _ABANDONED.discard(path)
+    if opening.exception() is None:
+        drop(opening.result())
