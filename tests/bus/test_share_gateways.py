@@ -14,6 +14,7 @@ from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineError, LineLost, NoAnswer
 from tui.bus.line import Line
 from tui.bus.link import TcpLink
+from tui.bus.share.keeper_process import OTHER_CONTAINER
 
 from .peer import Step, TcpPeer, eventually, honest_pdu, tcp_reply, tcp_request_length
 from .sharing import SharedLines, frozen
@@ -58,6 +59,27 @@ async def stop(line: Line) -> float:
 
 async def come(condition: Callable[[], bool]) -> None:
     await asyncio.to_thread(eventually, condition, 20.0)
+
+
+@pytest.mark.parametrize("others", ["hung up", "refused"])
+async def test_a_stop_fails_at_once_past_a_keeper_that_nobody_here_can_end(
+    tmp_path: Path, others: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.share.direct.GIVEN_UP", 1000.0)
+    with Gateway(others) as gateway:
+        lines = SharedLines(tmp_path, TcpLink("127.0.0.1", gateway.port))
+        try:
+            # this process is not the one that the lock file names, as in a container
+            keeper, other = lines.open("keeper", pid=4711, wait=5.0), lines.open("panel")
+            await other.read(1, 1)
+            with frozen(keeper):
+                with pytest.raises(LineLost, match="No stop gets past keeper") as caught:
+                    await asyncio.wait_for(stop(other), 20)
+                assert OTHER_CONTAINER in str(caught.value)
+                await come(lambda: OTHER_CONTAINER in other.state.reason)
+                assert gateway.written == []
+        finally:
+            lines.close()
 
 
 @pytest.mark.parametrize("others", ["wait", "hung up", "refused"])

@@ -6,12 +6,26 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 
-from tests.programs import DRIVEPANEL, PATIENCE, is_running, wait_until
+import pytest
+
+from tests.programs import DRIVEPANEL, PATIENCE, Served, is_running, keepers, served, wait_until
 from tui.bus.share.keeper_share import ALARM_AFTER
+from tui.bus.share.owner_watch import HEARD_WITHIN
+from tui.simulator import DriveSpec, Simulation
 
-from .test_commands import bench
-from .test_keeper import keeper
+from .test_commands import bench, turns
+from .test_keeper import keeper, times_of_good_values
+from .test_shared_programs import one_connection, records, runs_a_motor, stopped_by_commands
+
+
+@pytest.fixture
+def programs() -> Iterator[ExitStack]:
+    """Programs that end with the test."""
+    with ExitStack() as stack:
+        yield stack
 
 
 def test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on() -> None:
@@ -26,3 +40,53 @@ def test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on() -> None:
         assert is_running(pid), "a process that is stopped takes no alarm"
         os.kill(pid, signal.SIGCONT)
         wait_until(lambda: not is_running(pid), "it ends")
+
+
+@contextmanager
+def frozen_keeper(programs: ExitStack, line: str) -> Iterator[tuple[int, Served, Served]]:
+    """A keeper that stands still while a motor runs; with `run`, and a recorder."""
+    recorder = programs.enter_context(served(records(line), ready="{"))
+    runner = programs.enter_context(served(runs_a_motor(line), ready="running forward"))
+    pid = keeper()
+    os.kill(pid, signal.SIGSTOP)
+    yield pid, runner, recorder
+
+
+def gateway(programs: ExitStack) -> tuple[Simulation, str]:
+    """A drive behind a gateway that takes one connection: no stop gets past who holds it."""
+    drive = DriveSpec("atv71", 1, sets={"TTO": 300})
+    simulation = programs.enter_context(Simulation([drive]))
+    return simulation, programs.enter_context(one_connection(simulation.serve_tcp(), "wait"))
+
+
+def test_a_stop_replaces_a_keeper_that_is_frozen(programs: ExitStack) -> None:
+    simulation, line = gateway(programs)
+    with frozen_keeper(programs, line) as (frozen, runner, recorder):
+        status, said = runner.end(signal.SIGINT)
+        assert status == 0, said
+        assert stopped_by_commands(simulation)
+        assert not is_running(frozen)
+        wait_until(lambda: keepers() not in ([], [frozen]), "another one is started")
+        times_of_good_values(recorder, 1.0)
+
+
+def test_a_keeper_that_is_frozen_is_replaced_without_a_stop(programs: ExitStack) -> None:
+    simulation, line = gateway(programs)
+    with frozen_keeper(programs, line) as (frozen, runner, recorder):
+        wait_until(lambda: not is_running(frozen), "it is killed")
+        assert len(times_of_good_values(recorder, 5.0)) > 1
+        assert turns(simulation)
+        assert simulation.drive(1).fault is None
+        assert runner.process.poll() is None
+
+
+def test_a_program_that_was_frozen_itself_kills_no_keeper(programs: ExitStack) -> None:
+    with bench() as (_, line):
+        recorder = programs.enter_context(served(records(line), ready="{"))
+        pid = keeper()
+        for _ in range(3):
+            recorder.process.send_signal(signal.SIGSTOP)
+            time.sleep(HEARD_WITHIN + 1.0)
+            recorder.process.send_signal(signal.SIGCONT)
+            times_of_good_values(recorder, 1.5)
+        assert keepers() == [pid]

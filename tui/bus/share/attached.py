@@ -20,6 +20,7 @@ from ..schedule.queue import Job
 from .failures import failure_told
 from .lease import SILENT_CLIENT, TOO_LATE, stood_still
 from .messages import (
+    Alive,
     Answer,
     AnyMessage,
     Asking,
@@ -29,6 +30,7 @@ from .messages import (
     SeenFrame,
     packed,
 )
+from .owner_watch import is_stop
 from .request_forms import asked_request
 
 log = logging.getLogger(__name__)
@@ -77,9 +79,11 @@ class Client:
             return
         self.writer.write(packed(message))
 
-    def hears_life(self, now: float) -> None:
-        """It said something."""
+    def hears(self, message: AnyMessage, now: float) -> None:
+        """It said something; a stop is acknowledged on receipt."""
         self.heard, self.looks = now, 0
+        if is_stop(message):
+            self.say(Alive())
 
     def is_silent(self, now: float, looks: int) -> bool:
         """Whether it gave no sign of life for too long, however often one was looked for.

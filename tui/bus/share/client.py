@@ -41,13 +41,13 @@ from .messages import (
     packed,
 )
 from .news_heard import NewsHeard
+from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .past_owner import PastOwner
 from .place import Owner, short_path
 from .voices import ProgramVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)
 
-WATCH_INTERVAL = 0.1
 LOOKS_A_SIGN = 4
 """Looks at the owner for each own sign of life."""
 LEAVE_WITHIN = 1.0
@@ -79,8 +79,7 @@ class ShareClient:
         self._gone, self._told = False, ""
         self.again = False  # attached to the line before
         self.taken_in = False  # attached to this owner
-        self.heard = inside.clock()
-        """When the owner last gave a sign of life."""
+        self._watching = OwnerWatch(inside, owner, past)
         self.quiet_until = 0.0
         """When no reply to the owner's last request may come any more."""
 
@@ -100,6 +99,7 @@ class ShareClient:
         except (OSError, ValueError) as error:
             raise OwnerAway from error
         self.writer = writer
+        self._watching.connected(writer.get_extra_info("socket"))
         closing = True
         try:
             self._greet()
@@ -110,6 +110,7 @@ class ShareClient:
             # what is said from here on would not be heard: a stop takes another way
             self.writer = None
             frozen = self.frozen
+            self._watching.close()
             await self._past.end()
             if closing and self.taken_in and not frozen:
                 await self._leave(reader, writer)
@@ -153,9 +154,9 @@ class ShareClient:
             message = await next_message(reader)
         except (EOFError, OSError, NoMessage) as error:
             raise OwnerAway from error
-        self._hear_life()
+        self._hear_life(message)
         if isinstance(message, Goodbye):
-            self.quiet_until = self.heard + message.quiet
+            self.quiet_until = self._watching.heard + message.quiet
             raise OwnerAway
         if isinstance(message, TurnedAway):
             raise NotShared(message.why)
@@ -186,15 +187,15 @@ class ShareClient:
                 log.error("%s sent a malformed message: %s", self._owner.program.text, error)
                 self._killed()
                 return
-            self._hear_life()
+            self._hear_life(message)
             if isinstance(message, Goodbye):
-                self.quiet_until = self.heard + message.quiet
+                self.quiet_until = self._watching.heard + message.quiet
                 return
             self._hear(message)
 
     def _killed(self) -> None:
         """The owner is gone without a word: it may have sent until a moment ago."""
-        last = min(self._inside.clock(), self.heard + SILENT_OWNER)
+        last = min(self._inside.clock(), self._watching.heard + SILENT_OWNER)
         self.quiet_until = last + self._inside.timing.late_reply
 
     # Requests
@@ -210,7 +211,6 @@ class ShareClient:
 
     async def _watch(self) -> None:
         """Notice an owner that does not answer any more, and one that does again."""
-        looks, heard = 0, self.heard
         for turn in itertools.count():
             await asyncio.sleep(WATCH_INTERVAL)
             inside = self._inside
@@ -220,18 +220,12 @@ class ShareClient:
             if wish != self._wish:
                 self._wish = wish
                 self._tell(PollWish(*wish))
-            # by looks, too: where this program got no time to look, the owner may be well
-            looks = looks + 1 if heard == self.heard else 0
-            heard = self.heard
-            silent = inside.clock() - heard
-            if not self.frozen and silent > SILENT_OWNER and looks >= SILENT_OWNER / WATCH_INTERVAL:
-                log.error("%s owns the line and does not answer", self._owner.program.text)
-                self._past.begin()
+            self._watching.look(attached=self.taken_in)
             if self.frozen:
-                self._help_stops(silent)
+                self._help_stops(self._watching.silence)
 
-    def _hear_life(self) -> None:
-        self.heard = self._inside.clock()
+    def _hear_life(self, message: AnyMessage) -> None:
+        self._watching.hear(message)
         if self.frozen:
             self._past.leave()
             self._told = ""
@@ -254,6 +248,8 @@ class ShareClient:
     def _hear(self, message: AnyMessage) -> None:
         facts, inside = self._inside.facts, self._inside
         match message:
+            case Alive():
+                pass
             case Answer() | Failed():
                 self._asked.answered(message)
             case News():
@@ -294,6 +290,16 @@ class ShareClient:
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._tell, message)
 
+    def pass_on(self, stop: bytes) -> bool:
+        """Send a finished stop to the owner; False if it takes none."""
+        if self.writer is None or self.frozen:
+            return False
+        self.writer.write(stop)
+        self._watching.note_stop()
+        return True
+
     def _tell(self, message: AnyMessage) -> None:
         if self.writer is not None and not self.writer.transport.is_closing():
             self.writer.write(packed(message))
+            if is_stop(message):
+                self._watching.note_stop()

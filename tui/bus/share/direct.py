@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from concurrent.futures import Future
 from contextlib import suppress
 
@@ -16,6 +17,7 @@ from ..schedule.connection import open_master
 from ..schedule.dispatcher import Dispatcher
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
+from .keeper_process import BY_HAND
 from .turn import Turn
 
 log = logging.getLogger(__name__)
@@ -24,6 +26,8 @@ PORT_AGAIN = 0.5
 GATEWAY_HELD = " A gateway that takes one connection only is held by it."
 GIVEN_UP = 3.0
 """Seconds after which a stop that finds no way past the owner is told so, and fails."""
+NO_WAY = 1.0
+"""The same, once it is known that the owner stays."""
 
 
 class DirectStops:
@@ -34,6 +38,12 @@ class DirectStops:
         """Why no stop gets past the owner, and what to do; empty while nothing is known of it."""
         self._failing_since: float | None = None
         self._owner = owner
+        self._taken: list[Job] = []
+        """Requests that have not ended."""
+        self._why = "the line does not open."
+        self._remedy = BY_HAND.format(pid=owner.pid)
+        self._worked = inside.clock()
+        """When an exchange came to an end last."""
         self._inside = inside
         self._turn = turn
         self._echo: bool | None = None
@@ -64,6 +74,7 @@ class DirectStops:
         ):
             return False
         job.answer.add_done_callback(self._note_end)
+        self._taken = [one for one in (*self._taken, job) if not one.answer.done()]
         self._dispatcher.submit(job)
         if self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._serve(), name="direct stops")
@@ -91,7 +102,7 @@ class DirectStops:
         """There is no way past the owner just now: say so, and after a while fail what waits."""
         now = self._inside.clock()
         self._failing_since = self._failing_since or now
-        self.trouble = no_way_past(self._owner, self._inside.link, str(error))
+        self._note_no_way(str(error))
         if now - self._failing_since > GIVEN_UP:
             self._dispatcher.fail_all(self.trouble, LineLost)
 
@@ -102,8 +113,22 @@ class DirectStops:
         error = answer.exception()
         if not isinstance(error, LineError):
             self.trouble, self._failing_since = "", None
+            self._worked = self._inside.clock()
         elif isinstance(error, NoAnswer) and not isinstance(self._inside.link, SerialLink):
-            self.trouble = no_way_past(self._owner, self._inside.link, str(error))
+            self._note_no_way(str(error))
+
+    def _note_no_way(self, why: str) -> None:
+        self._why = why
+        self.trouble = no_way_past(self._owner, self._inside.link, why, self._remedy)
+
+    def owner_stays(self, remedy: str) -> None:
+        """The owner cannot be ended by this program, but by `remedy`: fail what finds no way."""
+        self._remedy = remedy
+        waiting = [one.asked for one in self._taken if not one.answer.done()]
+        since = max(min(waiting, default=math.inf), self._worked)
+        if self._inside.clock() - since > NO_WAY:
+            self._note_no_way(self._why)
+            self._dispatcher.fail_all(self.trouble, LineLost)
 
     async def _serve_some(self) -> float:
         inside = self._inside
@@ -135,10 +160,12 @@ class DirectStops:
             self._inside.dispatcher.put_back(job)
 
 
-def no_way_past(owner: Program, link: SerialLink | TcpLink | RtuTcpLink, why: str) -> str:
+def no_way_past(
+    owner: Program, link: SerialLink | TcpLink | RtuTcpLink, why: str, remedy: str
+) -> str:
     """That stops do not get past an owner which is frozen, and what to do, for a person."""
     gateway = "" if isinstance(link, SerialLink) else GATEWAY_HELD
     return (
         f"No stop gets past {owner.text}, which owns the line and does not answer: {why}{gateway}"
-        f" End that program (kill -9 {owner.pid}): then stops go out."
+        f" {remedy}"
     )

@@ -157,7 +157,7 @@ class Here(Message, frozen=True):
 
 
 class Alive(Message, frozen=True):
-    """A program's sign of life: one that gives none for long is let go."""
+    """A program's sign of life: one that gives none for long is let go. Answers each stop, too."""
 
 
 class Claim(Message, frozen=True):

@@ -32,6 +32,7 @@ class PastOwner:
         self._owner = owner
         self._direct: DirectStops | None = None
         self._ending: asyncio.Task[None] | None = None
+        self._remedy = ""
         self._noted: dict[int, tuple[int, ...]] = {}
 
     @property
@@ -39,16 +40,25 @@ class PastOwner:
         """What becomes of the line while its owner is frozen, for a person."""
         if self._direct is not None and self._direct.trouble:
             return self._direct.trouble
-        who = self._owner.text
-        return f"{who} {OWNER_SILENT}. Stops go out past it; all else waits."
+        remedy = f" {self._remedy}" if self._remedy else ""
+        return f"{self._owner.text} {OWNER_SILENT}. Stops go out past it; all else waits.{remedy}"
 
     def begin(self) -> None:
         """The owner does not answer: take stops from now on."""
         self.at_work = True
 
+    def owner_stays(self, remedy: str) -> None:
+        """The owner hangs and cannot be ended by this program; `remedy` is who can, for a person.
+
+        Called again and again: a stop that finds no way past it fails as soon as that is known.
+        """
+        self._remedy = remedy
+        if self._direct is not None:
+            self._direct.owner_stays(remedy)
+
     def leave(self) -> None:
         """The owner answers again: what is left goes its usual way."""
-        self.at_work = False
+        self.at_work, self._remedy = False, ""
         direct, self._direct = self._direct, None
         if direct is not None:
             self._ending = asyncio.get_running_loop().create_task(direct.end())

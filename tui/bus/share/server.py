@@ -208,7 +208,7 @@ class ShareServer:
     # What clients say
 
     def _hear(self, client: Client, message: AnyMessage) -> None:
-        client.hears_life(self._inside.clock())
+        client.hears(message, self._inside.clock())
         match message:
             case Alive():
                 pass

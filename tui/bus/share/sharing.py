@@ -220,11 +220,7 @@ class Sharing:
 
     def pass_on(self, message: bytes) -> bool:
         """Send a finished message to the owner; False if none takes it."""
-        client = self._client
-        if client is None or client.frozen or client.writer is None:
-            return False
-        client.writer.write(message)
-        return True
+        return self._client is not None and self._client.pass_on(message)
 
     def tell_state(self) -> None:
         """The line's state has changed."""

@@ -1,0 +1,246 @@
+"""Whether a keeper hangs, as a program on its line sees it, and what ends it then."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tui.bus.model import Priority
+from tui.bus.program import KEEPER, Program
+from tui.bus.share.keeper_process import OTHER_CONTAINER, OTHER_USER, STAYS, KeeperProcess
+from tui.bus.share.messages import VERSION, Alive, Asking, RollCall, StopGiven
+from tui.bus.share.owner_watch import (
+    DIES_WITHIN,
+    HEARD_WITHIN,
+    STOP_HEARD_WITHIN,
+    WATCH_INTERVAL,
+    OwnerWatch,
+    is_stop,
+)
+from tui.bus.share.place import Owner
+
+LISTENS = """
+import socket, sys
+with socket.socket(socket.AF_UNIX) as listening:
+    listening.bind(sys.argv[1])
+    listening.listen()
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+class MadeUpProcess:
+    """A process that a program may end, or may not."""
+
+    remedy = "End it."
+
+    def __init__(self, *, may: bool = True) -> None:
+        self.is_keeper = True
+        self.may = may
+        self.kills: list[float] = []
+
+    def kill(self) -> bool:
+        self.kills.append(time.monotonic())
+        return self.may
+
+
+class Bench:
+    """A program on a line that looks at the line's keeper as time goes by."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.process = MadeUpProcess()
+        self.stays: list[str] = []
+        inside: Any = SimpleNamespace(clock=lambda: self.now)
+        past: Any = SimpleNamespace(
+            at_work=False, begin=lambda: None, owner_stays=self.stays.append
+        )
+        owner = Owner(VERSION, Program("k", KEEPER, 1), "socket")
+        self.watch = OwnerWatch(inside, owner, past)
+        self.watch._process = self.process  # type: ignore[assignment]
+
+    def wait(self, seconds: float, *, awake: bool = True, attached: bool = True) -> None:
+        """Look all the time, or once at the end."""
+        end = self.now + seconds
+        while awake and self.now + WATCH_INTERVAL < end:
+            self.now += WATCH_INTERVAL
+            self.watch.look(attached=attached)
+        self.now = end
+        self.watch.look(attached=attached)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_a_keeper_that_does_not_acknowledge_a_stop_is_killed_after_a_second(bench: Bench) -> None:
+    bench.wait(1.0)
+    bench.watch.note_stop()
+    bench.wait(STOP_HEARD_WITHIN - 0.01)
+    assert not bench.process.kills
+    bench.wait(0.02)
+    assert len(bench.process.kills) == 1
+
+
+def test_news_do_not_acknowledge_a_stop(bench: Bench) -> None:
+    bench.watch.note_stop()
+    bench.watch.note_stop()
+    for message in (RollCall(1), Alive(), RollCall(2)):
+        bench.wait(STOP_HEARD_WITHIN / 4)
+        bench.watch.hear(message)
+    bench.wait(STOP_HEARD_WITHIN / 4)
+    assert not bench.process.kills
+    bench.wait(STOP_HEARD_WITHIN / 4)
+    assert bench.process.kills
+
+
+def test_a_keeper_that_acknowledges_its_stops_is_let_live(bench: Bench) -> None:
+    for _ in range(20):
+        bench.watch.note_stop()
+        bench.wait(0.5)
+        bench.watch.hear(Alive())
+    assert not bench.process.kills
+
+
+@pytest.mark.parametrize("attached", [True, False])
+def test_a_keeper_that_says_nothing_is_killed_after_three_seconds(
+    bench: Bench, attached: bool
+) -> None:
+    if not attached:
+        bench.watch.note_stop()  # before it is taken in, nothing is acknowledged
+    bench.wait(HEARD_WITHIN - 0.01, attached=attached)
+    assert not bench.process.kills
+    bench.wait(0.02, attached=attached)
+    assert len(bench.process.kills) == 1
+    assert bench.stays == []
+
+
+def test_a_program_that_stood_still_itself_kills_nothing(bench: Bench) -> None:
+    """What the keeper has said meanwhile is yet to be read."""
+    bench.watch.note_stop()
+    bench.wait(60.0, awake=False)
+    bench.wait(STOP_HEARD_WITHIN - 0.1)
+    assert not bench.process.kills
+
+
+def test_who_can_end_a_keeper_is_told_once_it_does_not_die(bench: Bench) -> None:
+    bench.wait(HEARD_WITHIN + 0.1)
+    assert len(bench.process.kills) == 1
+    bench.wait(DIES_WITHIN - 0.2)
+    assert bench.stays == []
+    bench.wait(0.5)
+    assert bench.stays[-1] == "End it."
+    assert len(bench.process.kills) == 1
+
+
+def test_who_can_end_a_keeper_is_told_at_once_if_this_program_may_not(bench: Bench) -> None:
+    bench.process.may = False
+    bench.wait(HEARD_WITHIN + 0.1)
+    assert bench.stays[-1] == "End it."
+    assert len(bench.process.kills) == 1
+
+
+def test_a_program_that_holds_the_line_itself_is_not_killed(bench: Bench) -> None:
+    bench.process.is_keeper = False
+    bench.watch.note_stop()
+    bench.wait(60.0)
+    assert not bench.process.kills
+    assert bench.stays == []
+
+
+def test_stops_are_what_a_keeper_acknowledges() -> None:
+    def asking(priority: Priority) -> Asking:
+        return Asking(1, "WriteOne", {}, priority, False, 0.0, 0, 0.0)
+
+    assert is_stop(StopGiven((1,), (1,), "a key", Program("a", "run")))
+    assert is_stop(asking(Priority.STOP))
+    assert not is_stop(asking(Priority.OPERATOR_WRITE))
+    assert not is_stop(Alive())
+
+
+# The process itself
+
+
+@pytest.fixture
+def listener(tmp_path: Any) -> Iterator[tuple[subprocess.Popen[str], socket.socket]]:
+    """A process that listens, and a connection to it."""
+    path = str(tmp_path / "s")
+    process = subprocess.Popen(
+        [sys.executable, "-c", LISTENS, path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(path)
+        yield process, connection
+    process.kill()
+    process.communicate()
+
+
+def owner(pid: int, name: str = KEEPER, version: int = VERSION) -> Owner:
+    return Owner(version, Program("k", name, pid), "socket")
+
+
+def test_the_process_at_the_other_end_is_killed(listener: Any) -> None:
+    process, connection = listener
+    os.kill(process.pid, signal.SIGSTOP)
+    keeper = KeeperProcess(owner(process.pid), connection)
+    assert keeper.kill()
+    assert process.wait(20) == -signal.SIGKILL
+    # another program was quicker
+    assert keeper.kill()
+    assert keeper.remedy == STAYS
+    keeper.close()
+
+
+def test_nothing_but_a_known_keeper_at_the_other_end_is_killed(listener: Any) -> None:
+    process, connection = listener
+    for one in (owner(process.pid, name="panel"), owner(process.pid, version=VERSION + 1)):
+        found = KeeperProcess(one, connection)
+        assert not found.kill()
+        assert not found.is_keeper
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
+        found = KeeperProcess(owner(other.pid), connection)
+        assert not found.kill()
+        assert found.remedy == OTHER_CONTAINER
+        assert other.poll() is None
+        other.kill()
+    assert process.poll() is None
+
+
+def test_a_number_that_another_process_has_got_is_not_killed(listener: Any) -> None:
+    process, connection = listener
+    process.kill()
+    with suppress(ConnectionResetError):
+        connection.recv(1)
+    # its number is not free yet, and could be any other's soon
+    assert not KeeperProcess(owner(process.pid), connection).kill()
+
+
+def test_a_keeper_of_another_user_is_left_to_that_user(
+    listener: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process, connection = listener
+
+    def refused(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(signal, "pidfd_send_signal", refused)
+    keeper = KeeperProcess(owner(process.pid), connection)
+    assert not keeper.kill()
+    assert keeper.remedy == OTHER_USER.format(pid=process.pid)
+    keeper.close()

@@ -1,0 +1,84 @@
+"""The process of a line's keeper, and its end by a program on the line if it hangs."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import struct
+from contextlib import suppress
+
+from ..program import KEEPER
+from .messages import VERSION
+from .place import Owner
+
+OTHER_USER = "It belongs to another user: end it as that user or as root (kill -9 {pid})."
+OTHER_CONTAINER = "It runs in another container: end it there."
+STAYS = "The system does not end it: plug its adapter in again, or restart the computer."
+BY_HAND = "End that program (kill -9 {pid}): then stops go out."
+
+
+class KeeperProcess:
+    """A process that was started as a keeper, by a handle that no other process ever gets.
+
+    Nothing else is killed: not a program that holds the line itself, not one of another version.
+    """
+
+    def __init__(self, owner: Owner, connection: socket.socket) -> None:
+        """`connection` leads to the owner that the lock file names."""
+        self._pid = owner.program.pid
+        self._handle: int | None = None
+        known = owner.program.name == KEEPER and owner.version == VERSION
+        self.is_keeper = known and self._pid != os.getpid()
+        self._remedy = BY_HAND
+        if self.is_keeper and hasattr(os, "pidfd_open"):
+            if _pid_of(connection) == self._pid:
+                self._open(connection)
+            else:
+                self._remedy = OTHER_CONTAINER
+
+    def _open(self, connection: socket.socket) -> None:
+        with suppress(OSError):
+            self._handle = os.pidfd_open(self._pid)
+        # an end that is open yet: the number was not given to another process since
+        ended = select.poll()
+        ended.register(connection, 0)
+        if ended.poll(0):
+            self.close()
+
+    @property
+    def remedy(self) -> str:
+        """Who can end it if this program cannot, for a person."""
+        return self._remedy.format(pid=self._pid)
+
+    def kill(self) -> bool:
+        """End it; False if this program cannot. It is dead once its lock is released."""
+        if self._handle is None:
+            return False
+        try:
+            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
+        except ProcessLookupError:
+            pass  # another program was quicker
+        except PermissionError:
+            self._remedy = OTHER_USER
+            return False
+        except OSError:
+            return False
+        self._remedy = STAYS
+        return True
+
+    def close(self) -> None:
+        """Let go of the handle."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+
+
+def _pid_of(connection: socket.socket) -> int | None:
+    """The process at the other end; 0 for one in another PID namespace."""
+    try:
+        found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    except (AttributeError, OSError):
+        return None
+    return int(struct.unpack("3i", found)[0])
