@@ -47,7 +47,7 @@ async def test_the_loop_goes_on_while_a_port_is_opened(port: SlowPort) -> None:
     assert not port.closed.is_set()
 
 
-async def test_what_a_port_is_refused_for_is_raised() -> None:
+async def test_the_reason_of_a_refused_port_is_raised() -> None:
     def missing() -> SlowPort:
         raise PortMissing("port")
 

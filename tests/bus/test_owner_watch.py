@@ -134,7 +134,7 @@ def test_a_program_that_stood_still_itself_kills_nothing(bench: Bench) -> None:
     assert not bench.process.kills
 
 
-def test_who_can_end_a_keeper_is_told_once_it_does_not_die(bench: Bench) -> None:
+def test_a_keeper_that_does_not_die_is_reported(bench: Bench) -> None:
     bench.wait(HEARD_WITHIN + 0.1)
     assert len(bench.process.kills) == 1
     bench.wait(DIES_WITHIN - 0.2)
@@ -144,7 +144,7 @@ def test_who_can_end_a_keeper_is_told_once_it_does_not_die(bench: Bench) -> None
     assert len(bench.process.kills) == 1
 
 
-def test_who_can_end_a_keeper_is_told_at_once_if_this_program_may_not(bench: Bench) -> None:
+def test_a_keeper_that_cannot_be_killed_is_reported_immediately(bench: Bench) -> None:
     bench.process.may = False
     bench.wait(HEARD_WITHIN + 0.1)
     assert bench.stays[-1] == "End it."

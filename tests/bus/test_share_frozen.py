@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import threading
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
+from tui.bus.api import LineStatus
 from tui.bus.errors import LineError
 from tui.bus.share.client import STOOD_STILL
+from tui.bus.share.lease import SILENT_OWNER
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest
@@ -82,3 +87,30 @@ async def test_a_client_that_has_nothing_to_say_is_kept(share: Share) -> None:
         owner.facts.on_gone(lambda program: gone.append(program.name))
         await asyncio.sleep(2.8)
         assert gone == []
+
+
+async def test_a_disk_that_hangs_holds_up_neither_the_line_nor_its_signs_of_life(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goes_on, hangs, utime = threading.Event(), threading.Event(), os.utime
+
+    def hanging(*args: Any) -> None:
+        hangs.set()
+        goes_on.wait(60)
+        utime(*args)
+
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("watch"), lines.open("panel")
+        monkeypatch.setattr("tui.bus.share.listening.os.utime", hanging)
+        try:
+            await come(hangs.is_set)
+            reasons: list[str] = []
+            other.on_state(lambda state: reasons.append(state.reason))
+            for count in range(1, 8):
+                assert (await other.read(1, 5, count)).words == tuple(range(5, 5 + count))
+                await asyncio.sleep(SILENT_OWNER / 4)
+            assert reasons == []
+            assert owner.state.status is LineStatus.CONNECTED
+        finally:
+            goes_on.set()

@@ -12,6 +12,8 @@ LEASES = "tests/bus/test_leases.py"
 CARE = "tests/session/test_care.py"
 STEP = "tests/bus/test_step_proof.py"
 BOUNDS = "tests/bus/test_share_bounds.py"
+HUNG = "tests/line/test_hung_keepers.py"
+WATCH = "tests/bus/test_owner_watch.py"
 MAPPING = "tests/session/test_mapping.py"
 APPLYING = "tests/session/test_applying.py"
 BLOCK = "tests/cli/test_block.py"
@@ -90,6 +92,54 @@ DEFECTS = (
         ("tests/line/test_keeper.py::test_it_inherits_nothing_and_outlives_its_command",),
     ),
     Defect(
+        "keeper-without-an-alarm",
+        "tui/keeper/process.py",
+        "signal.signal(signal.SIGALRM, signal.SIG_DFL)",
+        "signal.signal(signal.SIGALRM, signal.SIG_IGN)",
+        "A keeper that was frozen goes on with what is old.",
+        (f"{HUNG}::test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on",),
+    ),
+    Defect(
+        "keeper-alarm-not-renewed",
+        "tui/bus/share/keeper_share.py",
+        "                await asyncio.sleep(ALARM_RENEWED)\n",
+        "                await asyncio.sleep(2 * ALARM_AFTER)\n",
+        "Each keeper ends after two seconds.",
+        (f"{HUNG}::test_a_program_that_was_frozen_itself_kills_no_keeper",),
+    ),
+    Defect(
+        "stops-not-acknowledged",
+        "tui/bus/share/attached.py",
+        "            self.say(Alive())\n",
+        "            pass\n",
+        "Each stop costs the line its keeper.",
+        (f"{HUNG}::test_a_keeper_that_is_well_is_kept_after_stops",),
+    ),
+    Defect(
+        "panel-killed-for-a-keeper",
+        "tui/bus/share/keeper_process.py",
+        "owner.program.name == KEEPER and owner.version == VERSION",
+        "owner.version == VERSION",
+        "A panel that holds its line is killed by another program.",
+        (f"{WATCH}::test_nothing_but_a_known_keeper_at_the_other_end_is_killed",),
+    ),
+    Defect(
+        "keeper-killed-after-an-own-pause",
+        "tui/bus/share/owner_watch.py",
+        "            self._awake = now\n",
+        "            pass\n",
+        "After each pause of the computer a program kills a keeper that is well.",
+        (f"{WATCH}::test_a_program_that_stood_still_itself_kills_nothing",),
+    ),
+    Defect(
+        "line-comes-and-goes-for-ever",
+        "tui/session/sharing/guardian.py",
+        "self._lost.setdefault(session.device, self._clock.monotonic())",
+        "self._clock.monotonic()",
+        "A keeper lives for ever on a port whose number another program has got.",
+        ("tests/session/test_guardian.py",),
+    ),
+    Defect(
         "lost-line-without-its-error",
         "tui/bus/share/news_heard.py",
         "error_of(*news.failure) if news.failure is not None else None",
@@ -100,8 +150,8 @@ DEFECTS = (
     Defect(
         "no-way-past-not-told",
         "tui/bus/share/direct.py",
-        "            self._dispatcher.fail_all(self.trouble, LineLost)",
-        "            pass",
+        "if now - self._failing_since > GIVEN_UP:",
+        "if False:",
         "A stop past a frozen owner waits for ever on a gateway that takes one connection.",
         (GATEWAYS,),
     ),

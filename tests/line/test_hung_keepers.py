@@ -8,12 +8,16 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, Served, is_running, keepers, served, wait_until
 from tui.bus.share.keeper_share import ALARM_AFTER
-from tui.bus.share.owner_watch import HEARD_WITHIN
+from tui.bus.share.owner_watch import HEARD_WITHIN, STOP_HEARD_WITHIN
+from tui.keeper.starting import start_keeper
+from tui.session.connect import keepers as connect_keepers
+from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
 
 from .test_commands import bench, turns
@@ -40,6 +44,8 @@ def test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on() -> None:
         assert is_running(pid), "a process that is stopped takes no alarm"
         os.kill(pid, signal.SIGCONT)
         wait_until(lambda: not is_running(pid), "it ends")
+        # by the alarm: one that goes on would take its socket away in the end
+        assert list(Path(os.environ["DRIVEPANEL_STATE"]).rglob("*.sock"))
 
 
 @contextmanager
@@ -62,8 +68,8 @@ def gateway(programs: ExitStack) -> tuple[Simulation, str]:
 def test_a_stop_replaces_a_keeper_that_is_frozen(programs: ExitStack) -> None:
     simulation, line = gateway(programs)
     with frozen_keeper(programs, line) as (frozen, runner, recorder):
-        status, said = runner.end(signal.SIGINT)
-        assert status == 0, said
+        status, errors = runner.end(signal.SIGINT)
+        assert status == 0, errors
         assert stopped_by_commands(simulation)
         assert not is_running(frozen)
         wait_until(lambda: keepers() not in ([], [frozen]), "another one is started")
@@ -90,3 +96,17 @@ def test_a_program_that_was_frozen_itself_kills_no_keeper(programs: ExitStack) -
             recorder.process.send_signal(signal.SIGCONT)
             times_of_good_values(recorder, 1.5)
         assert keepers() == [pid]
+
+
+def test_a_keeper_that_is_well_is_kept_after_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connect_keepers, "start", start_keeper)
+    with bench() as (_, line):
+        opened = open_line(line, wait=PATIENCE, program="panel")
+        try:
+            pid = keeper()
+            for _ in range(3):
+                opened.line.facts.give_stop([1], "the stop key")
+                time.sleep(STOP_HEARD_WITHIN)
+            assert keepers() == [pid]
+        finally:
+            opened.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
 from concurrent.futures import Future
 from contextlib import suppress
 
@@ -43,7 +42,7 @@ class DirectStops:
         self._why = "the line does not open."
         self._remedy = BY_HAND.format(pid=owner.pid)
         self._worked = inside.clock()
-        """When an exchange came to an end last."""
+        """When an exchange came to an end last, or the first that waits was taken."""
         self._inside = inside
         self._turn = turn
         self._echo: bool | None = None
@@ -74,7 +73,10 @@ class DirectStops:
         ):
             return False
         job.answer.add_done_callback(self._note_end)
-        self._taken = [one for one in (*self._taken, job) if not one.answer.done()]
+        self._taken = [one for one in self._taken if not one.answer.done()]
+        if not self._taken:
+            self._worked = self._inside.clock()
+        self._taken.append(job)
         self._dispatcher.submit(job)
         if self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._serve(), name="direct stops")
@@ -124,9 +126,8 @@ class DirectStops:
     def owner_stays(self, remedy: str) -> None:
         """The owner cannot be ended by this program, but by `remedy`: fail what finds no way."""
         self._remedy = remedy
-        waiting = [one.asked for one in self._taken if not one.answer.done()]
-        since = max(min(waiting, default=math.inf), self._worked)
-        if self._inside.clock() - since > NO_WAY:
+        waits = not all(one.answer.done() for one in self._taken)
+        if waits and self._inside.clock() - self._worked > NO_WAY:
             self._note_no_way(self._why)
             self._dispatcher.fail_all(self.trouble, LineLost)
 

@@ -22,9 +22,9 @@ log = logging.getLogger(__name__)
 LINGERS = 10.0
 """Seconds that a keeper waits for the next program, its port closed."""
 ALARM_AFTER, ALARM_RENEWED = 2.0, 0.25
-"""Seconds for which the loop of the line may stand still before its process is ended, and seconds
+"""Seconds for which the loop of the line may hang before its process is ended, and seconds
 between two signs that it does not."""
-ENDS_WITHIN = 20.0
+PROCESS_ENDS_WITHIN = 20.0
 """Seconds that the process has to end once that loop has."""
 CARE_INTERVAL = 0.005
 """Seconds between two looks whether a motor is still to be stopped."""
@@ -86,7 +86,7 @@ class KeeperShare(Sharing):
                 self._keeping.alarm(ALARM_AFTER)
                 await asyncio.sleep(ALARM_RENEWED)
         finally:
-            self._keeping.alarm(ENDS_WITHIN)
+            self._keeping.alarm(PROCESS_ENDS_WITHIN)
 
     async def _listens(self) -> bool:
         try:
