@@ -33,7 +33,7 @@ from tui.bus.share.messages import (
     packed,
     unpacked,
 )
-from tui.bus.share.place import Owner, OwnerLock, short_path
+from tui.bus.share.place import Owner, OwnerLock, Peer, short_path
 
 from .conftest import NO_ECHO, Share
 from .peer import PtyPeer, Step, eventually, honest, reply
@@ -347,7 +347,8 @@ async def test_another_user_is_turned_away_in_words(
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("panel")
-        monkeypatch.setattr("tui.bus.share.greeting.user_of", lambda _: os.getuid() + 4711)
+        foreign = Peer(4711, os.getuid() + 4711)
+        monkeypatch.setattr("tui.bus.share.greeting.peer_of", lambda _: foreign)
         with pytest.raises(NotShared, match="other users only"):
             lines.open("foreign")
 

@@ -1,17 +1,31 @@
-"""The first message of a program on a line's socket, and the answer: it is taken in, or not."""
+"""The first message of a program on a line's socket, and the answer: it is taken in, or not.
+
+A stop in its plain form takes the place of that message.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Protocol
 
 from ..bounds import MOST_PROGRAMS
 from ..link import label
 from ..schedule.inside import LineInside
-from .messages import VERSION, Goodbye, Hello, NoMessage, TurnedAway, next_message, packed
-from .place import user_of
+from .messages import (
+    LENGTH,
+    VERSION,
+    Goodbye,
+    Hello,
+    NoMessage,
+    StopGiven,
+    TurnedAway,
+    next_message,
+    packed,
+)
+from .place import peer_of
+from .plain_stop import GIVEN, STOP_HEAD, plain_stop
 
 HELLO_WITHIN = 2.0
 """Seconds that a program has for its greeting."""
@@ -33,7 +47,15 @@ class LineHolder(Protocol):
 class Greeting:
     """Takes the greetings of programs for the holder of a line."""
 
-    def __init__(self, inside: LineInside, group: int | None, holder: LineHolder) -> None:
+    def __init__(
+        self,
+        inside: LineInside,
+        group: int | None,
+        holder: LineHolder,
+        stopped: Callable[[StopGiven], None],
+    ) -> None:
+        """`stopped` hears a stop that takes the place of a greeting."""
+        self._stopped = stopped
         self._inside = inside
         self._group = group
         self._holder = holder
@@ -47,7 +69,11 @@ class Greeting:
         OSError, TimeoutError.
         """
         async with asyncio.timeout(HELLO_WITHIN):
-            message = await next_message(reader)
+            head = await reader.readexactly(LENGTH)
+            if head == STOP_HEAD:
+                await self._hear_stop(reader, writer)
+                return None
+            message = await next_message(reader, head)
         leaves = isinstance(message, Goodbye)
         if leaves or (isinstance(message, Hello) and not self._suits(message)):
             if await self._holder.makes_way():
@@ -62,14 +88,28 @@ class Greeting:
             return None
         return message
 
+    async def _hear_stop(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if self._is_stranger(writer):
+            raise NoMessage("a stop of another user")
+        peer = peer_of(writer.get_extra_info("socket"))
+        stop = await plain_stop(reader, self._inside.devices.known, peer)
+        self._stopped(stop)
+        # nobody of this name comes back: its stops count on without it
+        self._inside.facts.stops.fold({stop.program.id})
+        writer.write(GIVEN)
+
+    def _is_stranger(self, writer: asyncio.StreamWriter) -> bool:
+        """True for a program of another user on a line that no group shares."""
+        peer = peer_of(writer.get_extra_info("socket"))
+        return self._group is None and peer is not None and peer.user not in (os.getuid(), 0)
+
     def _suits(self, hello: Hello) -> bool:
         """True if program and owner have the same version and settings of the line."""
         return hello.version == VERSION and hello.label == label(self._inside.link)
 
     def _refusal(self, hello: Hello, writer: asyncio.StreamWriter, present: Collection[str]) -> str:
         """Why a program may not share the line, or empty; its user as by the socket's mode."""
-        mine = (os.getuid(), 0, None)
-        if self._group is None and user_of(writer.get_extra_info("socket")) not in mine:
+        if self._is_stranger(writer):
             return "This line is shared with other users only."
         if hello.version != VERSION:
             who = f"{self._inside.facts.me.text} owns the line, in another version of Drive Panel."

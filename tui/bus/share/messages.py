@@ -287,9 +287,9 @@ def packed(message: AnyMessage) -> bytes:
     return len(data).to_bytes(LENGTH, "big") + data
 
 
-async def next_message(reader: asyncio.StreamReader) -> AnyMessage:
-    """The next message. Raises NoMessage, EOFError where the other end is gone, OSError."""
-    length = int.from_bytes(await reader.readexactly(LENGTH), "big")
+async def next_message(reader: asyncio.StreamReader, head: bytes = b"") -> AnyMessage:
+    """The message after its length, `head` if read. Raises NoMessage, EOFError, OSError."""
+    length = int.from_bytes(head or await reader.readexactly(LENGTH), "big")
     if length > LONGEST_MESSAGE:
         raise NoMessage(f"{length} bytes")
     return unpacked(await reader.readexactly(length))

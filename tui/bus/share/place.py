@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import IO, Annotated
+from typing import IO, Annotated, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -275,10 +275,19 @@ def has_ended(program: Program) -> bool:
     return False
 
 
-def user_of(peer: socket.socket) -> int | None:
-    """The number of the user at the other end of a local socket; None where it is not told."""
+class Peer(NamedTuple):
+    """The process at the other end of a local socket."""
+
+    pid: int
+    """0 for one in another PID namespace."""
+    user: int
+
+
+def peer_of(connection: socket.socket) -> Peer | None:
+    """The process at the other end of a local socket; None if the system does not report it."""
     try:
-        found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+        found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
     except (AttributeError, OSError):
         return None
-    return int(struct.unpack("3i", found)[1])
+    pid, user, _ = struct.unpack("3i", found)
+    return Peer(max(0, pid), user)

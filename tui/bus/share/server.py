@@ -53,7 +53,7 @@ class ShareServer:
         self._holder = holder
         self._loop = asyncio.get_running_loop()
         self._clients: dict[str, Client] = {}
-        self._greeting = Greeting(inside, place.group, holder)
+        self._greeting = Greeting(inside, place.group, holder, self._stopped)
         self._listening = Listening(place, lock, inside.facts, label(inside.link), self._welcome)
         self._commanding = Commanding(inside.facts, self._clients, self._tell_facts)
         self._signs = SignsOfLife(

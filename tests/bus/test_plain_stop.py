@@ -1,0 +1,193 @@
+"""A stop in its plain form: who may give it, whom it stops, and forms that are none."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+
+from tui.bus.bounds import MOST_STOPPERS
+from tui.bus.line import Line
+from tui.bus.program import Program
+from tui.bus.share.messages import LONGEST_MESSAGE, NoMessage
+from tui.bus.share.place import Peer
+from tui.bus.share.plain_stop import GIVEN, LONGEST_PLAIN_STOP, STOP_HEAD, plain_stop, stop_devices
+
+from .conftest import Share
+from .peer import PtyPeer, eventually, honest
+from .sharing import SharedLines
+from .test_share_bounds import voided_and_stopped
+from .test_share_ends import raw
+
+Stop = tuple[tuple[int, ...], str, Program]
+FORMS = {
+    b" 2\n": (2,),
+    b" 2 3\n": (2, 3),
+    b" 3 2 3\n": (3, 2),
+    b" 1 247\n": (1, 247),
+    b" all\n": (5, 9),
+    b" " + b" ".join(str(n).encode() for n in range(1, 248)) + b"\n": tuple(range(1, 248)),
+}
+NO_FORMS = (
+    b"\n", b" \n", b"  2\n", b" 2 \n", b" 2  3\n", b"2\n", b"\t2\n", b" 2,3\n", b" 2\r\n", b" 02\n",
+    b" 0\n", b" 248\n", b" 999999\n", b" -1\n", b" +1\n", b" 1.0\n", b" 1_0\n", b" \xd9\xa1\n",
+    b" \0\n", b" 2\0\n", b"\0 2\n", b" all 2\n", b" 2 all\n", b" ALL\n", b" all \n", b" \xff\n",
+    b" 2 x\n", b" 2\n3\n", b" " + b"9" * 5000 + b"\n", b" 2" * LONGEST_PLAIN_STOP + b"\n",
+)  # fmt: skip
+MUTATED = 100_000
+
+
+async def stop_of(data: bytes) -> tuple[int, ...]:
+    """The devices that are stopped by what a program sends after the head."""
+    reader = asyncio.StreamReader()
+    reader.feed_data(data)
+    reader.feed_eof()
+    return (await plain_stop(reader, (0, 5, 9, 255), Peer(7, 0))).devices
+
+
+def heard_by(line: Line) -> list[Stop]:
+    """The stops of others that a program hears of from now on."""
+    heard: list[Stop] = []
+    line.facts.on_stop(lambda *stop: heard.append(stop))
+    return heard
+
+
+def give(lines: SharedLines, form: bytes) -> bytes:
+    """Send a stop in its plain form; returns all that is answered."""
+    with raw(lines) as connection, suppress(ConnectionError):
+        connection.sendall(STOP_HEAD + form)
+        return b"".join(iter(lambda: connection.recv(100), b""))
+    return b""
+
+
+def test_plain_stop_head_as_a_length_exceeds_every_message() -> None:
+    assert int.from_bytes(STOP_HEAD, "big") > LONGEST_MESSAGE
+
+
+@pytest.mark.parametrize(("form", "devices"), FORMS.items(), ids=range(len(FORMS)))
+async def test_plain_stop_returns_its_devices(form: bytes, devices: tuple[int, ...]) -> None:
+    assert await stop_of(form) == devices
+
+
+@pytest.mark.parametrize("form", NO_FORMS, ids=range(len(NO_FORMS)))
+async def test_plain_stop_malformed_raises(form: bytes) -> None:
+    with pytest.raises(NoMessage):
+        stop_devices(form, (5, 9))
+
+
+async def test_plain_stop_without_an_end_raises() -> None:
+    with pytest.raises(EOFError):
+        await stop_of(b" 2")
+    with pytest.raises(NoMessage):
+        await stop_of(b" 2" * 100_000)
+
+
+def mutated_forms() -> Iterator[bytes]:
+    """Forms with some of their bytes changed, taken out or doubled; the same each time."""
+    chance, forms = random.Random(29), [*list(FORMS)[:-1], *NO_FORMS[:-2]]
+    for _ in range(MUTATED):
+        data = bytearray(chance.choice(forms))
+        for _ in range(chance.randint(1, 3)):
+            place = chance.randrange(len(data) + 1)
+            new = chance.choice((b"", b" ", b"\n", b"\0", b"all", b"247", chance.randbytes(2)))
+            data[place : place + chance.randint(0, 2)] = new
+        yield bytes(data)
+
+
+async def test_plain_stop_mutated_returns_its_devices_or_raises() -> None:
+    taken = refused = 0
+    for data in mutated_forms():
+        try:
+            devices = await stop_of(data)
+        except (NoMessage, EOFError):
+            refused += 1
+            continue
+        taken += 1
+        line = data.partition(b"\n")[0]
+        named = b"5 9" if line == b" all" else line.removeprefix(b" ")
+        assert devices == tuple(dict.fromkeys(map(int, named.split(b" "))))
+        assert all(1 <= device <= 247 for device in devices)
+    assert taken > 1000
+    assert refused > 1000
+
+
+async def test_plain_stop_reaches_every_program_as_from_one_that_is_not_attached(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        before = {one: one.facts.stops.stamp(3) for one in (owner, other)}
+        heard = [heard_by(owner), heard_by(other)]
+        assert await asyncio.to_thread(give, lines, b" 3 4\n") == GIVEN
+        eventually(lambda: all(heard))
+        for ((devices, by, program),) in heard:
+            assert (devices, by) == ((3, 4), "drivepanel stop")
+            assert program.text == f"stop (pid {os.getpid()})"
+            assert program not in owner.facts.programs
+        for one in (owner, other):
+            # what was meant before is void, whoever meant it
+            assert "a stop came after it" in one.facts.refusal(one.facts.me.id, 3, before[one])
+            assert not one.facts.refusal(one.facts.me.id, 5, one.facts.stops.stamp(5))
+        await voided_and_stopped(lines, peer, other, owner)
+
+
+async def test_plain_stop_of_all_stops_the_known_devices(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        heard = heard_by(owner)
+        assert await asyncio.to_thread(give, lines, b" all\n") == GIVEN
+        ((devices, _, _),) = heard
+        assert devices == tuple(range(1, 10))
+
+
+async def test_plain_stops_each_count_and_leave_no_names_behind(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        before = owner.facts.stops.stamp(3)
+        for _ in range(MOST_STOPPERS + 10):
+            assert await asyncio.to_thread(give, lines, b" 3\n") == GIVEN
+        assert owner.facts.stops.stamp(3) == before + MOST_STOPPERS + 10
+        assert len(owner.facts.stops.given[3]) < 5
+        eventually(lambda: other.facts.stops.stamp(3) == owner.facts.stops.stamp(3))
+        await voided_and_stopped(lines, peer, other, owner)
+        await voided_and_stopped(lines, peer, owner, other)
+
+
+async def test_plain_stop_malformed_ends_its_connection_only(
+    share: Share, caplog: pytest.LogCaptureFixture
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        heard = heard_by(owner)
+        for form in NO_FORMS:
+            if form != b" 2\n3\n":
+                assert await asyncio.to_thread(give, lines, form) == b""
+        assert not heard
+        assert [one.name for one in owner.facts.others] == ["watch"]
+        await voided_and_stopped(lines, peer, other, owner)
+    assert "serving a program on the line failed" not in caplog.text
+
+
+async def test_plain_stop_of_another_user_is_refused(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        heard = heard_by(owner)
+        foreign = Peer(4711, os.getuid() + 4711)
+        monkeypatch.setattr("tui.bus.share.greeting.peer_of", lambda _: foreign)
+        assert await asyncio.to_thread(give, lines, b" 3\n") == b""
+        assert not heard
+        # root may
+        monkeypatch.setattr("tui.bus.share.greeting.peer_of", lambda _: Peer(4711, 0))
+        assert await asyncio.to_thread(give, lines, b" 3\n") == GIVEN
+        assert len(heard) == 1
