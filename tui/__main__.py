@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False
+"""As in typing, whose import would hold up a stop."""
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -20,6 +21,10 @@ NO_KEEPER = "DRIVEPANEL_NO_KEEPER"
 
 def main() -> None:
     """Run the command line, or the panel where there is none."""
+    if "stop" in sys.argv:
+        from tui.cli.short_stop import stop_at_once
+
+        stop_at_once(sys.argv[1:])
     from tui.cli.shared.standard_streams import keep_streams
 
     keep_streams()

@@ -1,0 +1,80 @@
+"""The short way of `drivepanel stop` to the keeper of a line, as a person types it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+
+import pytest
+
+from tests.programs import PATIENCE, drivepanel, keepers, wait_until
+from tui.bus.program import Program
+from tui.bus.shared_facts import SharedFacts
+from tui.keeper.starting import start_keeper
+from tui.session.connect import keepers as connect_keepers
+from tui.session.connect.open_line import OpenLine, open_line
+
+from .test_commands import bench
+
+WITHOUT_IMPORTS = """
+import sys
+sys.modules.update(dict.fromkeys(["click", "msgspec", "asyncio", "tui.cli.shared"]))
+sys.argv = ["drivepanel", *sys.argv[1:]]
+from tui.__main__ import main
+main()
+"""
+"""The program, none of whose imports works."""
+
+
+@pytest.fixture
+def panel(monkeypatch: pytest.MonkeyPatch) -> Iterator[OpenLine]:
+    """A program that is attached to the keeper of a line."""
+    monkeypatch.setattr(connect_keepers, "start", start_keeper)
+    with bench() as (_, line), closing(open_line(line, wait=PATIENCE, program="panel")) as opened:
+        assert len(keepers()) == 1
+        yield opened
+
+
+def stops_heard(facts: SharedFacts) -> list[tuple[tuple[int, ...], Program, bool]]:
+    """Stops of others from now on: of which devices, by whom, and True if that one is attached."""
+    heard: list[tuple[tuple[int, ...], Program, bool]] = []
+
+    def hear(devices: tuple[int, ...], _by: str, program: Program) -> None:
+        heard.append((devices, program, program in facts.programs))
+
+    facts.on_stop(hear)
+    return heard
+
+
+def test_stop_reaches_the_keeper_before_anything_is_imported(panel: OpenLine) -> None:
+    heard = stops_heard(panel.line.facts)
+    command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", panel.text, "-d", "1", "-d", "3"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert "ModuleNotFoundError" in done.stderr
+    wait_until(lambda: bool(heard), "the stop is heard")
+    ((devices, program, attached),) = heard
+    assert devices == (1, 3)
+    assert program.name == "stop"
+    assert not attached
+
+
+def test_stop_after_its_short_way_is_carried_out_and_reported_as_usual(panel: OpenLine) -> None:
+    heard = stops_heard(panel.line.facts)
+    done = drivepanel("stop", panel.text, "-d", "1", "-p", "atv71")
+    assert done.returncode == 0, done.stderr
+    assert "Altivar 71: stopped." in done.stdout
+    assert [devices for devices, *_ in heard] == [(1,)] * len(heard)
+    assert heard[0][1].pid == heard[-1][1].pid
+    assert heard[0][1].id != heard[-1][1].id
+    assert [attached for *_, attached in heard[:2]] == [False, True]
+
+
+def test_stop_of_another_kind_takes_no_short_way(panel: OpenLine) -> None:
+    heard = stops_heard(panel.line.facts)
+    for words in (["--quick"], ["--read-only"], ["--all", "--addresses", "1-2"]):
+        command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", panel.text, *words]
+        subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
+    assert drivepanel("stop", panel.text, "-p", "atv71").returncode == 0
+    assert {devices for devices, *_ in heard} == {(1,)}
