@@ -123,12 +123,16 @@ async def test_plain_stop_reaches_every_program_as_from_one_that_is_not_attached
         owner, other = lines.open("panel"), lines.open("watch")
         before = {one: one.facts.stops.stamp(3) for one in (owner, other)}
         heard = [heard_by(owner), heard_by(other)]
+        due: list[tuple[tuple[int, ...], str]] = []
+        owner.facts.holder.on_stop_due(lambda *stop: due.append(stop))
         assert await asyncio.to_thread(give, lines, b" 3 4\n") == GIVEN
         eventually(lambda: all(heard))
         for ((devices, by, program),) in heard:
             assert (devices, by) == ((3, 4), "drivepanel stop")
             assert program.text == f"stop (pid {os.getpid()})"
             assert program not in owner.facts.programs
+        # no program carries it out, so the owner does
+        assert due == [((3, 4), f"stop (pid {os.getpid()})")]
         for one in (owner, other):
             # what was meant before is void, whoever meant it
             assert "a stop came after it" in one.facts.refusal(one.facts.me.id, 3, before[one])

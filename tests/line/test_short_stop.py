@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 
 import pytest
 
@@ -17,6 +17,7 @@ from tui.session.connect import keepers as connect_keepers
 from tui.session.connect.open_line import OpenLine, open_line
 
 from .test_commands import bench
+from .test_shared_programs import motor_run, stopped_by_commands
 
 WITHOUT_IMPORTS = """
 import sys
@@ -58,6 +59,22 @@ def test_stop_reaches_the_keeper_before_anything_is_imported(panel: OpenLine) ->
     assert devices == (1, 3)
     assert program.name == "stop"
     assert not attached
+
+
+def test_stop_is_carried_out_by_the_keeper_alone() -> None:
+    with ExitStack() as programs, motor_run(programs, "watch") as (simulation, line, runner, _):
+        command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "-d", "1"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+        assert "ModuleNotFoundError" in done.stderr
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+        assert runner.process.wait(PATIENCE) == 6
+
+
+def test_stop_of_all_is_carried_out_by_the_keeper_alone() -> None:
+    with ExitStack() as programs, motor_run(programs, "watch") as (simulation, line, _, _):
+        command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "--all"]
+        subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
 
 
 def test_stop_after_its_short_way_is_carried_out_and_reported_as_usual(panel: OpenLine) -> None:

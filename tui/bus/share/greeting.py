@@ -93,9 +93,11 @@ class Greeting:
             raise NoMessage("a stop of another user")
         peer = peer_of(writer.get_extra_info("socket"))
         stop = await plain_stop(reader, self._inside.devices.known, peer)
+        facts = self._inside.facts
         self._stopped(stop)
+        facts.holder.hear_stop_due(stop.devices, stop.program.text)
         # nobody of this name comes back: its stops count on without it
-        self._inside.facts.stops.fold({stop.program.id})
+        facts.stops.fold({stop.program.id})
         writer.write(GIVEN)
 
     def _is_stranger(self, writer: asyncio.StreamWriter) -> bool:
