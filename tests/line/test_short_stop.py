@@ -9,15 +9,17 @@ from contextlib import ExitStack, closing
 
 import pytest
 
-from tests.programs import PATIENCE, drivepanel, keepers, wait_until
+from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, keepers, served, wait_until
 from tui.bus.program import Program
 from tui.bus.shared_facts import SharedFacts
 from tui.keeper.starting import start_keeper
 from tui.session.connect import keepers as connect_keepers
 from tui.session.connect.open_line import OpenLine, open_line
+from tui.simulator import DriveSpec
 
 from .test_commands import bench
-from .test_shared_programs import motor_run, stopped_by_commands
+from .test_keeper import times_of_good_values
+from .test_shared_programs import motor_run, records, stopped_by_commands
 
 WITHOUT_IMPORTS = """
 import sys
@@ -95,3 +97,26 @@ def test_stop_of_another_kind_takes_no_short_way(panel: OpenLine) -> None:
         subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
     assert drivepanel("stop", panel.text, "-p", "atv71").returncode == 0
     assert {devices for devices, *_ in heard} == {(1,)}
+
+
+def test_stop_on_a_line_that_no_process_holds_starts_none() -> None:
+    with bench() as (_, line):
+        done = drivepanel("stop", line, "-p", "atv71")
+        assert done.returncode == 0, done.stderr
+        assert keepers() == []
+
+
+def test_program_that_came_during_a_stop_goes_on_with_a_keeper() -> None:
+    slow = DriveSpec("atv71", 1, sets={"DEC": 1000}, run_hz=40)
+    with bench(slow) as (simulation, line):
+        command = [*DRIVEPANEL, "stop", line, "-p", "atv71"]
+        with (
+            served(command, ready="sent first") as stopping,
+            served(records(line), ready="{") as recorder,
+        ):
+            assert stopping.process.poll() is None, "it follows the motor to standstill"
+            assert keepers() == []
+            simulation.drive(1).set("DEC", 1)
+            assert stopping.process.wait(PATIENCE) == 0
+            wait_until(lambda: len(keepers()) == 1, "a keeper holds the line")
+            assert times_of_good_values(recorder, 3.0)

@@ -111,7 +111,8 @@ def stop(
             telling.gave_back(await give_control_back(session, arm=arm))
         return status
 
-    worst = on_line(target, work)
+    # the start of a keeper would hold up the stop
+    worst = on_line(target, work, keeper=False)
     if as_json:
         several = every or len(target.each()) > 1
         print_json(telling.documents if several else telling.documents[0])

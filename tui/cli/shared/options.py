@@ -157,10 +157,12 @@ def on_line(
     work: Callable[[OpenLine], Coroutine[Any, Any, T]],
     *,
     read_only: bool = False,
+    keeper: bool = True,
 ) -> T:
     """Open a line, do the work, close the line whatever happens.
 
-    A Target whose text names no baud or format is opened with those of its profile.
+    A Target whose text names no baud or format is opened with those of its profile. Without
+    `keeper` no process is started for a line that none holds.
     """
     from tui.bus.errors import NoAnswer
     from tui.session.connect.open_line import open_line
@@ -171,7 +173,12 @@ def on_line(
     with ExitStack() as stack:
         stack.enter_context(never_suspended())
         opened = open_line(
-            text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual, program=program
+            text,
+            read_only=read_only,
+            wait=CONNECT_WITHIN,
+            usual=usual,
+            program=program,
+            keeper=keeper,
         )
         stack.callback(opened.close)
         if opened.line.facts.voice is not None and opened.line.facts.others:

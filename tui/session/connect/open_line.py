@@ -74,10 +74,12 @@ def open_line(
     wait: float | None = None,
     usual: UsualSettings | None = None,
     program: str = "",
+    keeper: bool = True,
 ) -> OpenLine:
     """The line that a person means, opened; `usual` are serial settings where none are named.
 
     `program` is what others on the line call this one; a program without a name shares nothing.
+    Without `keeper` it holds a line itself that no other program holds.
 
     With `wait` it returns connected, or raises the line's error after so many seconds;
     without, it connects by itself. Raises LinkSyntaxError, UnknownProfile, ProfileError.
@@ -103,7 +105,7 @@ def open_line(
         read_only=read_only,
         place=place,
         program=this_program(program),
-        share=partial(Sharing, start_keeper=keepers.start),
+        share=partial(Sharing, start_keeper=keepers.start if keeper else None),
         gated=True,
     )
 
