@@ -29,6 +29,7 @@ SMALL = {
     "line": "--families atv31 --bauds 19200 --seconds 0.2",
     "scan": "--addresses 4 --rounds 1",
     "share_soak": "--minutes 0.1",
+    "shell": "--rounds 1",
     "soak": "--minutes 0.1",
     "stop": "--presses 1 --drives 2",
     "upload": "--rounds 1 --baud 115200",
