@@ -20,6 +20,7 @@ from tests.sources import ROOT
 BENCHMARKS = ROOT / "benchmarks"
 SMALL = {
     "block": "--bauds 19200 --seconds 0.5",
+    "chaos": "--rounds 6 --after 9 --slack 20",
     "fleet": "--drives 3 --seconds 1",
     "gateway": "--seconds 0.3 --rounds 1",
     "hands": "--bursts 2 --keys 8 --ends 1 --resizes 24",
