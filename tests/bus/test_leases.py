@@ -71,7 +71,7 @@ async def test_an_armed_drive_is_written_until_it_is_disarmed(share: Share) -> N
             one.facts.leases.disarm(1)
             assert "drive 1 is not armed" in await refusal(one)
         program.facts.leases.arm(2, 60.0, CARE)
-        assert "drive 1 is not armed any more" in await refusal(program)
+        assert "drive 1 is not armed by this program" in await refusal(program)
         assert written(peer) == [RUN, RUN]
 
 
@@ -189,3 +189,20 @@ async def test_a_write_whose_program_is_gone_reaches_the_holder_with_its_result(
         # the other one was never sent
         await holder.read(1, 1)
         assert written(peer) == [RUN]
+
+
+async def test_a_stop_is_not_due_any_more_once_its_drive_was_armed_again(share: Share) -> None:
+    """A panel that stopped a drive that was switched off, and is closed an hour later."""
+    due: list[tuple[int, ...]] = []
+    with PtyPeer(prompt) as peer:
+        lines = share(peer.path)
+        holder = lines.open("keeper", gated=True)
+        holder.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        panel, runner = lines.open("panel"), lines.open("run")
+        panel.facts.give_stop([1, 2], "the stop key")
+        await asyncio.to_thread(eventually, lambda: runner.facts.stops.stamp(1) == 1)
+        runner.facts.leases.arm(1, None, CARE)
+        await runner.write(1, 1, [RUN])
+        await asyncio.to_thread(panel.close)
+        await asyncio.to_thread(eventually, lambda: due != [])
+        assert due == [(2,)]

@@ -5,16 +5,18 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tui.bus.api import Priority
+from tui.bus.errors import NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line
 
-from .conftest import NO_ECHO, WIDE, Share
+from .conftest import NO_ECHO, WIDE, OpenLine, Share
 from .peer import PtyPeer, Step, eventually, reply
 from .sharing import QUICK, OtherProgram, other_program
 
@@ -90,3 +92,56 @@ async def test_the_words_of_a_stop_wait_for_no_proof(share: Share, tmp_path: Pat
         assert peer.requests[-1][5] == 0
         await asyncio.gather(stop, other, return_exceptions=True)
         assert time.monotonic() - killed >= LATE
+
+
+def busy_once(request: bytes, count: int) -> Sequence[Step]:
+    """A drive that hears everything meanwhile, and answers it in turn."""
+    return [0.55 if count == 0 else 0.03, reply(request)]
+
+
+def doubting(open_line: OpenLine, peer: PtyPeer, seconds: float) -> Line:
+    """A line whose last holder was killed: a late reply may come for so many seconds."""
+    timing = replace(QUICK, late_reply=LATE, first_timeout=0.2, min_timeout=0.2)
+    line = open_line(peer.path, timing)
+    line._engine._dispatcher.proof.doubt(time.monotonic() + seconds)
+    return line
+
+
+async def test_late_replies_to_a_proof_that_failed_are_taken_for_no_others(
+    open_line: OpenLine,
+) -> None:
+    with PtyPeer(busy_once) as peer:
+        line = doubting(open_line, peer, 0.3)
+        found = []
+        for register in (SLOW, OTHER, 9, 10):
+            with suppress(NoAnswer):
+                answer = await line.read(1, register, priority=Priority.OPERATOR_READ)
+                found.append((register, answer.words[0]))
+        assert [wanted for wanted, _ in found] == [word for _, word in found]
+        assert len(found) >= 3
+
+
+async def test_a_write_that_waits_for_a_proof_can_be_withdrawn(open_line: OpenLine) -> None:
+    with PtyPeer(never_echoes) as peer:
+        line = doubting(open_line, peer, 1.2)
+        write = asyncio.create_task(line.write(1, 1, [15]))
+        await asyncio.to_thread(eventually, lambda: 8 in functions(peer))
+        write.cancel()
+        await line.read(1, OTHER)
+        assert 6 not in functions(peer)
+
+
+async def test_a_stop_waits_for_one_request_of_a_proof_at_most(open_line: OpenLine) -> None:
+    def silent_at_1(request: bytes, _count: int) -> Sequence[Step]:
+        return [] if request[0] == 1 else [reply(request)]
+
+    with PtyPeer(silent_at_1) as peer:
+        line = doubting(open_line, peer, 5.0)
+        reading = asyncio.create_task(line.read(1, OTHER))
+        await asyncio.to_thread(peer.await_requests, 1)
+        await line.write(2, 1, [0], priority=Priority.STOP)
+        # nor does a healthy drive wait for a silent one
+        await line.read(2, OTHER)
+        assert [one[0] for one in peer.requests][:2] == [1, 2]
+        assert [one[0] for one in peer.requests].count(1) == 1
+        reading.cancel()

@@ -262,24 +262,34 @@ async def test_a_recorder_waits_for_the_person_of_an_attached_panel_only(
 FROZEN = Program("frozen", "run", LIVING)
 
 
-async def frozen(bench: Bench, **started: bool) -> None:
+async def frozen(bench: Bench, *, person: bool = True, **started: bool) -> None:
     """A program that runs a motor gives no sign of life, and was let go."""
     bench.started(1, pid=LIVING, **started)
     await come(lambda: bench.turns(1))
-    bench.guardian(timeout=10.0)
+    bench.guardian(person=person, timeout=10.0)
     bench.gone(FROZEN)
     await asyncio.sleep(0.2)
     assert bench.told == []  # it may be just ending
     bench.clock.advance(ENDS_WITHIN + 0.1)
 
 
-async def test_the_motor_of_a_frozen_program_is_stopped_after_the_drives_own_time_out(
+async def test_the_motor_of_a_frozen_program_is_stopped_where_nobody_can_take_it_over(
+    bench: Bench,
+) -> None:
+    await frozen(bench, person=False)
+    drive = bench.simulation.drive(1)
+    await come(lambda: drive.motor.frequency == 0)
+    assert drive.fault is None
+    assert bench.told[0][1] == "run (pid 900001) is not on the line any more: its motor is stopped."
+
+
+async def test_a_person_has_the_drives_own_time_out_to_take_over_from_a_frozen_program(
     bench: Bench,
 ) -> None:
     await frozen(bench)
     let_go = bench.clock.monotonic() - ENDS_WITHIN - 0.1
     await come(lambda: bench.says("is not on the line any more: its motor is stopped in "))
-    assert bench.says("unless it comes back.")
+    assert bench.says("unless it comes back or a and T take it over here.")
     bench.clock.advance(3.0)
     await asyncio.sleep(0.2)
     assert bench.line.facts.stops.stamp(1) == 0

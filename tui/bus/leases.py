@@ -64,12 +64,15 @@ class WriteLeases:
 
     def stay_armed(self, device: int, seconds: float | None) -> None:
         """Write on to a device that this program has armed, for so many seconds."""
-        lease = self._leases.get((self._me, device))
-        if lease is None or lease.until is None or seconds is None:
+        if seconds is None:
             return
-        if (until := time.monotonic() + seconds + RENEWED_EACH) - lease.until >= RENEWED_EACH:
-            self.grant(self._me, device, replace(lease, until=until))
-            self._say(device, WriteLease(lease.stamp, until))
+        until, mine = time.monotonic() + seconds + RENEWED_EACH, (self._me, device)
+        with self._lock:  # one that ended just now stays ended
+            lease = self._leases.get(mine)
+            if lease is None or lease.until is None or until - lease.until < RENEWED_EACH:
+                return
+            self._leases = MappingProxyType({**self._leases, mine: replace(lease, until=until)})
+        self._say(device, WriteLease(lease.stamp, until))
 
     def disarm(self, device: int) -> None:
         """Write to a device no more."""

@@ -1,6 +1,6 @@
 """The short way of `drivepanel stop`: the stop reaches the holder of the line before the imports.
 
-It is a shot in front. The command follows in full, whatever becomes of it: it repeats the stop,
+It is a shot in front. The command follows in full, whether it arrives or not: it repeats the stop,
 follows the motor to standstill, and reports. So nothing here prints, raises or waits for long. It
 takes a command line only if each word of it is understood, and stops no other drive than the
 command. An import costs more than all the rest: what is here needs none but sockets and a digest,

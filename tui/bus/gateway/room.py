@@ -1,7 +1,8 @@
 """Makes room for a further connection to a server that keeps a limited number.
 
 Each address that clients come from has a share: the one with the most connections gives one of
-its own. So no number of connections from elsewhere keeps a client out that must stop a motor.
+its own. So no number of connections that are idle, or read, keeps a client out that must stop a
+motor. One that waits for the answer to a write is never closed: it may be a stop.
 """
 
 from __future__ import annotations

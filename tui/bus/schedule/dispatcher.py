@@ -204,12 +204,9 @@ class Dispatcher:
         return self.refusal(job) or (job.forbidden() if job.forbidden is not None else "")
 
     def _begins(self, job: Job) -> bool:
-        """Take a job up; False if nothing is to be sent for it."""
+        """Take a job up; False if nothing is to be sent for it, or not yet."""
         if self._left_alone(job) or self._is_answered(job):
             return False
-        if not job.begun and not job.answer.set_running_or_notify_cancel():
-            return False
-        job.begun = True
         if why := self.forbidden(job):
             job.fail(RequestRefused(why))
             return False
@@ -222,6 +219,9 @@ class Dispatcher:
             self._queue.put_back(job)
             await self.proof.prove(master, job)
             return
+        if not job.begun and not job.answer.set_running_or_notify_cancel():
+            return
+        job.begun = True
         if job.request.changes:
             self._outcomes.values.drop(job.request.device)
         begun = self._clock()
@@ -281,7 +281,7 @@ class Dispatcher:
             job.pdu,
             job.expectation,
             self._devices.time_out(request.device, request.function, job.priority, job.within),
-            sure,
+            sure and not self.proof.doubts_refusal(request.device),
             skip,
             look,
         )

@@ -278,7 +278,8 @@ class Engine:
     def _quiet_after(self) -> float:
         """Seconds for which a reply to what was sent from here may still come."""
         now = self._clock()
-        late = now + self._timing.late_reply if self._dispatcher.in_flight else now
+        waits = self._dispatcher.in_flight or self._dispatcher.proof.busy
+        late = now + self._timing.late_reply if waits else now
         return max(late, self.devices.last_reply_by(now)) - now
 
 

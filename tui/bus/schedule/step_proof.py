@@ -19,8 +19,8 @@ from .queue import Job
 
 ECHO = 0
 """The sub-function that every device echoes, if it has function 8."""
-MOST_TRIES = 2
-"""Echoes that a device may miss; then it has to wait."""
+MOST_TRIES = 3
+"""Requests that are sent for a proof; then the device has to wait."""
 
 
 class StepProof:
@@ -33,6 +33,8 @@ class StepProof:
         self._devices = devices
         self._outcomes = outcomes
         self._clock = clock
+        self.busy = False
+        """True while a reply to a request for a proof is due."""
         self._until = 0.0
         self._proved: set[int] = set()
         self._tries: dict[int, int] = {}
@@ -63,24 +65,42 @@ class StepProof:
             return False
         return job.priority is not Priority.STOP or not job.request.changes
 
+    def doubts_refusal(self, device: int) -> bool:
+        """True while a refusal may be one of a request of the holder before."""
+        return self._clock() < self._until and device not in self._proved
+
     async def prove(self, master: Master, job: Job) -> None:
-        """Have the drive of a request echo a number. Raises LineLost."""
+        """Send one request that leads to the proof of a drive; a stop may follow it at once.
+
+        Raises LineLost.
+        """
         device = job.request.device
-        self._tries[device] = self._tries.get(device, 0) + 1
-        for _ in range(MOST_TRIES):
+        tries = self._tries[device] = self._tries.get(device, 0) + 1
+        if master.echo is None and tries < MOST_TRIES and Read.function in job.limits.functions:
             # a number that came back may be from an adapter that repeats what is sent; a read
             # tells, whatever its reply, unless another reply comes just then
-            if master.echo is None and Read.function in job.limits.functions:
-                await self._exchange(master, job, Read(device, job.request.register, 1))
-                await master.quiet()
-        echo = Diagnose(device, ECHO, secrets.randbelow(1 << 16))
-        if (await self._exchange(master, job, echo)).kind is ResultKind.REPLY:
-            self._proved.add(device)
+            result = await self._exchange(master, job, Read(device, job.request.register, 1))
+        else:
+            echo = Diagnose(device, ECHO, secrets.randbelow(1 << 16))
+            result = await self._exchange(master, job, echo)
+            if result.kind is ResultKind.REPLY:
+                self._proved.add(device)
+        if result.kind is ResultKind.NOTHING:
+            # others are not to wait for a silent drive
+            self._tries[device] = MOST_TRIES
 
     async def _exchange(self, master: Master, job: Job, request: Request) -> ExchangeResult:
-        device = request.device
+        """Send a request whose reply is kept from being taken for that of a later one."""
+        device, expectation, begun = request.device, request.expectation(), self._clock()
         time_out = self._devices.time_out(device, request.function, job.priority, job.within)
-        sending = Sending(device, request.pdu(), request.expectation(), time_out)
-        result = await master.exchange(sending)
+        result, self.busy = None, True
+        try:
+            sending = Sending(device, request.pdu(), expectation, time_out)
+            result = await master.exchange(sending)
+        finally:
+            self.busy = False
+            if result is None or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
+                sent = begun if result is None else result.sent
+                self._devices.may_come(device, expectation, sent, self._clock())
         self._outcomes.count_beside(device, result)
         return result

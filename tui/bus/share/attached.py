@@ -37,6 +37,8 @@ log = logging.getLogger(__name__)
 
 MOST_ASKED = 256
 """Requests of one client that may wait."""
+STOP_DUE = 10.0
+"""Seconds for which a stop is carried out for a program that is gone."""
 MOST_UNREAD = 1 << 23
 """Bytes that a client may leave unread; one that stalls is let go, and may come back."""
 
@@ -56,8 +58,8 @@ class Client:
     limits: dict[int, Limits] = field(default_factory=dict)
     stops_left: list[Job] = field(default_factory=list)
     """Stops that it had asked when it went."""
-    stops_due: set[int] = field(default_factory=set)
-    """Devices that it has stopped, and that have not answered a word of it yet."""
+    stops_due: dict[int, float] = field(default_factory=dict)
+    """When it stopped devices, by device, that have not answered a word of it yet."""
     asked: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
     counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
@@ -78,6 +80,10 @@ class Client:
             transport.abort()
             return
         self.writer.write(packed(message))
+
+    def due_stops(self, now: float) -> tuple[int, ...]:
+        """Devices that it has stopped of late, and that have answered no word of it."""
+        return tuple(one for one, when in self.stops_due.items() if now - when < STOP_DUE)
 
     def hears(self, message: AnyMessage, now: float) -> None:
         """It said something; a stop is acknowledged on receipt."""
@@ -134,7 +140,7 @@ class Client:
             return
         error = answer.exception()
         if error is None and job.priority is Priority.STOP and job.request.changes:
-            self.stops_due.discard(job.request.device)
+            self.stops_due.pop(job.request.device, None)
         if error is not None:
             self.say(Failed(number, *failure_told(error)))
         else:

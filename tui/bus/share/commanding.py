@@ -54,8 +54,13 @@ class Commanding:
     def _armed(self, program: Program, message: Armed) -> None:
         """A program may write to a device; care that nobody here can make use of is none."""
         facts, device, care = self._facts, message.device, message.care
+        for client in self._clients.values():
+            client.stops_due.pop(device, None)  # whoever arms it now knows of that stop
         if program.id == facts.me.id:
             return  # granted already
+        if message.until is not None and message.until <= 0:
+            facts.leases.end(program.id, device)
+            return
         if care and not facts.holder.hear_care(device, care):
             facts.leases.end(program.id, device)
             care = b""

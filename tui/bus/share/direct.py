@@ -42,7 +42,7 @@ class DirectStops:
         self._why = "the line does not open."
         self._remedy = BY_HAND.format(pid=owner.pid)
         self._worked = inside.clock()
-        """When an exchange came to an end last, or the first that waits was taken."""
+        """When an exchange ended last, or the first that waits was taken."""
         self._inside = inside
         self._turn = turn
         self._echo: bool | None = None

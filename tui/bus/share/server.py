@@ -76,6 +76,7 @@ class ShareServer:
             self._missing(before)
         await self._listening.start()
         self._signs.start()
+        self._miss_departed(ended=True)
         self._missed = self._loop.call_later(BACK_WITHIN, self._miss_departed)
 
     async def close(self, quiet: float = 0.0) -> None:
@@ -167,11 +168,10 @@ class ShareServer:
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
         self._stops_left += client.forget()
-        if client.stops_due:
-            facts = self._inside.facts
-            facts.holder.hear_stop_due(tuple(client.stops_due), client.program.text)
         if self._clients.get(client.program.id) is not client:
             return
+        if due := client.due_stops(self._inside.clock()):
+            self._inside.facts.holder.hear_stop_due(due, client.program.text)
         del self._clients[client.program.id]
         log.info("%s has left the line", client.program.text)
         facts = self._inside.facts
@@ -180,12 +180,12 @@ class ShareServer:
         self._holder.moved(arrived=False)
         self._tell_facts()
 
-    def _miss_departed(self) -> None:
-        """Programs that were on the line of an owner before are not back: they are gone."""
+    def _miss_departed(self, *, ended: bool = False) -> None:
+        """Programs of an owner before are gone: they are not back, or surely have `ended`."""
         facts = self._inside.facts
         here = {one.id for one in facts.programs}
         for program in facts.departed:
-            if program.id not in here | self._gone_before:
+            if program.id not in here | self._gone_before and (has_ended(program) or not ended):
                 self._missing(program)
         self._holder.moved(arrived=False)
         self._tell_facts()
@@ -233,7 +233,7 @@ class ShareServer:
     def _hear_of_devices(self, client: Client, message: AnyMessage) -> None:
         match message:
             case StopGiven() if message.program.id == client.program.id:
-                client.stops_due.update(message.devices)
+                client.stops_due |= dict.fromkeys(message.devices, self._inside.clock())
                 self._stopped(message)
             case Told(device=device, text=text):
                 self._inside.facts.hear_text(device, text)

@@ -21,16 +21,24 @@ def guard_motors(opened: OpenLine, name: str = "") -> None:
     line = opened.line
     guardians: list[Guardian] = []
 
-    def gone(program: Program) -> None:
-        # imported when it is needed: most commands never are left by anybody
+    def begin() -> None:
+        # imported when it is needed: most commands never share their line as its holder
         from tui.session.journal import Journal
         from tui.session.sharing.guardian import Guardian
 
-        if not guardians:
-            guardians.append(Guardian(line, Journal(), timeout_of=partial(_timeout_of, opened)))
-            guardians[0].gone(program)
+        for leave in waiting:
+            leave()
+        guardians.append(Guardian(line, Journal(), timeout_of=partial(_timeout_of, opened)))
 
-    line.facts.on_gone(gone)
+    def gone(program: Program) -> None:
+        begin()
+        guardians[0].gone(program)
+
+    def armed(device: int, care: bytes) -> bool:
+        begin()
+        return line.facts.holder.hear_care(device, care)
+
+    waiting = (line.facts.on_gone(gone), line.facts.holder.on_care(armed))
     line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
 
 

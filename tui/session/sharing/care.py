@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -36,7 +37,14 @@ class DrivesInCare:
     Called in the line's thread.
     """
 
-    def __init__(self, line: ModbusLine, journal: Journal) -> None:
+    def __init__(
+        self,
+        line: ModbusLine,
+        journal: Journal,
+        session_of: Callable[[int], DriveSession | None] = lambda _: None,
+    ) -> None:
+        """`session_of` finds a drive that this program has open itself."""
+        self._session_of = session_of
         self._line = line
         self._journal = journal
         self._profiles: dict[bytes, Profile] = {}
@@ -57,7 +65,7 @@ class DrivesInCare:
     def _registered(self, device: int, care: bytes) -> bool:
         """A program arms a drive; False if its care cannot be used."""
         before, _ = self._sessions.get(device, (b"", None))
-        if before == care:
+        if before == care or self._session_of(device) is not None:
             return True
         try:
             data = msgspec.msgpack.decode(care, type=CareData)
@@ -69,8 +77,6 @@ class DrivesInCare:
         except Exception:
             # a profile that only its sender has checked
             log.exception("drive %s cannot be taken into care", device)
-            return False
-        if not session.prepared:
             return False
         session.guessed = data.guessed
         if len(self._profiles) >= MOST_PROFILES:

@@ -48,7 +48,7 @@ BY_KEYS = "a and T take it over here"
 LINE_BACK_WITHIN = 600.0
 """Seconds for which a motor on a lost line is still to be stopped once that is back."""
 LINE_STAYS_LOST = "NOT STOPPED: the line stays lost. Stop the motor at the machine."
-ENDS_WITHIN = 1.0
+ENDS_WITHIN = 0.5
 """Seconds that a program takes to be gone from the list of processes."""
 LOOK_INTERVAL = 0.05
 
@@ -77,7 +77,7 @@ class Guardian:
         self._stopper = Stopper(line, journal, events)
         self._key = line_key(label(line.link))
         """The line by its adapter, also while that is unplugged."""
-        self._care = DrivesInCare(line, journal)
+        self._care = DrivesInCare(line, journal, session_of)
         self._lost: dict[int, float] = {}
         """By device, when its line was lost before a stop; it may have come and gone since."""
         self._workers: list[LineWorker] = []
@@ -109,8 +109,7 @@ class Guardian:
 
     def _stop_due(self, devices: tuple[int, ...], by: str) -> None:
         """A stop was given that no program carries out; called in the line's thread."""
-        for session in filter(None, map(self._known, devices)):
-            self._spawn(partial(self._stop, session, by), f"stop {session.device} for {by}")
+        self._spawn(partial(self._stop, devices, by), f"stop for {by}")
 
     async def _look_after(self, program: Program) -> None:
         """Stop each motor that it has started and that nobody takes over in time."""
@@ -128,14 +127,14 @@ class Guardian:
     ) -> None:
         """Stop a motor, unless an attached person takes it over within the drive's time-out.
 
-        A program that lives has as long to look after it again, as if nobody asked its drive on.
+        With such a person, a program that lives has as long to look after it again.
         """
         device, frozen = record.device, self._starts.is_alive(record)
         timeout = self._timeout_of(device) or record.acts_after or TAKEN_OVER_WITHIN
         grace = min(timeout, LONGEST_GRACE)
         # one that is frozen had been silent before it was let go
         begun = left - SILENT_CLIENT if frozen else self._clock.monotonic()
-        end = begun + grace if frozen or takers else begun
+        end = begun + grace if takers else begun
         self._announce(device, program, end, frozen=frozen, takers=takers)
         while self._clock.monotonic() < end:
             if frozen and self._is_back(program):
@@ -154,9 +153,21 @@ class Guardian:
                 self._tell(device, f"{program.text} is back: its motor runs on.")
                 return
 
-    async def _stop(self, session: DriveSession, by: str) -> None:
+    async def _stop(self, devices: tuple[int, ...], by: str) -> None:
         """Carry a stop out that all programs have heard of."""
-        self._stopper.stop([session], by=by, given=True)
+        sessions = list(filter(None, map(self._known, devices)))
+        if sessions:
+            self._stopper.stop(sessions, by=by, given=True)
+        if unknown := set(devices) - {one.device for one in sessions}:
+            # left running by a program that armed it under another holder of the line
+            records = await asyncio.to_thread(self._starts.newest, label(self._line.link))
+            found = [await self._session(one) for d, one in records.items() if d in unknown]
+            if more := list(filter(None, found)):
+                self._stopper.stop(more, by=by, given=True)
+                sessions += more
+        await asyncio.gather(*(self._followed(one, by) for one in sessions))
+
+    async def _followed(self, session: DriveSession, by: str) -> None:
         while await self._ended_by_loss(session):
             self._stopper.stop([session], by=by, given=True)
 
