@@ -20,7 +20,7 @@ from .conftest import NO_ECHO, WIDE, OpenLine, Share
 from .peer import PtyPeer, Step, eventually, reply
 from .sharing import QUICK, OtherProgram, other_program
 
-LATE = 1.5
+LATE = 2.5
 """Seconds for which a reply may be late."""
 SLOW, OTHER = 77, 8
 
@@ -75,7 +75,7 @@ async def test_a_drive_that_proves_nothing_waits_until_no_reply_may_come(
     drive, limits = (slow, NO_ECHO) if why == "it has no echo" else (never_echoes, WIDE)
     with PtyPeer(drive) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
         killed = await killed_while_it_waits(owner, peer)
-        line = await asyncio.to_thread(next_program, share, peer, limits, 0.2)
+        line = await asyncio.to_thread(next_program, share, peer, limits, 0.8)
         assert (await line.read(1, OTHER)).words == (OTHER,)
         assert time.monotonic() - killed >= LATE
         assert functions(peer).count(8) <= 2
