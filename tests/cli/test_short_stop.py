@@ -444,3 +444,9 @@ def test_short_stop_imports_nothing_that_takes_long() -> None:
     )
     allowed = {"__future__", "tui", "tui.__main__", "tui.cli", "tui.cli.short_stop", "_socket"}
     assert set(done.stdout.split()) <= allowed | {"_sha2", "_sha256"}
+
+
+def test_short_stop_waits_for_no_pipe_in_the_place_of_a_lock(tmp_path: Path) -> None:
+    pipe = tmp_path / "line.lock"
+    os.mkfifo(pipe)
+    assert short_stop._content(str(pipe)) == ""

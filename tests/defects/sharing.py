@@ -361,8 +361,8 @@ DEFECTS = (
     Defect(
         "programs-gone-with-the-owner-not-missed",
         "tui/bus/share/server.py",
-        "if program.id not in here | self._gone_before:",
-        "if False:",
+        "                self._missing(program)\n",
+        "                pass\n",
         "A recorder feeds a motor whose program was killed together with the panel.",
         (f"{ENDS}::test_programs_that_went_with_the_owner_are_missed_by_the_next",),
     ),
@@ -401,7 +401,7 @@ DEFECTS = (
     Defect(
         "no-time-to-take-a-motor-over",
         "tui/session/sharing/guardian.py",
-        "if frozen or takers else begun",
+        "if takers else begun",
         "if frozen else begun",
         "A motor stops before the person beside it can take it over.",
         ("tests/session/test_guardian.py",),

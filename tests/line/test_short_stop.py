@@ -17,9 +17,9 @@ from tui.session.connect import keepers as connect_keepers
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec
 
-from .test_commands import bench
+from .test_commands import bench, turns
 from .test_keeper import times_of_good_values
-from .test_shared_programs import motor_run, records, stopped_by_commands
+from .test_shared_programs import motor_run, records, runs_a_motor, stopped_by_commands
 
 WITHOUT_IMPORTS = """
 import sys
@@ -120,3 +120,14 @@ def test_program_that_came_during_a_stop_goes_on_with_a_keeper() -> None:
             assert stopping.process.wait(PATIENCE) == 0
             wait_until(lambda: len(keepers()) == 1, "a keeper holds the line")
             assert times_of_good_values(recorder, 3.0)
+
+
+def test_stop_is_carried_out_by_a_keeper_whose_port_is_closed() -> None:
+    """It waits for the next program, and the motor was left running on purpose."""
+    with bench(DriveSpec("atv71", 1, sets={"SLL": 0})) as (simulation, line):
+        with served(runs_a_motor(line, "--leave-running"), ready="running forward") as runner:
+            wait_until(lambda: turns(simulation), "the motor turns")
+            runner.process.kill()
+        command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "-d", "1"]
+        subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")

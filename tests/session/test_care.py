@@ -143,3 +143,18 @@ async def test_the_motor_of_a_program_that_is_gone_is_stopped_by_its_own_profile
     bench.gone()
     await bench.stopped(1)
     assert not bench.says("Stop it at the machine")
+
+
+async def test_a_drive_that_nobody_has_armed_is_not_stopped_by_a_start_on_record(
+    bench: Bench,
+) -> None:
+    """Another family may have its address since: the word of the one could start the other."""
+    bench.started(1)
+    await come(lambda: bench.turns(1))
+    guardian = guard(bench)
+    loop = bench.line._engine._loop
+    assert loop is not None
+    loop.call_soon_threadsafe(bench.line.facts.holder.hear_stop_due, (1,), "drivepanel stop")
+    await come(lambda: guardian._workers != [])
+    await come(lambda: not guardian.busy)
+    assert bench.turns(1)

@@ -32,6 +32,8 @@ def stop_at_once(words: list[str]) -> None:
             line, devices = stop
             if address := holder_address(line):
                 _send(address, " ".join(map(str, devices)) or "all")
+    except KeyboardInterrupt:
+        os._exit(130)
     except Exception:
         # the command itself follows
         pass
@@ -235,8 +237,12 @@ def _digest(text: str) -> str:
 
 
 def _content(path: str) -> str:
-    with open(path, "rb") as file:
-        return file.read(_LONGEST_FILE).decode()
+    # never one that waits: a pipe of this name has no end
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        return os.read(file, _LONGEST_FILE).decode()
+    finally:
+        os.close(file)
 
 
 def _field(document: str, name: str) -> str:

@@ -18,6 +18,7 @@ from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER
 from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
 from tui.bus.share.keeping import KeeperOrder
+from tui.bus.share.sharing import KEEPER_STARTS
 from tui.session.connect.share_place import this_program
 from tui.session.journal import Journal
 from tui.session.logs import start_logging
@@ -101,6 +102,7 @@ def main() -> None:
     for name in IGNORED_SIGNALS:
         signal.signal(getattr(signal, name), signal.SIG_IGN)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process whose line's loop hangs
+    signal.setitimer(signal.ITIMER_REAL, KEEPER_STARTS)  # and one that never begins
     start_logging(0)
     keeper = Keeper(order, int(sys.argv[1]))
     for name in ENDING_SIGNALS:

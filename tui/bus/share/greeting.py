@@ -96,6 +96,7 @@ class Greeting:
         facts = self._inside.facts
         self._stopped(stop)
         facts.holder.hear_stop_due(stop.devices, stop.program.text)
+        self._holder.moved(arrived=False)  # its port may be closed
         # nobody of this name comes back: its stops count on without it
         facts.stops.fold({stop.program.id})
         writer.write(GIVEN)

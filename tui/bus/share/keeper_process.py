@@ -6,12 +6,11 @@ import os
 import select
 import signal
 import socket
-import struct
 from contextlib import suppress
 
 from ..program import KEEPER
 from .messages import VERSION
-from .place import Owner
+from .place import Owner, peer_of
 
 OTHER_USER = "It belongs to another user: end it as that user or as root (kill -9 {pid})."
 OTHER_CONTAINER = "It runs in another container: end it there."
@@ -33,7 +32,7 @@ class KeeperProcess:
         self.is_keeper = known and self._pid != os.getpid()
         self._remedy = BY_HAND
         if self.is_keeper and hasattr(os, "pidfd_open"):
-            if _pid_of(connection) == self._pid:
+            if (peer := peer_of(connection)) is not None and peer.pid == self._pid:
                 self._open(connection)
             else:
                 self._remedy = OTHER_CONTAINER
@@ -73,12 +72,3 @@ class KeeperProcess:
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
-
-
-def _pid_of(connection: socket.socket) -> int | None:
-    """The process at the other end; 0 for one in another PID namespace."""
-    try:
-        found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
-    except (AttributeError, OSError):
-        return None
-    return int(struct.unpack("3i", found)[0])

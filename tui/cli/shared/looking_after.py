@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,10 +15,16 @@ if TYPE_CHECKING:
     from tui.session.sharing.guardian import Guardian
 
 
-def guard_motors(opened: OpenLine, name: str = "") -> None:
+MOTORS_STOP_WITHIN = 60.0
+"""Seconds that a command waits at its end for motors of other programs to stop."""
+GUARD_LOOK_INTERVAL = 0.05
+
+
+def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     """From now on stop the motors of a program that is gone, as far as this one owns the line.
 
-    `name` is what the line is called where a command has several.
+    `name` is what the line is called where a command has several. Returns what waits until those
+    motors are stopped, before the line is closed.
     """
     line = opened.line
     guardians: list[Guardian] = []
@@ -38,8 +46,19 @@ def guard_motors(opened: OpenLine, name: str = "") -> None:
         begin()
         return line.facts.holder.hear_care(device, care)
 
-    waiting = (line.facts.on_gone(gone), line.facts.holder.on_care(armed))
+    def due(devices: tuple[int, ...], by: str) -> None:
+        begin()
+        line.facts.holder.hear_stop_due(devices, by)
+
+    def end() -> None:
+        limit = time.monotonic() + MOTORS_STOP_WITHIN
+        while any(one.busy for one in guardians) and time.monotonic() < limit:
+            time.sleep(GUARD_LOOK_INTERVAL)
+
+    holder = line.facts.holder
+    waiting = (line.facts.on_gone(gone), holder.on_care(armed), holder.on_stop_due(due))
     line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
+    return end
 
 
 def _timeout_of(opened: OpenLine, device: int) -> float | None:

@@ -183,7 +183,7 @@ def on_line(
         stack.callback(opened.close)
         if opened.line.facts.voice is not None and opened.line.facts.others:
             say(f"drivepanel: {opened.line.state.reason}", err=True)
-        guard_motors(opened)
+        stack.callback(guard_motors(opened))
         try:
             mind_the_line(opened)
             return asyncio.run(to_its_end([opened], lambda: work(opened)))

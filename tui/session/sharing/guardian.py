@@ -80,6 +80,8 @@ class Guardian:
         self._care = DrivesInCare(line, journal, session_of)
         self._lost: dict[int, float] = {}
         """By device, when its line was lost before a stop; it may have come and gone since."""
+        self._followed: set[int] = set()
+        """Devices whose due stop is seen to its end."""
         self._workers: list[LineWorker] = []
         self._changing = threading.Lock()
         facts = line.facts
@@ -154,22 +156,27 @@ class Guardian:
                 return
 
     async def _stop(self, devices: tuple[int, ...], by: str) -> None:
-        """Carry a stop out that all programs have heard of."""
+        """Carry a stop out that all programs have heard of.
+
+        Of drives that no program has armed here: a word by a start on record might start a drive
+        of another family that has its address now.
+        """
+        if unknown := [one for one in devices if self._known(one) is None]:
+            log.warning("drives %s are not stopped for %s: nobody has armed them", unknown, by)
         sessions = list(filter(None, map(self._known, devices)))
         if sessions:
             self._stopper.stop(sessions, by=by, given=True)
-        if unknown := set(devices) - {one.device for one in sessions}:
-            # left running by a program that armed it under another holder of the line
-            records = await asyncio.to_thread(self._starts.newest, label(self._line.link))
-            found = [await self._session(one) for d, one in records.items() if d in unknown]
-            if more := list(filter(None, found)):
-                self._stopper.stop(more, by=by, given=True)
-                sessions += more
-        await asyncio.gather(*(self._followed(one, by) for one in sessions))
+        new = [one for one in sessions if one.device not in self._followed]
+        self._followed |= {one.device for one in new}
+        await asyncio.gather(*(self._follow(one, by) for one in new))
 
-    async def _followed(self, session: DriveSession, by: str) -> None:
-        while await self._ended_by_loss(session):
-            self._stopper.stop([session], by=by, given=True)
+    async def _follow(self, session: DriveSession, by: str) -> None:
+        """See a stop to its end, also beyond a loss of the line."""
+        try:
+            while await self._ended_by_loss(session):
+                self._stopper.stop([session], by=by, given=True)
+        finally:
+            self._followed.discard(session.device)
 
     async def _ended_by_loss(self, session: DriveSession) -> bool:
         """Wait for the end of a stop; True if the line was lost, and is back.
