@@ -18,7 +18,7 @@ from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec
 
 from .test_commands import bench, turns
-from .test_keeper import times_of_good_values
+from .test_keeper import holders, times_of_good_values
 from .test_shared_programs import motor_run, records, runs_a_motor, stopped_by_commands
 
 WITHOUT_IMPORTS = """
@@ -128,6 +128,8 @@ def test_stop_is_carried_out_by_a_keeper_whose_port_is_closed() -> None:
         with served(runs_a_motor(line, "--leave-running"), ready="running forward") as runner:
             wait_until(lambda: turns(simulation), "the motor turns")
             runner.process.kill()
+        port = line.removeprefix("serial:").partition(",")[0]
+        wait_until(lambda: holders(port) == [], "the port is closed")
         command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "-d", "1"]
         subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
