@@ -24,6 +24,7 @@ from tests.programs import (
     PATIENCE,
     Served,
     drivepanel,
+    end_keepers,
     served,
     simulated,
     wait_until,
@@ -507,6 +508,7 @@ def test_3_a_motor_started_from_here_that_no_search_finds_is_a_failure() -> None
         left = ("--for", "1", "--leave-running")
         run = drivepanel("run", line, "-d", "31", "--reference", "20Hz", "--arm", *left)
         assert run.returncode == 0, run.stderr
+        end_keepers()  # which would stop it by itself, as it was armed there
         silence(simulation)
         done = drivepanel("stop", line, "--all")
         assert done.returncode == 3, done.stdout + done.stderr

@@ -162,7 +162,7 @@ def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
             assert '"RFR"' in recorder.process.stdout.readline()
         _, told = recorder.end()
         gone = f"run (pid {runner.process.pid}) is not on the line any more"
-        assert f"{gone}: its motor is stopped in " in told
+        assert f"{gone}: its motor is stopped." in told
         assert left_over() == []
 
 
@@ -177,7 +177,7 @@ def test_the_motor_of_a_frozen_program_is_taken_over_by_a_key(
         panel.press("a")
         wait_until(lambda: "ARMED" in panel.text().replace("NOT ARMED", ""), "it is armed")
         panel.press("T")
-        panel.wait_for("Taken over")
+        wait_until(lambda: "aken over" in panel.text(), "it is taken over")
         before = simulation.drive(1).raw("CMD")
         # it comes back to a drive that is another's, and its motor turns on
         runner.process.send_signal(signal.SIGCONT)
