@@ -30,8 +30,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from tui.__main__ import NO_KEEPER
 from tui.bus.share.place import has_ended, owner_of_lock
+from tui.bus.share.starting import NO_KEEPER
 
 PROGRAM = (sys.executable, "-m", "tui")
 DRIVES = ("atv71@1", "atv31@2", "atv312@3", "atv71@4", "atv31@5")

@@ -80,13 +80,15 @@ def tmp_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Home, configuration and state folders that belong to the test, and a log closed after it."""
+    """Folders of the test's own for home, configuration and state; no keeper; the log closed."""
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "config"))
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
     monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(tmp_path / "group"))
     monkeypatch.delenv("DRIVEPANEL_LINE", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "home").mkdir()
+    # lines of the test itself have none; programs that it starts have
+    monkeypatch.setattr("tui.bus.share.starting.can_start", lambda: False)
     monkeypatch.setenv("LC_ALL", "C.UTF-8")
     monkeypatch.setenv("TZ", "UTC")
     yield tmp_path

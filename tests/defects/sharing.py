@@ -85,7 +85,7 @@ DEFECTS = (
     ),
     Defect(
         "keeper-has-the-output-of-a-command",
-        "tui/keeper/starting.py",
+        "tui/bus/share/starting.py",
         "stdout=subprocess.DEVNULL",
         "stdout=None",
         "A shell waits for the output of a command until the keeper ends.",

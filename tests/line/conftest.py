@@ -13,7 +13,7 @@ import pytest
 
 from tests.conftest import need_peer
 from tests.programs import PATIENCE
-from tui.__main__ import NO_KEEPER
+from tui.bus.share.starting import NO_KEEPER
 
 from .pty_panel import PtyPanel, panel_on_a_pty
 from .terminal import Terminal
@@ -58,6 +58,12 @@ def holder(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
 def held_inside(monkeypatch: pytest.MonkeyPatch) -> None:
     """The program that opens a line first holds it, as where no keeper can be started."""
     monkeypatch.setenv(NO_KEEPER, "1")
+
+
+@pytest.fixture
+def with_keepers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines that the test itself opens have keepers, too."""
+    monkeypatch.setattr("tui.bus.share.starting.can_start", lambda: True)
 
 
 @pytest.fixture(scope="session")

@@ -15,8 +15,6 @@ import pytest
 from tests.programs import DRIVEPANEL, PATIENCE, Served, is_running, keepers, served, wait_until
 from tui.bus.share.keeper_share import ALARM_AFTER
 from tui.bus.share.owner_watch import HEARD_WITHIN, STOP_HEARD_WITHIN
-from tui.keeper.starting import start_keeper
-from tui.session.connect import keepers as connect_keepers
 from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
 
@@ -98,8 +96,8 @@ def test_a_program_that_was_frozen_itself_kills_no_keeper(programs: ExitStack) -
         assert keepers() == [pid]
 
 
-def test_a_keeper_that_is_well_is_kept_after_stops(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connect_keepers, "start", start_keeper)
+@pytest.mark.usefixtures("with_keepers")
+def test_a_keeper_that_is_well_is_kept_after_stops() -> None:
     with bench() as (_, line):
         opened = open_line(line, wait=PATIENCE, program="panel")
         try:

@@ -26,8 +26,7 @@ from tests.programs import (
     wait_until,
 )
 from tui.bus.share.keeper_share import LINGERS
-from tui.keeper.starting import start_keeper
-from tui.session.connect import keepers as connect_keepers
+from tui.bus.share.starting import can_start
 from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
 
@@ -261,8 +260,8 @@ def test_paths_from_the_folder_of_the_program_hold_for_its_keeper(
     end_keepers()
 
 
-def test_the_port_is_free_as_soon_as_a_line_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connect_keepers, "start", start_keeper)
+@pytest.mark.usefixtures("with_keepers")
+def test_the_port_is_free_as_soon_as_a_line_is_closed() -> None:
     with bench() as (_, line):
         for _ in range(5):
             opened = open_line(line, wait=PATIENCE, program="panel")
@@ -274,15 +273,43 @@ def test_the_port_is_free_as_soon_as_a_line_is_closed(monkeypatch: pytest.Monkey
             other.close()
 
 
+SCRIPT = """
+import sys
+from tui.session.api import open_drives
+
+with open_drives(sys.argv[1]) as line:
+    print(line.drive(profile="atv71").read("ETA")["ETA"].raw, flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_the_line_of_a_script_is_held_by_a_keeper(programs: ExitStack) -> None:
+    with bench() as (_, line):
+        script = [sys.executable, "-c", SCRIPT, line]
+        started = served(script, ready="\n", stdin=subprocess.PIPE)
+        script_process = programs.enter_context(started).process
+        assert holders(line.removeprefix("serial:").partition(",")[0]) == [keeper()]
+        # it is frozen, and nobody waits for it
+        script_process.send_signal(signal.SIGSTOP)
+        done = read(line)
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("executable", ["/usr/bin/qgis", "", None])
+def test_no_keeper_is_started_by_a_program_that_embeds_python(
+    monkeypatch: pytest.MonkeyPatch, executable: str | None
+) -> None:
+    assert can_start()
+    monkeypatch.setattr(sys, "executable", executable)
+    assert not can_start()
+
+
 DIES = """
 import os, signal, sys, time
 from tui.drive.profile import library
-from tui.keeper.starting import start_keeper
-from tui.session.connect import keepers
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 
-keepers.start = start_keeper
 opened = open_line(sys.argv[1], wait=20, program="run")
 drive = DriveSession(opened.line, 1, library.load("atv71"))
 drive.arming.arm()

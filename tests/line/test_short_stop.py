@@ -12,8 +12,6 @@ import pytest
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, keepers, served, wait_until
 from tui.bus.program import Program
 from tui.bus.shared_facts import SharedFacts
-from tui.keeper.starting import start_keeper
-from tui.session.connect import keepers as connect_keepers
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec
 
@@ -32,9 +30,8 @@ main()
 
 
 @pytest.fixture
-def panel(monkeypatch: pytest.MonkeyPatch) -> Iterator[OpenLine]:
+def panel(with_keepers: None) -> Iterator[OpenLine]:
     """A program that is attached to the keeper of a line."""
-    monkeypatch.setattr(connect_keepers, "start", start_keeper)
     with bench() as (_, line), closing(open_line(line, wait=PATIENCE, program="panel")) as opened:
         assert len(keepers()) == 1
         yield opened

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from time import monotonic, sleep
@@ -40,13 +39,6 @@ class KeeperOrder(msgspec.Struct, frozen=True):
         """The meeting place of the line."""
         folders = tuple(Path(one) for one in self.socket_folders)
         return SharePlace(self.key, Path(self.lock_folder), folders, self.group)
-
-
-KeeperStarter = Callable[[KeeperOrder, int, Callable[[int], None]], Callable[[], bool]]
-"""Starts a keeper that inherits the lock by its descriptor; returns whether it lives.
-
-Calls the third argument with its process id, before the keeper does anything. Raises OSError.
-"""
 
 
 MAKES_WAY_WITHIN = 1.0

@@ -15,7 +15,7 @@ from ..model import LineStatus
 from ..program import KEEPER, Program
 from ..schedule.inside import LineInside, Say, SharedLine
 from .client import OwnerAway, ShareClient
-from .keeping import KeeperOrder, KeeperStarter
+from .keeping import KeeperOrder
 from .messages import VERSION
 from .past_owner import PastOwner
 from .place import (
@@ -28,6 +28,7 @@ from .place import (
     owner_text,
 )
 from .server import ShareServer
+from .starting import start_keeper
 from .stops_past import StopsPast
 from .turn import Turn
 
@@ -53,11 +54,9 @@ class Sharing:
 
     keeps = False
 
-    def __init__(
-        self, place: SharePlace, inside: LineInside, start_keeper: KeeperStarter | None = None
-    ) -> None:
-        """`start_keeper` starts a process that owns the line; without, this program does."""
-        self._start_keeper = start_keeper
+    def __init__(self, place: SharePlace, inside: LineInside, *, keeper: bool = False) -> None:
+        """With `keeper` a process is started that owns the line; without, this program does."""
+        self._keeper = keeper
         self._keeper_lives: Callable[[], bool] = bool
         self._place = place
         self._inside = inside
@@ -126,7 +125,7 @@ class Sharing:
         """Start the line's keeper, which has the lock from then on; False where it cannot be."""
         now = self._inside.clock()
         self._keeper_lives = bool
-        if self._start_keeper is None or len(self._lock.deaths) >= MOST_DEATHS:
+        if not self._keeper or len(self._lock.deaths) >= MOST_DEATHS:
             return False
         facts, place = self._inside.facts, self._place
         self._learn_of_before()
@@ -139,7 +138,7 @@ class Sharing:
             self._lock.tell(Owner(VERSION, keeper, "", self._quiet_until, stopped))
 
         try:
-            self._keeper_lives = self._start_keeper(order, self._lock.descriptor, started)
+            self._keeper_lives = start_keeper(order, self._lock.descriptor, started)
         except OSError as error:
             log.error("the keeper of the line could not be started: %s", error)
             return False

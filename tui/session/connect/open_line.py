@@ -94,8 +94,8 @@ def open_line(
     from tui.bus.line import Line
     from tui.bus.link import absolute, parse_link
     from tui.bus.share.sharing import Sharing
+    from tui.bus.share.starting import can_start
 
-    from . import keepers
     from .share_place import share_place, this_program
 
     link = absolute(parse_link(text, usual))
@@ -105,7 +105,7 @@ def open_line(
         read_only=read_only,
         place=place,
         program=this_program(program),
-        share=partial(Sharing, start_keeper=keepers.start if keeper else None),
+        share=partial(Sharing, keeper=keeper and can_start()),
         gated=True,
     )
 

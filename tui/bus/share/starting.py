@@ -10,17 +10,24 @@ from pathlib import Path
 
 import msgspec
 
-import tui
-from tui.bus.share.keeping import KeeperOrder
+from .keeping import KeeperOrder
 
 MODULE = "tui.keeper"
-
+"""Started by its name: it stands above the bus, which does not import it."""
+NO_KEEPER = "DRIVEPANEL_NO_KEEPER"
+"""Set by tests: a program that opens a line first holds it itself, as where no process can."""
 
 PATHS = ("DRIVEPANEL_STATE", "DRIVEPANEL_CONFIG", "DRIVEPANEL_SHARE_FOLDER", "XDG_RUNTIME_DIR")
 """Environment variables that may hold a path which counts from the folder of this program."""
 
 _STARTED: list[subprocess.Popen[bytes]] = []
 """Keepers that were started here and may live; one that has ended is let go with the next."""
+
+
+def can_start() -> bool:
+    """True if this program can start a process of Python; one that embeds Python cannot."""
+    python = os.path.basename(sys.executable or "").startswith(("python", "pypy"))
+    return os.name == "posix" and python and not os.environ.get(NO_KEEPER)
 
 
 def start_keeper(
@@ -61,7 +68,7 @@ def _environment() -> dict[str, str]:
     for name in PATHS:
         if environment.get(name):
             environment[name] = os.path.abspath(environment[name])
-    root = str(Path(tui.__file__).parent.parent)
+    root = str(Path(__file__).parents[3])
     others = environment.get("PYTHONPATH", "")
     if "site-packages" not in root and "dist-packages" not in root:
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, (others, root)))
