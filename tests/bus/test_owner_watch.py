@@ -10,19 +10,20 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from tui.bus.model import Priority
 from tui.bus.program import KEEPER, Program
-from tui.bus.share.keeper_process import OTHER_CONTAINER, OTHER_USER, STAYS, KeeperProcess
-from tui.bus.share.messages import VERSION, Alive, Asking, RollCall, StopGiven
+from tui.bus.share.keeper_process import BY_HAND, OTHER_CONTAINER, OTHER_USER, STAYS, KeeperProcess
+from tui.bus.share.messages import VERSION, Alive, Asking, StopGiven, Told
 from tui.bus.share.owner_watch import (
     DIES_WITHIN,
     HEARD_WITHIN,
+    SILENT_OWNER,
     STOP_HEARD_WITHIN,
+    TAKEN_IN_WITHIN,
     WATCH_INTERVAL,
     OwnerWatch,
     is_stop,
@@ -45,7 +46,6 @@ class MadeUpProcess:
     remedy = "End it."
 
     def __init__(self, *, may: bool = True) -> None:
-        self.is_keeper = True
         self.may = may
         self.kills: list[float] = []
 
@@ -60,13 +60,8 @@ class Bench:
     def __init__(self) -> None:
         self.now = 100.0
         self.process = MadeUpProcess()
-        self.stays: list[str] = []
-        inside: Any = SimpleNamespace(clock=lambda: self.now)
-        past: Any = SimpleNamespace(
-            at_work=False, begin=lambda: None, owner_stays=self.stays.append
-        )
         owner = Owner(VERSION, Program("k", KEEPER, 1), "socket")
-        self.watch = OwnerWatch(inside, owner, past)
+        self.watch = OwnerWatch(lambda: self.now, owner)
         self.watch._process = self.process  # type: ignore[assignment]
 
     def wait(self, seconds: float, *, awake: bool = True, attached: bool = True) -> None:
@@ -96,7 +91,7 @@ def test_a_keeper_that_does_not_acknowledge_a_stop_is_killed_after_a_second(benc
 def test_news_do_not_acknowledge_a_stop(bench: Bench) -> None:
     bench.watch.note_stop()
     bench.watch.note_stop()
-    for message in (RollCall(1), Alive(), RollCall(2)):
+    for message in (Told(1, "a"), Alive(), Told(1, "b")):
         bench.wait(STOP_HEARD_WITHIN / 4)
         bench.watch.hear(message)
     bench.wait(STOP_HEARD_WITHIN / 4)
@@ -117,13 +112,25 @@ def test_a_keeper_that_acknowledges_its_stops_is_let_live(bench: Bench) -> None:
 def test_a_keeper_that_says_nothing_is_killed_after_three_seconds(
     bench: Bench, attached: bool
 ) -> None:
-    if not attached:
-        bench.watch.note_stop()  # before it is taken in, nothing is acknowledged
-    bench.wait(HEARD_WITHIN - 0.01, attached=attached)
+    bench.wait(SILENT_OWNER - 0.01, attached=attached)
+    assert not bench.watch.frozen
+    bench.wait(HEARD_WITHIN - SILENT_OWNER, attached=attached)
+    assert bench.watch.frozen
     assert not bench.process.kills
     bench.wait(0.02, attached=attached)
     assert len(bench.process.kills) == 1
-    assert bench.stays == []
+    assert bench.watch.remedy == ""
+
+
+def test_stop_to_a_keeper_that_answers_no_greeting_kills_it_after_two_seconds(
+    bench: Bench,
+) -> None:
+    """It may be at work for a second to make way; stops are acknowledged after that only."""
+    bench.watch.note_stop()
+    bench.wait(TAKEN_IN_WITHIN + STOP_HEARD_WITHIN - 0.01, attached=False)
+    assert not bench.process.kills
+    bench.wait(0.02, attached=False)
+    assert len(bench.process.kills) == 1
 
 
 def test_a_program_that_stood_still_itself_kills_nothing(bench: Bench) -> None:
@@ -138,25 +145,22 @@ def test_a_keeper_that_does_not_die_is_reported(bench: Bench) -> None:
     bench.wait(HEARD_WITHIN + 0.1)
     assert len(bench.process.kills) == 1
     bench.wait(DIES_WITHIN - 0.2)
-    assert bench.stays == []
+    assert bench.watch.remedy == ""
     bench.wait(0.5)
-    assert bench.stays[-1] == "End it."
+    assert bench.watch.remedy == "End it."
     assert len(bench.process.kills) == 1
+    bench.watch.hear(Alive())
+    assert (bench.watch.frozen, bench.watch.remedy) == (False, "")
 
 
 def test_a_keeper_that_cannot_be_killed_is_reported_immediately(bench: Bench) -> None:
     bench.process.may = False
-    bench.wait(HEARD_WITHIN + 0.1)
-    assert bench.stays[-1] == "End it."
-    assert len(bench.process.kills) == 1
-
-
-def test_a_program_that_holds_the_line_itself_is_not_killed(bench: Bench) -> None:
-    bench.process.is_keeper = False
     bench.watch.note_stop()
-    bench.wait(60.0)
-    assert not bench.process.kills
-    assert bench.stays == []
+    bench.wait(STOP_HEARD_WITHIN + 0.1)
+    assert bench.watch.remedy == "End it."
+    assert bench.watch.frozen
+    bench.wait(HEARD_WITHIN)
+    assert len(bench.process.kills) == 1
 
 
 def test_stops_are_what_a_keeper_acknowledges() -> None:
@@ -212,7 +216,7 @@ def test_nothing_but_a_known_keeper_at_the_other_end_is_killed(listener: Any) ->
     for one in (owner(process.pid, name="panel"), owner(process.pid, version=VERSION + 1)):
         found = KeeperProcess(one, connection)
         assert not found.kill()
-        assert not found.is_keeper
+        assert found.remedy == BY_HAND.format(pid=process.pid)
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
         found = KeeperProcess(owner(other.pid), connection)
         assert not found.kill()

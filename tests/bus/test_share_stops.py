@@ -7,22 +7,21 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import pytest
 
-from tui.bus.api import Priority
-from tui.bus.errors import LineError, LineLost, RequestRefused
+from tui.bus.api import LineStatus, Priority
+from tui.bus.errors import LineError, LineLost, NoAnswer, RequestRefused
 from tui.bus.line import Line
-from tui.bus.program import Program
-from tui.bus.share.messages import StopGiven
+from tui.bus.program import KEEPER
+from tui.bus.share.keeper_process import OTHER_CONTAINER
+from tui.bus.share.owner_watch import HEARD_WITHIN
 from tui.bus.share.place import owner_of
-from tui.bus.share.stops_past import StopsPast
 from tui.bus.stop_counts import STOPS_KEPT, StopCounts
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
-from .sharing import QUICK, SharedLines, frozen, place_in
+from .sharing import QUICK, frozen, in_loop, place_in
 
 STOP, RUN = 0, 15
 
@@ -36,6 +35,15 @@ def written(peer: PtyPeer) -> list[tuple[int, int]]:
     return [(one[0], one[5]) for one in peer.requests if one[1] == 6]
 
 
+NOT_ENDED = r"does not answer\. End that program \(kill -9 \d+\)"
+
+
+async def send_stop(line: Line, device: int) -> float:
+    """A stop key on a line whose owner may be frozen: without a look."""
+    line.facts.give_stop([device], "the stop key")
+    return await line.write(device, 1, [STOP], priority=Priority.STOP)
+
+
 def stop(line: Line, *devices: int) -> list[asyncio.Task[float]]:
     """What a stop key does: nothing that was meant before goes out, and the stop goes first."""
     line.facts.give_stop(devices, "the stop key")
@@ -45,11 +53,6 @@ def stop(line: Line, *devices: int) -> list[asyncio.Task[float]]:
 async def look_and_stop(line: Line, device: int) -> float:
     await line.read(device, 3, priority=Priority.STOP)
     return await line.write(device, 1, [STOP], priority=Priority.STOP)
-
-
-def notes(lines: SharedLines) -> list[Path]:
-    """The notes of stops that went past an owner."""
-    return sorted(place_in(lines.folder).lock_folder.glob("*.stop*"))
 
 
 def all_know(programs: Sequence[Line], stops: int) -> bool:
@@ -177,7 +180,7 @@ def test_counts_only_go_up_and_one_telling_counts_once() -> None:
 # An owner that is frozen
 
 
-async def test_a_stop_goes_past_a_frozen_owner_and_nothing_of_before_goes_out_after_it(
+async def test_a_stop_waits_for_a_frozen_owner_and_nothing_of_before_goes_out_after_it(
     share: Share,
 ) -> None:
     """The owner goes on with commands in its queue, and in its sockets, that a stop has voided."""
@@ -186,63 +189,106 @@ async def test_a_stop_goes_past_a_frozen_owner_and_nothing_of_before_goes_out_af
         owner, other, third = (lines.open(name) for name in ("run", "stop", "remote"))
         await owner.read(1, 1)
         with frozen(owner):
-            # by the owner itself, by one that does not know of the stop, and for another drive
+            # by the owner itself, and by one that does not know of the stop
             runs = [
                 asyncio.create_task(owner.write(1, 1, [RUN])),
                 asyncio.create_task(third.write(1, 1, [RUN])),
             ]
             await asyncio.sleep(0.05)
-            await asyncio.wait_for(asyncio.gather(*stop(other, 1)), 10)
-            assert written(peer) == [(1, STOP)]
-            assert "does not answer. Stops go out past it" in other.state.reason
+            begun = time.monotonic()
+            with pytest.raises(LineLost, match=NOT_ENDED):
+                await send_stop(other, 1)
+            # before the other requests fail: a person must know
+            assert time.monotonic() - begun < HEARD_WITHIN
+            assert "owns the line and does not answer. End that program" in other.state.reason
+            assert other.state.status is LineStatus.LOST
+            assert written(peer) == []
         for run in runs:
             assert "Not sent" in await refused(run)
-        eventually(lambda: owner.facts.stops.stamp(1) == 1)
+        # it goes out by itself, once
+        eventually(lambda: written(peer) == [(1, STOP)])
         await owner.write(2, 1, [RUN])
-        # the stop once more: a frame may have been on its way as the owner froze
-        assert written(peer) == [(1, STOP), (1, STOP), (2, RUN)]
-        assert notes(lines) == []
+        assert written(peer) == [(1, STOP), (2, RUN)]
+        eventually(lambda: other.state.status is LineStatus.CONNECTED)
 
 
-async def test_the_owner_finds_a_stop_of_a_program_that_is_gone_again(share: Share) -> None:
+async def test_a_stop_that_a_frozen_owner_has_kept_is_sent_by_the_next(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("run"), lines.open("stop")
+        await owner.read(1, 1)
+        with frozen(owner):
+            with pytest.raises(LineLost, match=NOT_ENDED):
+                await send_stop(other, 1)
+            # each key press is one more, and fails at once
+            with pytest.raises(LineLost, match=NOT_ENDED):
+                await send_stop(other, 2)
+            server = owner._engine._shared._server  # type: ignore[union-attr]
+            in_loop(owner, lambda: [one.writer.transport.abort() for one in server._all()])
+            closing = asyncio.create_task(asyncio.to_thread(owner.close))
+        await closing
+        await asyncio.to_thread(eventually, lambda: len(written(peer)) == 2)
+        assert sorted(written(peer)) == [(1, STOP), (2, STOP)]
+
+
+async def test_the_look_before_a_stop_fails_so_that_the_stop_is_given(share: Share) -> None:
+    """A stop word that waits is worth more than a look that fails: it is sent by the next owner."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("run"), lines.open("stop")
+        await owner.read(1, 1)
+        with frozen(owner):
+            other.facts.give_stop([1], "the stop key")
+            with pytest.raises(NoAnswer, match=NOT_ENDED):
+                await other.read(1, 3, priority=Priority.STOP)
+        assert (await other.read(1, 4)).words == (4,)
+        assert [one[3] for one in peer.requests if one[1] == 3 and one[3] != 1] == [4]
+
+
+async def test_the_owner_hears_a_stop_of_a_program_that_is_gone_again(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("run")
         await owner.read(1, 1)
         with frozen(owner):
-            run = asyncio.create_task(owner.write(1, 1, [RUN]))
             late = lines.open("stop", wait=None)
-            eventually(lambda: "does not answer" in late.state.reason)
-            await asyncio.gather(*stop(late, 1))
+            await asyncio.to_thread(eventually, lambda: "does not answer" in late.state.reason)
+            run = asyncio.create_task(owner.write(1, 1, [RUN]))
+            await asyncio.sleep(0.02)
+            with pytest.raises(LineLost, match=NOT_ENDED):
+                await send_stop(late, 1)
             late.close()
         assert "Not sent" in await refused(run)
+        eventually(lambda: written(peer) == [(1, STOP)])
         await owner.write(1, 1, [RUN])
         assert written(peer) == [(1, STOP), (1, RUN)]
 
 
-async def test_the_note_of_a_stop_is_enough(share: Share) -> None:
-    """Also where nothing comes through a socket any more."""
+async def test_a_keeper_in_another_container_is_named_with_what_to_do(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
-        owner = lines.open("run")
+        # this process is not the one that the lock file names, as in a container
+        keeper, other = lines.open(KEEPER, pid=4711), lines.open("panel")
+        await other.read(1, 1)
+        with frozen(keeper), pytest.raises(LineLost, match=OTHER_CONTAINER):
+            await send_stop(other, 1)
+
+
+async def test_what_waits_for_a_frozen_owner_for_long_is_reported_and_never_sent(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("run"), lines.open("remote")
         await owner.read(1, 1)
-        gone = Program("gone", "stop", 0)
         with frozen(owner):
-            run = asyncio.create_task(owner.write(1, 1, [RUN]))
-            await asyncio.sleep(1.0)
-            past = StopsPast(place_in(lines.folder))
-            past.note(StopGiven((1,), (1,), "the stop key", gone))
-            # one that cannot be read keeps the others from nothing
-            (note,) = notes(lines)
-            note.with_name(f"{place_in(lines.folder).name}-0.stop").write_bytes(b"\xc1" * 99)
-        assert "a stop came after it (the stop key, stop" in await refused(run)
-        assert notes(lines) == []
-        await owner.write(1, 1, [RUN])
-        # the next owner finds what was left for one that was killed
-        owner.close()
-        past.note(StopGiven((1,), (2,), "the stop key", gone))
-        late = lines.open("late")
-        assert late.facts.stops.stamp(1) == 2
+            reading = asyncio.create_task(other.read(1, 5))
+            with pytest.raises(LineLost, match=NOT_ENDED):
+                await other.write(1, 1, [RUN])
+            with pytest.raises(LineLost, match=NOT_ENDED):
+                await reading
+        await other.read(1, 2)
+        assert written(peer) == []
 
 
 async def test_a_command_that_waited_for_a_frozen_owner_is_too_old_to_be_sent(
@@ -274,61 +320,6 @@ async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share
         await other.read(1, 1)
         await asyncio.sleep(0.15)
         assert [one for one in said if "does not answer" in one] == []
-
-
-async def test_what_waits_for_a_frozen_owner_too_long_is_told_so_and_never_sent(
-    share: Share, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tui.bus.share.client.WAITED_ENOUGH", 0.3)
-    with PtyPeer(honest) as peer:
-        lines = share(peer.path)
-        owner, other = lines.open("run"), lines.open("remote")
-        await owner.read(1, 1)
-        with frozen(owner), pytest.raises(LineLost, match="does not answer"):
-            await other.write(1, 1, [RUN])
-        await other.read(1, 2)
-        assert written(peer) == []
-
-
-async def test_stops_and_the_reads_of_a_stopped_drive_pass_a_frozen_owner_polls_do_not(
-    share: Share,
-) -> None:
-    with PtyPeer(honest) as peer:
-        lines = share(peer.path)
-        owner, other = lines.open("run"), lines.open("stop")
-        await owner.read(1, 1)
-        with frozen(owner):
-            waits = asyncio.create_task(other.read(1, 5))
-            await asyncio.gather(*stop(other, 1))
-            look = await other.read(1, 6, priority=Priority.OPERATOR_READ)
-            assert look.words == (6,)
-            assert not waits.done()
-        assert (await waits).words == (5,)
-
-
-async def test_two_that_stop_past_a_frozen_owner_take_turns(share: Share) -> None:
-    """Both would have the port open, and each hear a part of the answers."""
-
-    def takes_a_while(request: bytes, _count: int) -> Sequence[Step]:
-        return [0.02, reply(request)]
-
-    with PtyPeer(takes_a_while) as peer:
-        lines = share(peer.path)
-        owner = lines.open("run")
-        stoppers = [lines.open(name) for name in ("stop", "panel", "remote")]
-        await owner.read(1, 1)
-        with frozen(owner):
-            stops = [task for number, one in enumerate(stoppers, 1) for task in stop(one, number)]
-            await asyncio.gather(*stops)
-            looks = [
-                one.read(number, 40 + number + turn, priority=Priority.OPERATOR_READ)
-                for turn in range(5)
-                for number, one in enumerate(stoppers, 1)
-            ]
-            answers = [answer.words for answer in await asyncio.gather(*looks)]
-            assert answers == [(40 + number + turn,) for turn in range(5) for number in (1, 2, 3)]
-            assert sorted(written(peer)) == [(1, STOP), (2, STOP), (3, STOP)]
-        assert [len(one) for one in peer.bursts] == [8] * len(peer.requests)
 
 
 async def test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from .defect import Defect
 
 STOPS = "tests/bus/test_share_stops.py"
-GATEWAYS = "tests/bus/test_share_gateways.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
 LEASES = "tests/bus/test_leases.py"
@@ -148,20 +147,52 @@ DEFECTS = (
         ("tests/line/test_keeper.py::test_a_port_that_is_not_there_is_reported_at_once",),
     ),
     Defect(
-        "no-way-past-not-told",
-        "tui/bus/share/direct.py",
-        "if now - self._failing_since > GIVEN_UP:",
-        "if False:",
-        "A stop past a frozen owner waits for ever on a gateway that takes one connection.",
-        (GATEWAYS,),
+        "stop-waits-without-a-word",
+        "tui/bus/share/client.py",
+        "            self._asked.fail_all(told)\n",
+        "            pass\n",
+        "A stop waits for a frozen program for ever, and nobody is told that the motor runs.",
+        (STOPS,),
     ),
     Defect(
-        "silent-gateway-not-told",
-        "tui/bus/share/direct.py",
-        "elif isinstance(error, NoAnswer) and not isinstance(self._inside.link, SerialLink):",
-        "elif False:",
-        "A drive is called silent whose gateway serves nobody but a frozen program.",
-        (f"{GATEWAYS}::test_a_gateway_with_one_connection_is_told_of_with_what_to_do",),
+        "stop-that-failed-is-dropped",
+        "tui/bus/share/asked.py",
+        "                    self._asked[number] = _without_asker(job)\n",
+        "                    self._withdraw(number)\n",
+        "The keeper hangs, is ended by hand, and the next one does not send the stop.",
+        (STOPS,),
+    ),
+    Defect(
+        "look-fails-and-stop-with-it",
+        "tui/bus/share/asked.py",
+        "            if stops:\n",
+        "            if False:\n",
+        "A stop is not even handed over, as the look before it has failed.",
+        (f"{STOPS}::test_the_look_before_a_stop_fails_so_that_the_stop_is_given",),
+    ),
+    Defect(
+        "keeper-that-stays-not-reported",
+        "tui/bus/share/owner_watch.py",
+        "        if not dies or now - self._killed > DIES_WITHIN:\n",
+        "        if False:\n",
+        "A keeper in another container hangs, and a stop waits for it without a word.",
+        (WATCH, STOPS),
+    ),
+    Defect(
+        "newcomer-waits-for-a-frozen-keeper",
+        "tui/bus/share/owner_watch.py",
+        "            sent = max(sent, self._begun + TAKEN_IN_WITHIN)\n",
+        "            sent = now\n",
+        "`stop` waits for a frozen keeper for two seconds more than a panel does.",
+        (WATCH,),
+    ),
+    Defect(
+        "thawed-owner-sends-on",
+        "tui/bus/share/signs.py",
+        "lambda: self._stood > SENDS_WITHIN",
+        "lambda: False",
+        "A frozen panel goes on with a run command from before a stop.",
+        (STOPS,),
     ),
     Defect(
         "frozen-client-kept",
@@ -221,22 +252,6 @@ DEFECTS = (
         "        )  # fmt: skip",
         "A motor that a panel took over runs on when that panel is killed.",
         ("tests/session/test_starts.py",),
-    ),
-    Defect(
-        "thawed-owner-sends-on",
-        "tui/bus/share/lease.py",
-        "return self.stood > LEASE",
-        "return False",
-        "A frozen panel goes on with a run command from before a stop that went past it.",
-        (STOPS,),
-    ),
-    Defect(
-        "stops-past-not-read",
-        "tui/bus/share/signs.py",
-        "for stop in self._stops_past.take():",
-        "for stop in ():",
-        "The owner hears nothing of the stop of a command that has ended since.",
-        (f"{STOPS}::test_the_note_of_a_stop_is_enough",),
     ),
     Defect(
         "late-command-sent",
@@ -429,14 +444,6 @@ DEFECTS = (
         "pass",
         "Work on a drive goes on although another program has stopped it.",
         ("tests/session/test_handover.py",),
-    ),
-    Defect(
-        "stops-past-without-turns",
-        "tui/bus/share/turn.py",
-        "await self._lock(descriptor)",
-        "pass",
-        "Of two that stop past a frozen owner one takes the answer of the other for its own.",
-        (f"{STOPS}::test_two_that_stop_past_a_frozen_owner_take_turns",),
     ),
     Defect(
         "answer-of-before-a-standstill",

@@ -187,14 +187,20 @@ def test_the_motor_stops_when_its_program_dies_with_the_keeper(programs: ExitSta
         assert "is gone: its motor is stopped" in said
 
 
-def test_a_stop_goes_past_a_frozen_keeper(programs: ExitStack) -> None:
-    with motor_run(programs, "watch") as (simulation, line, _, _):
+@pytest.mark.parametrize("others_live", [True, False])
+def test_stop_on_a_line_whose_keeper_is_frozen_is_sent_by_the_next(
+    programs: ExitStack, others_live: bool
+) -> None:
+    with motor_run(programs, "watch") as (simulation, line, runner, recorder):
         frozen = keeper()
         os.kill(frozen, signal.SIGSTOP)
+        if not others_live:
+            runner.process.send_signal(signal.SIGSTOP)
+            recorder.process.send_signal(signal.SIGSTOP)
         done = drivepanel("stop", line, "-d", "1", "-p", "atv71")
         assert done.returncode == 0, done.stderr
         assert stopped_by_commands(simulation)
-        wait_until(lambda: not is_running(frozen), "another program ends it")
+        assert not is_running(frozen)
 
 
 def test_after_three_deaths_the_programs_hold_the_line_themselves(programs: ExitStack) -> None:

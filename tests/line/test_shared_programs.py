@@ -104,26 +104,34 @@ def test_a_motor_that_is_meant_to_be_left_running_runs_on(programs: ExitStack, f
         assert recorder.process.poll() is None
 
 
-@pytest.mark.usefixtures("holder")
-@pytest.mark.parametrize("named", [("-p", "atv71"), (), ("--all", "--addresses", "1")])
-def test_a_stop_goes_past_a_frozen_owner_and_lasts(
+NAMED = pytest.mark.parametrize(
+    "named", [("-d", "1", "-p", "atv71"), ("-d", "1"), ("--all", "--addresses", "1")]
+)
+
+
+@NAMED
+def test_a_stop_of_the_motor_of_a_frozen_program_lasts(
     programs: ExitStack, named: tuple[str, ...]
 ) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, _):
         runner.process.send_signal(signal.SIGSTOP)
-        target = named if "--all" in named else ("-d", "1", *named)
-        done = drivepanel("stop", line, *target)
+        done = drivepanel("stop", line, *named)
         assert done.returncode == 0, done.stderr
         assert stopped_by_commands(simulation)
         before = simulation.drive(1).raw("CMD")
-        runner.process.send_signal(signal.SIGCONT)
-        said, _ = runner.process.communicate(timeout=PATIENCE)
-        # it hears of the stop on its return, or how many there were if it was taken for gone
-        by = ("drivepanel stop, stop", "a stop while this program stood still")
-        assert any(f"was stopped by {one}" in said for one in by)
-        assert runner.process.returncode == 6
-        assert stopped_by_commands(simulation)
+        goes_on_stopped(simulation, runner)
         assert simulation.drive(1).raw("CMD") == before
+
+
+def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
+    """A frozen `run` goes on, hears that its motor was stopped, and sends it nothing but stops."""
+    runner.process.send_signal(signal.SIGCONT)
+    said, _ = runner.process.communicate(timeout=PATIENCE)
+    # it hears of the stop on its return, or how many there were if it was taken for gone
+    by = ("drivepanel stop, stop", "a stop while this program stood still")
+    assert any(f"was stopped by {one}" in said for one in by)
+    assert runner.process.returncode == 6
+    assert stopped_by_commands(simulation)
 
 
 @pytest.mark.parametrize("count", [2**32 - 1, 2**63 - 1, 2**64 - 1])
@@ -223,30 +231,27 @@ def one_connection(target: tuple[str, int], others: str) -> Iterator[str]:
 
 
 @pytest.mark.usefixtures("held_inside")
-@pytest.mark.parametrize("others", ["wait", "hung up"])
-@pytest.mark.parametrize(
-    "named", [("-d", "1", "-p", "atv71"), ("-d", "1"), ("--all", "--addresses", "1")]
-)
-def test_where_no_stop_gets_past_a_frozen_owner_it_is_told_what_to_do(
-    programs: ExitStack, others: str, named: tuple[str, ...]
+@NAMED
+@pytest.mark.parametrize("number", [signal.SIGCONT, signal.SIGKILL])
+def test_a_stop_that_a_frozen_owner_holds_up_is_reported_and_carried_out(
+    programs: ExitStack, named: tuple[str, ...], number: signal.Signals
 ) -> None:
-    drive = DriveSpec("atv71", 1, sets={"TTO": 300})
-    with Simulation([drive]) as simulation, one_connection(simulation.serve_tcp(), others) as line:
-        runner = programs.enter_context(served(runs_a_motor(line), ready="running forward"))
-        recorder = programs.enter_context(served(records(line), ready="{"))
-        wait_until(lambda: turns(simulation), "the motor turns")
+    with motor_run(programs, "run") as (simulation, line, runner, recorder):
         pid = runner.process.pid
         runner.process.send_signal(signal.SIGSTOP)
         done = drivepanel("stop", line, *named)
         assert done.returncode == 3, done.stderr
-        not_stopped = "NOT STOPPED" if "-d" in named or others == "hung up" else "no answer at 1"
-        for words in (not_stopped, f"No stop gets past run (pid {pid})", f"kill -9 {pid}"):
-            assert words in done.stderr
-        assert "A gateway that takes one connection only is held by it" in done.stderr
-        # what was told to do helps; a stop that lay in the gateway may come first
-        runner.process.kill()
-        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
-        wait_until(lambda: on_record() == [], "the recorder has looked after it")
+        assert "NOT STOPPED" in done.stderr
+        what = (
+            f"run (pid {pid}) owns the line and does not answer. End that program (kill -9 {pid})"
+        )
+        assert what in done.stderr
+        if number is signal.SIGCONT:
+            goes_on_stopped(simulation, runner)
+        else:
+            runner.process.kill()
+            wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+            wait_until(lambda: on_record() == [], "the recorder has looked after it")
         recorder.end()
         assert left_over() == []
 

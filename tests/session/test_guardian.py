@@ -16,7 +16,7 @@ from tests.bus.peer import eventually
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink, label
 from tui.bus.program import Program
-from tui.bus.share.lease import SILENT_CLIENT
+from tui.bus.share.attached import SILENT_CLIENT
 from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession

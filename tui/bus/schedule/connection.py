@@ -80,15 +80,13 @@ async def open_master(
     link: Link,
     around: LineContext,
     wake: Callable[[], None],
-    *,
-    alone: bool = True,
-    opened: Callable[[str], None] = lambda _: None,
+    opened: Callable[[str], None],
 ) -> Master:
     """Open a line for requests; `opened` is told of it, with what is to be said of the port.
 
     Raises the line's errors.
     """
-    transport = await open_transport(link, around, alone=alone)
+    transport = await open_transport(link, around)
     wire_time = isinstance(link, SerialLink) and not is_pseudo_terminal(link.path)
     opened(transport.note)
     if isinstance(link, TcpLink):
@@ -161,7 +159,7 @@ class Connection:
         if self._shared is not None:
             await self._shared.own(self._say_of_owner)
         master = await open_master(
-            self._link, self._around, self._dispatcher.wake, opened=self._say_opened
+            self._link, self._around, self._dispatcher.wake, self._say_opened
         )
         try:
             self.refusal = None

@@ -51,8 +51,6 @@ class Dispatcher:
         """Whether nothing but stops may go out now: others may have sent stops meanwhile."""
         self.last_way: LastWay | None = None
         """Where stops wait that go around the queue."""
-        self.left = False
-        """Whether no further request is served past the owner."""
 
     def wake(self) -> None:
         """Something changed: a request came, a late reply came, or the line was lost."""
@@ -75,7 +73,9 @@ class Dispatcher:
 
     async def all_waiting(self) -> list[Job]:
         """Take out all that waits, once something does."""
-        await self.some_wait()
+        while not len(self._queue):
+            self._wake.clear()
+            await self._wake.wait()
         return self.take_all()
 
     def take_all(self) -> list[Job]:
@@ -101,32 +101,10 @@ class Dispatcher:
                 self._queue.remove(job)
                 job.fail(RequestRefused(why))
 
-    def leave(self) -> None:
-        """Serve no further request past the owner; the one in flight comes to its end."""
-        self.left = True
-        self._wake.set()
-
     def stray(self, piece: Piece, time: float) -> None:
         """A whole frame came that nobody waited for; it may be what others were held back for."""
         self._devices.stray(piece, time)
         self._wake.set()
-
-    async def some_wait(self) -> None:
-        """Return once something waits, or the line is left."""
-        while not len(self._queue) and not self.left:
-            self._wake.clear()
-            await self._wake.wait()
-
-    async def serve_some(self, master: Master) -> float:
-        """Send what may go out now; returns after how many seconds more may. Raises LineLost."""
-        while not self.left and len(self._queue):
-            await master.quiet()
-            now = self._clock()
-            job, ready = self._queue.take(self._not_before, now)
-            if job is None:
-                return 0.0 if ready is None else max(0.0, ready - now)
-            await self._run(master, job)
-        return 0.0
 
     async def serve(self, master: Master) -> None:
         """Send requests until the line is lost. Raises LineLost."""

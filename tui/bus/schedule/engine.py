@@ -125,19 +125,19 @@ class Engine:
             while not self._news.wait_for(self._is_decided, wait):
                 if self._shared is None or not self._shared.starts:
                     break
-            if self.state.status is LineStatus.CONNECTED or self._is_stops_only():
+            if self.state.status is LineStatus.CONNECTED or self._waits_for_holder():
                 return
             error = self._error
         self.close()
         raise error or LineLost(f"{label(self._link)} was not connected within {wait:g} s.")
 
     def _is_decided(self) -> bool:
-        connected = self.state.status is LineStatus.CONNECTED or self._is_stops_only()
+        connected = self.state.status is LineStatus.CONNECTED or self._waits_for_holder()
         return connected or self._closed or isinstance(self._error, HOPELESS)
 
-    def _is_stops_only(self) -> bool:
-        """Whether stops go out although the line is not there: its owner is frozen."""
-        return self._shared is not None and self._shared.stops_only
+    def _waits_for_holder(self) -> bool:
+        """True if the process that holds the line does not answer: a stop ends it, or fails."""
+        return self._shared is not None and self._shared.frozen
 
     def close(self) -> None:
         """End the loop and its thread; see Line.close."""

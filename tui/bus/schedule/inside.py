@@ -63,8 +63,8 @@ class SharedLine(Protocol):
         """True while the process starts that is to hold the line, for some time."""
 
     @property
-    def stops_only(self) -> bool:
-        """Whether the owner is frozen, so that nothing but stops goes out."""
+    def frozen(self) -> bool:
+        """True while the process that holds the line does not answer."""
 
     async def own(self, say: Say) -> None:
         """Return once this program owns the line; until then its requests go to the owner."""

@@ -7,14 +7,13 @@ import itertools
 from collections.abc import Callable
 from contextlib import suppress
 
-from ..errors import UNKNOWN_FATE, LineClosed, LineLost, RequestRefused
+from ..errors import UNKNOWN_FATE, LineClosed, LineLost, NoAnswer, RequestRefused
 from ..model import Priority
 from ..requests import BROADCAST
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from .failures import error_of
 from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw
-from .past_owner import PastOwner
 from .request_forms import request_form
 
 OWNER_ENDED = "The program that owned the line ended"
@@ -23,26 +22,23 @@ OWNER_ENDED = "The program that owned the line ended"
 class RequestsAsked:
     """One attachment's requests; lives in the line's loop."""
 
-    def __init__(
-        self, inside: LineInside, past: PastOwner, tell: Callable[[AnyMessage], None]
-    ) -> None:
+    def __init__(self, inside: LineInside, tell: Callable[[AnyMessage], None]) -> None:
         self._inside = inside
-        self._past = past
         self._tell = tell
         self._loop = asyncio.get_running_loop()
         self._numbers = itertools.count(1)
         self._asked: dict[int, Job] = {}
+        self._left: set[int] = set()
+        """Stops that nobody waits for any more."""
         self._described: dict[int, object] = {}
 
     def send(self, job: Job) -> None:
-        """Hand a job to the owner, unless it must not be sent; past it where it belongs there."""
+        """Hand a job to the owner, unless it must not be sent."""
         if job.answer.cancelled():
             return
         request = job.request
         if why := self._inside.dispatcher.forbidden(job):
             job.fail(RequestRefused(why))
-            return
-        if self._past.take(job):
             return
         self._describe(request.device, job)
         kind, fields = request_form(request)
@@ -91,17 +87,22 @@ class RequestsAsked:
         else:
             job.fail(error_of(message.error, message.form))
 
-    def send_past(self) -> None:
-        """Take back what belongs to a stop, and send it past the owner."""
+    def fail_all(self, why: str) -> None:
+        """Fail all that waits. Nothing of it is sent later, except the words of stops."""
         for number, job in list(self._asked.items()):
-            if self._past.take(job):
-                self._withdraw(number)
-
-    def give_up_older(self, than: float, why: str) -> None:
-        """Fail what has waited since before a moment; it is not sent any more."""
-        for number, job in list(self._asked.items()):
-            if job.asked < than and not job.answer.done():
-                self._withdraw(number)
+            stops = job.priority is Priority.STOP
+            if stops and job.request.changes:
+                if number not in self._left:
+                    self._left.add(number)
+                    self._asked[number] = _without_asker(job)
+                    job.fail(LineLost(why))
+                continue
+            self._withdraw(number)
+            if stops:
+                # a drive that does not answer is sent its stop without a look
+                request = job.request
+                job.fail(NoAnswer(request.device, request.function, request.register, why))
+            else:
                 job.fail(LineLost(why + (UNKNOWN_FATE if job.request.changes else "")))
 
     def give_up_all(self, *, closing: bool) -> None:
@@ -128,3 +129,10 @@ class RequestsAsked:
             else f"{OWNER_ENDED}; this was not sent."
         )
         job.fail(LineLost(text))
+
+
+def _without_asker(job: Job) -> Job:
+    """The same job, for whose answer nobody waits."""
+    again = Job(job.request, job.priority, job.limits)
+    again.program, again.asked = job.program, job.asked
+    return again

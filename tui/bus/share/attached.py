@@ -18,7 +18,6 @@ from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from .failures import failure_told
-from .lease import SILENT_CLIENT, TOO_LATE, stood_still
 from .messages import (
     Alive,
     Answer,
@@ -35,6 +34,10 @@ from .request_forms import asked_request
 
 log = logging.getLogger(__name__)
 
+SILENT_CLIENT = 2.0
+"""Seconds without a sign of life after which a client is let go: nobody is to wait for it."""
+TOO_LATE = 2.0
+"""Seconds after which a command is not sent any more: nobody expects it now."""
 MOST_ASKED = 256
 """Requests of one client that may wait."""
 STOP_DUE = 10.0
@@ -63,8 +66,6 @@ class Client:
     asked: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
     counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
-    present: int = 0
-    """The last roll call that it has answered."""
     heard: float = 0.0
     """When it last said anything."""
     looks: int = 0
@@ -176,3 +177,8 @@ class Client:
         error = inside.error()
         failure = failure_told(error) if error is not None else None
         return News(inside.state(), plain, changed, shares, failure, frames, counted)
+
+
+def stood_still(seconds: float) -> str:
+    """Why a command is not sent, for a person."""
+    return f"Not sent: the program that owns the line stood still for {seconds:.0f} s."

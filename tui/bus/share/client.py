@@ -15,7 +15,6 @@ from ..link import label
 from ..model import LineStatus
 from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
-from .lease import SILENT_OWNER
 from .messages import (
     VERSION,
     Alive,
@@ -28,11 +27,9 @@ from .messages import (
     Goodbye,
     Granting,
     Hello,
-    Here,
     News,
     NoMessage,
     PollWish,
-    RollCall,
     StopGiven,
     Told,
     TurnedAway,
@@ -42,7 +39,6 @@ from .messages import (
 )
 from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
-from .past_owner import PastOwner
 from .place import Owner, short_path
 from .voices import ProgramVoice, give_up_own, tell_own
 
@@ -52,9 +48,6 @@ LOOKS_A_SIGN = 4
 """Looks at the owner for each own sign of life."""
 LEAVE_WITHIN = 1.0
 """Seconds that a program which leaves waits for the port to be closed."""
-WAITED_ENOUGH = 5.0
-"""Seconds that a request waits for a frozen owner before it is told so."""
-
 STOP_UNHEARD = ("a stop while nobody owned the line", "a stop while this program stood still")
 STOOD_STILL = "This program stood still and was taken for gone: it commands nothing any more."
 
@@ -66,27 +59,24 @@ class OwnerAway(Exception):
 class ShareClient:
     """Attached to one owner until it ends; lives in the line's loop, and is its facts' voice."""
 
-    def __init__(self, inside: LineInside, owner: Owner, say: Say, past: PastOwner) -> None:
+    def __init__(self, inside: LineInside, owner: Owner, say: Say) -> None:
         self._inside = inside
         self._owner = owner
         self._say = say
         self._loop = asyncio.get_running_loop()
         self.writer: asyncio.StreamWriter | None = None
-        self._asked = RequestsAsked(inside, past, self._tell)
+        self._asked = RequestsAsked(inside, self._tell)
         self._news = NewsHeard(inside, say)
         self._wish: tuple[dict[int, float], bool] = ({}, False)
-        self._past = past
         self._gone, self._told = False, ""
         self.again = False  # attached to the line before
         self.taken_in = False  # attached to this owner
-        self._watching = OwnerWatch(inside, owner, past)
-        self.quiet_until = 0.0
-        """When no reply to the owner's last request may come any more."""
+        self._watching = OwnerWatch(inside.clock, owner)
 
     @property
     def frozen(self) -> bool:
-        """Whether the owner does not answer, so that nothing but stops goes out."""
-        return self._past.at_work
+        """True while the owner does not answer."""
+        return self._watching.frozen
 
     async def serve(self) -> None:
         """Serve this program's requests until the owner ends.
@@ -109,10 +99,8 @@ class ShareClient:
             self._inside.facts.voice = None
             # what is said from here on would not be heard: a stop takes another way
             self.writer = None
-            frozen = self.frozen
             self._watching.close()
-            await self._past.end()
-            if closing and self.taken_in and not frozen:
+            if closing and self.taken_in and not self.frozen:
                 await self._leave(reader, writer)
             with suppress(OSError, RuntimeError):
                 writer.close()
@@ -156,7 +144,6 @@ class ShareClient:
             raise OwnerAway from error
         self._hear_life(message)
         if isinstance(message, Goodbye):
-            self.quiet_until = self._watching.heard + message.quiet
             raise OwnerAway
         if isinstance(message, TurnedAway):
             raise NotShared(message.why)
@@ -181,22 +168,12 @@ class ShareClient:
             try:
                 message = await next_message(reader)
             except (EOFError, OSError):
-                self._killed()
                 return
             except NoMessage as error:
                 log.error("%s sent a malformed message: %s", self._owner.program.text, error)
-                self._killed()
                 return
             self._hear_life(message)
-            if isinstance(message, Goodbye):
-                self.quiet_until = self._watching.heard + message.quiet
-                return
             self._hear(message)
-
-    def _killed(self) -> None:
-        """The owner is gone without a word: it may have sent until a moment ago."""
-        last = min(self._inside.clock(), self._watching.heard + SILENT_OWNER)
-        self.quiet_until = last + self._inside.timing.late_reply
 
     # Requests
 
@@ -222,26 +199,25 @@ class ShareClient:
                 self._tell(PollWish(*wish))
             self._watching.look(attached=self.taken_in)
             if self.frozen:
-                self._help_stops(self._watching.silence)
+                self._wait_for_owner()
 
     def _hear_life(self, message: AnyMessage) -> None:
         self._watching.hear(message)
-        if self.frozen:
-            self._past.leave()
+        if self._told:
             self._told = ""
             self._news.tell_state()
 
-    def _help_stops(self, silent: float) -> None:
-        """Send stops past the frozen owner; tell others that they wait in vain."""
-        if (told := self._past.told) != self._told:
+    def _wait_for_owner(self) -> None:
+        """Fail what waits for a frozen owner, once it is known that this program cannot end it."""
+        remedy = self._watching.remedy
+        told = f"{self._owner.program.text} {OWNER_SILENT}. {remedy}".rstrip()
+        if told != self._told:
             self._told = told
             self._say(LineStatus.LOST, told, None)
-        self._asked.send_past()
         for job in self._inside.dispatcher.take_all():
             self._asked.send(job)
-        if silent > SILENT_OWNER + WAITED_ENOUGH:
-            text = f"{self._owner.program.text} {OWNER_SILENT}."
-            self._asked.give_up_older(self._inside.clock() - WAITED_ENOUGH, text)
+        if remedy:
+            self._asked.fail_all(told)
 
     # What the owner says
 
@@ -256,9 +232,6 @@ class ShareClient:
                 self._news.hear(message)
             case Facts():
                 self._hear_facts(message)
-            case RollCall(number=number):
-                # once nothing of this program goes out past the owner any more
-                self._past.when_ended(lambda: self._tell(Here(number)))
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
             case StopGiven(devices=devices, by=by, program=program) if program.id != facts.me.id:

@@ -15,7 +15,7 @@ from .place import Owner, peer_of
 OTHER_USER = "It belongs to another user: end it as that user or as root (kill -9 {pid})."
 OTHER_CONTAINER = "It runs in another container: end it there."
 STAYS = "The system does not end it: plug its adapter in again, or restart the computer."
-BY_HAND = "End that program (kill -9 {pid}): then stops go out."
+BY_HAND = "End that program (kill -9 {pid}). Then stops are sent."
 
 
 class KeeperProcess:
@@ -29,9 +29,8 @@ class KeeperProcess:
         self._pid = owner.program.pid
         self._handle: int | None = None
         known = owner.program.name == KEEPER and owner.version == VERSION
-        self.is_keeper = known and self._pid != os.getpid()
         self._remedy = BY_HAND
-        if self.is_keeper and hasattr(os, "pidfd_open"):
+        if known and self._pid != os.getpid() and hasattr(os, "pidfd_open"):
             if (peer := peer_of(connection)) is not None and peer.pid == self._pid:
                 self._open(connection)
             else:

@@ -90,7 +90,7 @@ class KeeperShare(Sharing):
 
     async def _listens(self) -> bool:
         try:
-            return await self._listen(None)
+            return await self._listen()
         except OSError as error:
             log.error("the keeper cannot listen: %s", error)
             self._inside.facts.set_programs((self._inside.facts.me,))

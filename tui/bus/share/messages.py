@@ -37,7 +37,7 @@ from ..program import Program
 from ..trace import FrameDirection
 from .failures import ErrorForm
 
-VERSION = 5
+VERSION = 6
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; more is no message of ours."""
@@ -144,18 +144,6 @@ class StopGiven(Message, frozen=True):
             raise ValueError("not one count for each device")
 
 
-class RollCall(Message, frozen=True):
-    """The owner stood still, and asks who is there: what was said meanwhile comes before it."""
-
-    number: Number
-
-
-class Here(Message, frozen=True):
-    """The answer to a RollCall; nothing goes out past the owner any more."""
-
-    number: Number
-
-
 class Alive(Message, frozen=True):
     """A program's sign of life: one that gives none for long is let go. Answers each stop, too."""
 
@@ -258,18 +246,15 @@ class News(Message, frozen=True):
 
 
 class Goodbye(Message, frozen=True):
-    """The owner ends, and a reply may still come for `quiet` seconds; or a client leaves.
+    """A client leaves. The owner closes the connection: after the port, if it was the last.
 
-    The owner closes the connection of a client that leaves: after the port, if it was the last.
     In place of a Hello it asks a keeper that serves nobody to end.
     """
-
-    quiet: Seconds = 0.0
 
 
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
-    | Alive | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | Hush | PollWish
+    | Alive | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
     | Facts | News | Goodbye | Armed
 )  # fmt: skip
 
@@ -293,13 +278,6 @@ async def next_message(reader: asyncio.StreamReader, head: bytes = b"") -> AnyMe
     if length > LONGEST_MESSAGE:
         raise NoMessage(f"{length} bytes")
     return unpacked(await reader.readexactly(length))
-
-
-def message_of(data: bytes) -> AnyMessage:
-    """The one message in bytes with its length before it. Raises NoMessage."""
-    if int.from_bytes(data[:LENGTH], "big") != len(data) - LENGTH:
-        raise NoMessage(f"{len(data)} bytes")
-    return unpacked(data[LENGTH:])
 
 
 def unpacked(data: bytes) -> AnyMessage:

@@ -6,12 +6,11 @@ import logging
 import socket
 from collections import deque
 
+from ..errors import OWNER_SILENT
+from ..master import MonotonicClock
 from ..model import Priority
-from ..schedule.inside import LineInside
 from .keeper_process import KeeperProcess
-from .lease import SILENT_OWNER
 from .messages import Alive, AnyMessage, Asking, StopGiven
-from .past_owner import PastOwner
 from .place import Owner
 
 log = logging.getLogger(__name__)
@@ -20,6 +19,10 @@ WATCH_INTERVAL = 0.1
 """Seconds between two looks at the owner."""
 AWAKE = 0.3
 """Seconds between two looks in which this program was awake all the time."""
+SILENT_OWNER = 1.0
+"""Seconds without a sign of life after which an owner counts as frozen."""
+TAKEN_IN_WITHIN = 1.0
+"""Seconds that a keeper which lives takes for the answer to a greeting."""
 STOP_HEARD_WITHIN = 1.0
 """Seconds in which a keeper that lives acknowledges a stop."""
 HEARD_WITHIN = 3.0
@@ -31,20 +34,21 @@ DIES_WITHIN = 1.0
 class OwnerWatch:
     """One attachment's look at its owner; lives in the line's loop."""
 
-    def __init__(self, inside: LineInside, owner: Owner, past: PastOwner) -> None:
-        self._clock = inside.clock
+    def __init__(self, clock: MonotonicClock, owner: Owner) -> None:
+        self._clock = clock
         self._owner = owner
-        self._past = past
+        self.frozen = False
+        """True while it does not answer."""
+        self.remedy = ""
+        """Who can end it if this program cannot, for a person."""
         self._process: KeeperProcess | None = None
         self._killed: float | None = None
-        self._stays = False
-        """True if it could not be killed."""
         self._looks = 0
         self._stops: deque[float] = deque()
         """When stops were sent that are not acknowledged yet."""
-        self.heard = self._looked = self._awake = inside.clock()
+        self.heard = self._looked = self._awake = self._begun = clock()
         """When the owner gave its last sign of life, when this program looked for one last, and
-        since when it was awake all the time."""
+        since when it was awake all the time; and when it began."""
 
     def connected(self, connection: socket.socket) -> None:
         """There is a connection to the owner."""
@@ -62,16 +66,12 @@ class OwnerWatch:
     def hear(self, message: AnyMessage) -> None:
         """The owner said something: it lives."""
         self.heard, self._looks, self._killed = self._clock(), 0, None
+        self.frozen, self.remedy = False, ""
         if isinstance(message, Alive) and self._stops:
             self._stops.popleft()
 
-    @property
-    def silence(self) -> float:
-        """Seconds since it has said anything."""
-        return self._clock() - self.heard
-
     def look(self, *, attached: bool) -> None:
-        """Let stops go past an owner that does not answer; kill a keeper that hangs."""
+        """Note if the owner does not answer; kill a keeper that hangs."""
         now = self._clock()
         if now - self._looked > AWAKE:
             self._awake = now
@@ -79,27 +79,30 @@ class OwnerWatch:
         # by looks, too: if this program got no time to look, the owner may be well
         self._looks += 1
         looked = self._looks > SILENT_OWNER / WATCH_INTERVAL
-        if not self._past.at_work and self.silence > SILENT_OWNER and looked:
-            log.error("%s owns the line and does not answer", self._owner.program.text)
-            self._past.begin()
-        if self._process is not None and self._process.is_keeper and self._hangs(now, attached):
+        if not self.frozen and now - self.heard > SILENT_OWNER and looked:
+            log.error("%s %s", self._owner.program.text, OWNER_SILENT)
+            self.frozen = True
+        if self._process is not None and self._hangs(now, attached):
             self._end(self._process, now)
 
     def _hangs(self, now: float, attached: bool) -> bool:
         """True if it acknowledges nothing, seen by a program that was awake all the time."""
         if now - max(self.heard, self._awake) > HEARD_WITHIN:
             return True
-        sent = self._stops[0] if attached and self._stops else now
+        sent = self._stops[0] if self._stops else now
+        if not attached:
+            sent = max(sent, self._begun + TAKEN_IN_WITHIN)
         return now - max(sent, self._awake) > STOP_HEARD_WITHIN
 
     def _end(self, process: KeeperProcess, now: float) -> None:
         """Kill it once; it is dead when its lock is released, and this attachment ends before."""
+        dies = True
         if self._killed is None:
-            self._killed, self._stays = now, not process.kill()
-            done = "cannot be killed" if self._stays else "was killed"
+            self._killed, dies = now, process.kill()
+            done = "was killed" if dies else "cannot be killed"
             log.error("%s hangs and %s", self._owner.program.text, done)
-        if self._stays or now - self._killed > DIES_WITHIN:
-            self._past.owner_stays(process.remedy)
+        if not dies or now - self._killed > DIES_WITHIN:
+            self.frozen, self.remedy = True, process.remedy
 
 
 def is_stop(message: AnyMessage) -> bool:

@@ -23,7 +23,6 @@ from .messages import (
     Describe,
     Facts,
     Goodbye,
-    Here,
     NoMessage,
     PollWish,
     StopGiven,
@@ -34,7 +33,6 @@ from .messages import (
 )
 from .place import OwnerLock, SharePlace, has_ended
 from .signs import SignsOfLife
-from .stops_past import StopsPast
 from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
@@ -56,38 +54,30 @@ class ShareServer:
         self._greeting = Greeting(inside, place.group, holder, self._stopped)
         self._listening = Listening(place, lock, inside.facts, label(inside.link), self._welcome)
         self._commanding = Commanding(inside.facts, self._clients, self._tell_facts)
-        self._signs = SignsOfLife(
-            inside, self._all, self._tell_news, self._stopped, StopsPast(place)
-        )
+        self._signs = SignsOfLife(inside, self._all, self._tell_news)
         self._gone_before: set[str] = set()  # looked after
         self._handling: set[asyncio.Task[None]] = set()
         self._stops_left: list[Job] = []
         self._missed: asyncio.TimerHandle | None = None
 
-    async def start(self, before: Program | None) -> None:
-        """Listen, after an owner whose client this program was, or None.
-
-        Raises OSError where no socket can be made.
-        """
+    async def start(self) -> None:
+        """Listen. Raises OSError where no socket can be made."""
         facts = self._inside.facts
         facts.set_programs((facts.me,))
         facts.voice = ProgramVoice(facts, self._say)
-        if before is not None:
-            self._missing(before)
         await self._listening.start()
         self._signs.start()
         self._miss_departed(ended=True)
         self._missed = self._loop.call_later(BACK_WITHIN, self._miss_departed)
 
-    async def close(self, quiet: float = 0.0) -> None:
-        """Say goodbye, listen no more, and leave no socket behind."""
+    async def close(self) -> None:
+        """Listen no more, and leave no socket behind; the programs start the next keeper."""
         self._inside.facts.voice = None
         self._signs.close()
         if self._missed is not None:
             self._missed.cancel()
         await self._listening.close()
         for client in list(self._clients.values()):
-            client.say(Goodbye(quiet))
             with suppress(OSError, RuntimeError):
                 client.writer.close()
         self._clients.clear()
@@ -225,8 +215,6 @@ class ShareServer:
             case PollWish(shares=shares, trace=trace):
                 client.shares, client.trace = shares, trace
                 self._inside.pace.others = self._wishes()
-            case Here(number=number):
-                client.present = number
             case _:
                 self._hear_of_devices(client, message)
 

@@ -17,7 +17,6 @@ from ..schedule.inside import LineInside, Say, SharedLine
 from .client import OwnerAway, ShareClient
 from .keeping import KeeperOrder
 from .messages import VERSION
-from .past_owner import PastOwner
 from .place import (
     MOST_DEATHS,
     STARTING,
@@ -29,8 +28,6 @@ from .place import (
 )
 from .server import ShareServer
 from .starting import start_keeper
-from .stops_past import StopsPast
-from .turn import Turn
 
 log = logging.getLogger(__name__)
 
@@ -69,8 +66,8 @@ class Sharing:
         self._quiet_until = 0.0
 
     @property
-    def stops_only(self) -> bool:
-        """Whether the owner is frozen, so that nothing but stops goes out."""
+    def frozen(self) -> bool:
+        """True while the process that holds the line does not answer."""
         return self._client is not None and self._client.frozen
 
     @property
@@ -88,7 +85,6 @@ class Sharing:
             return
         inside = self._inside
         away_since: float | None = None
-        served: Owner | None = None
         shown = False
         while True:
             try:
@@ -105,13 +101,13 @@ class Sharing:
                 if owner is None:
                     raise OwnerAway
                 await self._attend(owner, say)
-                served, away_since, shown = owner, None, False
+                away_since, shown = None, False
             except OwnerAway:
                 now = inside.clock()
                 away_since = away_since or now
                 begins = self._keeper_lives() or (owner is not None and owner.starts)
                 self._starts_until = away_since + KEEPER_STARTS if begins else 0.0
-                if served is not None and now - away_since > AWAY_FOR and not shown:
+                if self._attached and now - away_since > AWAY_FOR and not shown:
                     shown = True
                     say(LineStatus.CONNECTING, HOLDER_AWAY, None)
                 if now - away_since > (KEEPER_STARTS if begins else NO_OWNER):
@@ -119,7 +115,8 @@ class Sharing:
                         f"{owner_text(owner)} holds the line and cannot be reached. Close it."
                     ) from None
                 await asyncio.sleep(OWNER_INTERVAL)
-        await self._begin(served)
+        await self._listen()
+        self._doubt_replies()
 
     def _give_to_keeper(self) -> bool:
         """Start the line's keeper, which has the lock from then on; False where it cannot be."""
@@ -148,9 +145,7 @@ class Sharing:
 
     async def _attend(self, owner: Owner, say: Say) -> None:
         """Be a client of an owner until it ends."""
-        inside, place = self._inside, self._place
-        past = PastOwner(inside, StopsPast(place), Turn(place), owner.program)
-        self._client = client = ShareClient(inside, owner, say, past)
+        self._client = client = ShareClient(self._inside, owner, say)
         client.again = self._attached
         try:
             await client.serve()
@@ -160,15 +155,8 @@ class Sharing:
         log.info("%s does not own the line any more", owner.program.text)
         self._keeper_lives()  # takes note of its end, if this program has started it
         self._keeper_lives, self._starts_until = bool, 0.0
-        latest = inside.clock() + LONGEST_QUIET
-        self._quiet_until = max(self._quiet_until, min(client.quiet_until, latest))
 
-    async def _begin(self, served: Owner | None) -> None:
-        """Listen as the owner; replies to an owner before are not trusted."""
-        await self._listen(served.program if served is not None else None)
-        self._doubt_replies()
-
-    async def _listen(self, before: Program | None) -> bool:
+    async def _listen(self) -> bool:
         inside = self._inside
         self._learn_of_before()
         # should this program end before it listens
@@ -176,7 +164,7 @@ class Sharing:
         self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until, stopped))
         self._server = server = ShareServer(self._place, self._lock, inside, self)
         try:
-            await server.start(before)
+            await server.start()
         except OSError as error:
             log.error("the line cannot be shared: %s", error)
             return False
@@ -231,7 +219,7 @@ class Sharing:
         now = self._inside.clock()
         quiet = max(quiet, self._quiet_until - now)
         if self._server is not None:
-            await self._server.close(quiet)
+            await self._server.close()
             self._server = None
         # whoever comes next may not have been attached
         me, stopped = self._inside.facts.me, self._inside.facts.stops.late_times

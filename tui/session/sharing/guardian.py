@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.link import label
-from tui.bus.share.lease import SILENT_CLIENT
+from tui.bus.share.attached import SILENT_CLIENT
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
