@@ -70,7 +70,12 @@ class Bench:
         self.told: list[tuple[int, str]] = []
         self.line.facts.on_text(lambda device, text: self.told.append((device, text)))
 
-    def guardian(self, *, person: bool = False, timeout: float | None = None) -> Guardian:
+    def guardian(self, *, person: bool = False) -> Guardian:
+        """The guardian of this program, which is a panel if there is a `person`."""
+        if person:
+            facts = self.line.facts
+            facts.me = Program(facts.me.id, "panel", facts.me.pid)
+            facts.set_programs((facts.me, GONE))
         sessions = {
             one: DriveSession(self.line, one, library.load(profile), clock=self.clock)
             for one, profile in ((1, "atv71"), (2, "atv312"))
@@ -78,22 +83,27 @@ class Bench:
         return Guardian(
             self.line,
             self.journal,
-            timeout_of=lambda _: timeout,
             clock=self.clock,
             session_of=sessions.get,
-            person=person,
             events=self.events,
             starts=self.starts,
         )
 
-    def started(self, device: int, *, pid: int = GONE.pid, left_running: bool = False) -> None:
+    def started(
+        self,
+        device: int,
+        *,
+        pid: int = GONE.pid,
+        left_running: bool = False,
+        timeout: float | None = None,
+    ) -> None:
         """A program has started a motor, which runs."""
         self.simulation.drive(device).run(20.0)
         profile = "atv71" if device == 1 else "atv312"
         identity = DriveIdentity(device, "V", "R", "0201", "", profile, (profile,))
         record = self.starts.record(
             label(self.line.link), identity, profile, "forward",
-            program="run", left_running=left_running,
+            program="run", left_running=left_running, acts_after=timeout,
         )  # fmt: skip
         self.starts.begin(replace(record, pid=pid, started="100"))
         self.starts.sent(label(self.line.link), device)
@@ -217,9 +227,9 @@ async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None
 async def test_a_person_has_the_drives_own_time_out_to_take_the_motor_over(
     bench: Bench, timeout: float | None, grace: float
 ) -> None:
-    bench.started(1)
+    bench.started(1, timeout=timeout)
     await come(lambda: bench.turns(1))
-    bench.guardian(person=True, timeout=timeout)
+    bench.guardian(person=True)
     bench.gone()
     await come(lambda: bench.says(f"stopped in {grace:g} s, unless a and T take it over here"))
     bench.clock.advance(grace - 0.5)
@@ -264,9 +274,9 @@ FROZEN = Program("frozen", "run", LIVING)
 
 async def frozen(bench: Bench, *, person: bool = True, **started: bool) -> None:
     """A program that runs a motor gives no sign of life, and was let go."""
-    bench.started(1, pid=LIVING, **started)
+    bench.started(1, pid=LIVING, timeout=10.0, **started)
     await come(lambda: bench.turns(1))
-    bench.guardian(person=person, timeout=10.0)
+    bench.guardian(person=person)
     bench.gone(FROZEN)
     await asyncio.sleep(0.2)
     assert bench.told == []  # it may be just ending

@@ -115,23 +115,13 @@ class LineOwner(Panel):
             console = fleet.console(device)
             return console.session if console is not None else None
 
-        def timeout_of(device: int) -> float | None:
-            watch = fleet.line_watch.watch(device)
-            return watch.timeout if watch is not None else None
-
         def stopped(devices: tuple[int, ...], _by: str, _program: Program) -> None:
             soon_in_loop(self, self.stopped_elsewhere, list(devices))
 
         fleet.line.facts.on_stop(stopped)
         fleet.handover.person = True
         Guardian(
-            fleet.line,
-            self.journal,
-            session_of=session_of,
-            timeout_of=timeout_of,
-            person=True,
-            events=fleet.events,
-            clock=self.clock,
+            fleet.line, self.journal, session_of=session_of, events=fleet.events, clock=self.clock
         )
 
     def _open_here(self, text: str, remember: bool) -> OpenLine:

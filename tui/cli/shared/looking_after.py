@@ -36,7 +36,7 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
 
         for leave in waiting:
             leave()
-        guardians.append(Guardian(line, Journal(), timeout_of=partial(_timeout_of, opened)))
+        guardians.append(Guardian(line, Journal()))
 
     def gone(program: Program) -> None:
         begin()
@@ -59,15 +59,6 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     waiting = (line.facts.on_gone(gone), holder.on_care(armed), holder.on_stop_due(due))
     line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
     return end
-
-
-def _timeout_of(opened: OpenLine, device: int) -> float | None:
-    """Seconds to a drive's own communication time-out, as far as it has told it here."""
-    from .left_alone import LeftAlone
-
-    farewell = opened.farewells.get(device)
-    told = farewell.session.timeout if isinstance(farewell, LeftAlone) else None
-    return told.watch.timeout if told is not None and told.watch is not None else None
 
 
 def _tell(where: str, device: int, text: str) -> None:

@@ -61,18 +61,14 @@ class Guardian:
         line: ModbusLine,
         journal: Journal,
         *,
-        timeout_of: Callable[[int], float | None] = lambda _: None,
         clock: Clock = REAL_CLOCK,
         session_of: Callable[[int], DriveSession | None] = lambda _: None,
-        person: bool = False,
         events: EventLog | None = None,
         starts: Starts | None = None,
     ) -> None:
         self._line = line
-        self._timeout_of = timeout_of
         self._clock = clock
         self._session_of = session_of
-        self._person = person
         self._starts = starts or Starts()
         self._stopper = Stopper(line, journal, events)
         self._key = line_key(label(line.link))
@@ -119,7 +115,7 @@ class Guardian:
         records = await self._left_by(program)
         if not records:
             return
-        takers = self._person or any(one.name == "panel" for one in self._line.facts.others)
+        takers = any(one.name == "panel" for one in self._line.facts.programs)
         await asyncio.gather(
             *(self._stop_unless_taken(one, program, takers=takers, left=left) for one in records)
         )
@@ -132,8 +128,7 @@ class Guardian:
         With such a person, a program that lives has as long to look after it again.
         """
         device, frozen = record.device, self._starts.is_alive(record)
-        timeout = self._timeout_of(device) or record.acts_after or TAKEN_OVER_WITHIN
-        grace = min(timeout, LONGEST_GRACE)
+        grace = min(record.acts_after or TAKEN_OVER_WITHIN, LONGEST_GRACE)
         # one that is frozen had been silent before it was let go
         begun = left - SILENT_CLIENT if frozen else self._clock.monotonic()
         end = begun + grace if takers else begun
