@@ -143,8 +143,6 @@ class ShareClient:
         except (EOFError, OSError, NoMessage) as error:
             raise OwnerAway from error
         self._hear_life(message)
-        if isinstance(message, Goodbye):
-            raise OwnerAway
         if isinstance(message, TurnedAway):
             raise NotShared(message.why)
         if not isinstance(message, Welcome):

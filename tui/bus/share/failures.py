@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import msgspec
@@ -57,37 +57,27 @@ class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
     retry_in: Seconds | None = None
 
 
-_PLAIN: Mapping[str, type[LineError]] = {
-    kind.__name__: kind for kind in (RequestRefused, LineBusy, LineLost, LineFailed, LineClosed)
+_EXCHANGE = ("device", "function", "address")
+_KINDS: Mapping[type[LineError], tuple[str, ...]] = {
+    **dict.fromkeys((RequestRefused, LineBusy, LineLost, LineFailed, LineClosed, LineError), ()),
+    NoAnswer: (*_EXCHANGE, "detail", "retry_in"),
+    ChecksumFault: (*_EXCHANGE, "detail", "received"),
+    WrongReply: (*_EXCHANGE, "detail", "received"),
+    DeviceException: (*_EXCHANGE, "code", "meaning"),
+    Superseded: ("device", "register"),
+    PortBusy: ("path", "holder"),
+    PortMissing: ("path", "ports"),
+    PortRefused: ("path", "reason"),
 }
-
-
-_MADE: Mapping[str, Callable[[ErrorForm], LineError]] = {
-    "NoAnswer": lambda e: NoAnswer(e.device, e.function, e.address, e.detail, retry_in=e.retry_in),
-    "ChecksumFault": lambda e: ChecksumFault(e.device, e.function, e.address, e.detail, e.received),
-    "WrongReply": lambda e: WrongReply(e.device, e.function, e.address, e.detail, e.received),
-    "DeviceException": lambda e: DeviceException(
-        e.device, e.function, e.address, e.code, e.meaning
-    ),
-    "Superseded": lambda e: Superseded(e.device, e.register),
-    "PortBusy": lambda e: PortBusy(e.path, e.holder),
-    "PortMissing": lambda e: PortMissing(e.path, e.ports),
-    "PortRefused": lambda e: PortRefused(e.path, e.reason),
-}
-"""How each error with fields of its own is made anew."""
+"""The fields of which each error is made; of its text where it has none."""
+_NAMED = {kind.__name__: kind for kind in _KINDS}
 
 
 def failure_told(error: BaseException) -> tuple[str, ErrorForm]:
     """The kind of an error and what it tells, as a message carries them."""
-    name = type(error).__name__
-    if name not in _MADE:
-        return name if name in _PLAIN else "LineError", ErrorForm(_clipped(str(error)))
-    held = {
-        key: _clipped(getattr(error, key))
-        for key in ErrorForm.__struct_fields__
-        if key != "text" and hasattr(error, key)
-    }
-    return name, ErrorForm(_clipped(str(error)), **held)
+    kind = _NAMED.get(type(error).__name__, LineError)
+    held = {name: _clipped(getattr(error, name)) for name in _KINDS[kind]}
+    return kind.__name__, ErrorForm(_clipped(str(error)), **held)
 
 
 def _clipped(value: Any) -> Any:
@@ -99,6 +89,6 @@ def _clipped(value: Any) -> Any:
 
 def error_of(kind: str, form: ErrorForm) -> LineError:
     """The error that a message carries."""
-    if (make := _MADE.get(kind)) is not None:
-        return make(form)
-    return _PLAIN.get(kind, LineError)(form.text)
+    made = _NAMED.get(kind, LineError)
+    fields = {name: getattr(form, name) for name in _KINDS[made]}
+    return made(**fields) if fields else made(form.text)

@@ -75,12 +75,9 @@ class Greeting:
                 return None
             message = await next_message(reader, head)
         leaves = isinstance(message, Goodbye)
-        if leaves or (isinstance(message, Hello) and not self._suits(message)):
-            if await self._holder.makes_way():
-                writer.write(packed(Goodbye()))
-                return None
-            if leaves:
-                return None
+        needs_way = leaves or (isinstance(message, Hello) and not self._suits(message))
+        if needs_way and (await self._holder.makes_way() or leaves):
+            return None
         if not isinstance(message, Hello) or message.program.id == self._inside.facts.me.id:
             raise NoMessage("no greeting, or one in the name of the owner")
         if why := self._refusal(message, writer, present):

@@ -259,11 +259,6 @@ def short_path(path: Path) -> Iterator[str]:
         os.close(folder)
 
 
-def owner_text(owner: Owner | None) -> str:
-    """Who owns a line, for a person."""
-    return owner.program.text if owner else "another program"
-
-
 def has_ended(program: Program) -> bool:
     """Whether a program of this machine surely is no more."""
     try:

@@ -24,7 +24,6 @@ from .place import (
     OwnerLock,
     SharePlace,
     owner_of,
-    owner_text,
 )
 from .server import ShareServer
 from .starting import start_keeper
@@ -111,8 +110,9 @@ class Sharing:
                     shown = True
                     say(LineStatus.CONNECTING, HOLDER_AWAY, None)
                 if now - away_since > (KEEPER_STARTS if begins else NO_OWNER):
+                    who = owner.program.text if owner else "another program"
                     raise NotShared(
-                        f"{owner_text(owner)} holds the line and cannot be reached. Close it."
+                        f"{who} holds the line and cannot be reached. Close it."
                     ) from None
                 await asyncio.sleep(OWNER_INTERVAL)
         await self._listen()
