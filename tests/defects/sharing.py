@@ -525,4 +525,32 @@ DEFECTS = (
         "A motor runs for good whose program is gone: a service of another user asks its drive on.",
         ("tests/session/test_guardian.py::test_the_motor_of_another_user_of_the_group_is_stopped",),
     ),
+    Defect(
+        "trend-of-another-drive",
+        "tui/session/monitor/trend_notes.py",
+        "if (note.device, note.kind) != (self._device, self._kind):",
+        "if note.device != self._device:",
+        "Monitor shows as trend what the family at that address before had measured.",
+        (
+            "tests/session/test_trend_notes.py::test_a_trend_of_another_family_at_the_same_address"
+            "_is_not_taken",
+        ),
+    ),
+    Defect(
+        "notes-kept-for-good",
+        "tui/bus/notes.py",
+        "while self._size > MOST_NOTES or now",
+        "while now",
+        "A keeper grows with what programs leave, until the computer has no memory left.",
+        ("tests/bus/test_notes.py::test_the_oldest_notes_make_room_for_new_ones",),
+    ),
+    Defect(
+        "message-of-another-program-as-new",
+        "tui/session/events.py",
+        "                self._events = deque(events, maxlen=EVENTS_KEPT)\n",
+        "                self._events = deque(events, maxlen=EVENTS_KEPT)\n"
+        "                self._newest = event\n",
+        "The message line shows, as if it were new, what another program said minutes ago.",
+        ("tests/session/test_trend_notes.py::test_a_message_of_another_program_is_not_the_newest",),
+    ),
 )

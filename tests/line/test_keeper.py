@@ -27,7 +27,10 @@ from tests.programs import (
 )
 from tui.bus.share.keeper_share import LINGERS
 from tui.bus.share.starting import can_start
+from tui.drive.profile import library
 from tui.session.connect.open_line import open_line
+from tui.session.drive import DriveSession
+from tui.session.monitor.monitor import Monitor
 from tui.simulator import DriveSpec, Simulation
 
 from .terminal import Terminal
@@ -308,6 +311,24 @@ def test_no_keeper_is_started_by_a_program_that_embeds_python(
     assert can_start()
     monkeypatch.setattr(sys, "executable", executable)
     assert not can_start()
+
+
+def test_the_next_program_has_the_trend_of_one_that_was_killed() -> None:
+    with bench() as (_, line):
+        command = [*DRIVEPANEL, "watch", line, "-d", "1", "-p", "atv71", "--every", "0.2", "--json"]
+        with served(command) as recorder:
+            begun = times_of_good_values(recorder, 6.0)[0]
+            recorder.process.kill()
+        opened = open_line(line, wait=PATIENCE, program="panel")
+        try:
+            monitor = Monitor(DriveSession(opened.line, 1, library.load("atv71")))
+            monitor.start()
+            wait_until(lambda: bool(monitor.trend), "a cycle")
+            wait_until(lambda: monitor.trend[0].time < begun + 1.0, "the trend from before")
+            # but for the last points before it was killed
+            assert len([one for one in monitor.trend if one.time < begun + 4.0]) >= 10
+        finally:
+            opened.close()
 
 
 DIES = """

@@ -13,6 +13,7 @@ import pytest
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
 from tui.bus.leases import WriteLease
+from tui.bus.notes import LineNote
 from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR, CommandedElsewhere
@@ -55,6 +56,9 @@ class Told:
 
     def told(self, device: int, text: str) -> None:
         self.said.append(("told", device, text))
+
+    def noted(self, note: LineNote) -> None:
+        self.said.append(("noted", note.device, note.kind))
 
 
 class Bench:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from .leases import WriteLease
 from .program import Program, readable
+
+if TYPE_CHECKING:
+    from .notes import LineNote
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +40,9 @@ class LineVoice(Protocol):
 
     def told(self, device: int, text: str) -> None:
         """Something that everybody on the line is to read."""
+
+    def noted(self, note: LineNote) -> None:
+        """A note from here for the next program, or without data a request for some."""
 
 
 StopListener = Callable[[tuple[int, ...], str, Program], None]

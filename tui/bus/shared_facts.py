@@ -13,6 +13,7 @@ from types import MappingProxyType
 from .facts_heard import FactsHeard, LineVoice, heard
 from .holder_heard import HolderHeard
 from .leases import WriteLeases
+from .notes import Notes
 from .program import KEEPER, Program
 from .stop_counts import GivenStops, StopCounts
 
@@ -39,6 +40,8 @@ class SharedFacts(FactsHeard):
         """How many stops each device was given, by all programs."""
         self.leases = WriteLeases(self.me.id, self.stops, lambda: self.voice)
         """Which program may write to which device."""
+        self.notes = Notes(lambda: self.voice)
+        """Notes for the next program on the line."""
         self.gated = False
         """True on a line where nothing is written to a device that its program has not armed."""
         self.holder = HolderHeard()

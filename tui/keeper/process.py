@@ -20,6 +20,8 @@ from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
 from tui.bus.share.keeping import KeeperOrder
 from tui.bus.share.sharing import KEEPER_STARTS
 from tui.session.connect.share_place import this_program
+from tui.session.event_notes import EventNotes
+from tui.session.events import EventLog
 from tui.session.journal import Journal
 from tui.session.logs import start_logging
 from tui.session.sharing.guardian import Guardian
@@ -54,10 +56,18 @@ class Keeper:
         )
         self._journal = Journal()
         self._guardian = Guardian(self._line, self._journal)
+        self._events = EventLog()
+        EventNotes(self._line.facts, self._events)
+        self._line.facts.on_text(self._note_text)
 
     def cares(self) -> bool:
         """True while a motor is still to be stopped."""
         return self._guardian.busy
+
+    def _note_text(self, device: int, text: str) -> None:
+        """Leave a text for the next program if none on the line keeps it."""
+        if not self._line.facts.others:
+            self._events.add("told", text, device)
 
     def end(self) -> None:
         """End soon: the computer may be shut down, and programs that are attached end as well."""

@@ -87,6 +87,7 @@ class LineOwner(Panel):
         self.panel_lines = (*self.panel_lines, one)
         self.show_line(one)
         self._look_after(fleet)
+        fleet.event_notes.ask()
         log.info("opened %s", opened.label)
         self.opening.connected = True
 

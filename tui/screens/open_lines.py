@@ -73,13 +73,25 @@ class LineEvents(EventLog):
 
     def add(
         self, kind: str, text: str, device: int | None = None, wall: float | None = None
-    ) -> None:
-        """Keep an event among those of all lines."""
+    ) -> Event | None:
+        """Keep an event among those of all lines; None if it repeats the one before."""
+        text_of_all, device_of_all = self._named(text, device)
+        new = self._all.add(kind, text_of_all, device_of_all, wall)
+        if new is not None:
+            self.left(new._replace(text=text, device=device))
+        return new
+
+    def join(self, event: Event) -> None:
+        """Keep an event of another program on the line among those of all lines."""
+        text, device = self._named(event.text, event.device)
+        self._all.join(event._replace(text=text, device=device))
+
+    def _named(self, text: str, device: int | None) -> tuple[str, int | None]:
+        """Text and device of an event as all lines have it."""
         if self._is_shown():
-            self._all.add(kind, text, device, wall)
-        else:
-            drive = "" if device is None else f", drive {device}"
-            self._all.add(kind, f"{self._label}{drive}: {text}", None, wall)
+            return text, device
+        drive = "" if device is None else f", drive {device}"
+        return f"{self._label}{drive}: {text}", None
 
     @property
     def newest(self) -> Event | None:

@@ -25,20 +25,33 @@ class EventLog:
     """Keeps the last events."""
 
     def __init__(self, wall: Callable[[], float] = time.time) -> None:
+        self.left: Callable[[Event], None] = lambda _: None
+        """Gets each new event."""
         self._wall = wall
+        self._newest: Event | None = None
         self._lock = Lock()
         self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
 
     def add(
         self, kind: str, text: str, device: int | None = None, wall: float | None = None
-    ) -> None:
-        """Keep an event, of the time `wall` if given; a repetition in a row is kept once."""
+    ) -> Event | None:
+        """Keep an event, of the time `wall` if given; None if it repeats the one before."""
         with self._lock:
-            last = self._events[-1] if self._events else None
+            last = self._newest
             if last is not None and (last.device, last.kind, last.text) == (device, kind, text):
-                return
+                return None
             at = self._wall() if wall is None else wall
-            self._events.append(Event(at, device, kind, text))
+            self._newest = new = Event(at, device, kind, text)
+            self._events.append(new)
+        self.left(new)
+        return new
+
+    def join(self, event: Event) -> None:
+        """Keep an event of another program at its time; one that is there already is kept once."""
+        with self._lock:
+            if event not in self._events:
+                events = sorted((*self._events, event), key=lambda one: one.wall)
+                self._events = deque(events, maxlen=EVENTS_KEPT)
 
     def __bool__(self) -> bool:
         """A log is there however empty it is."""
@@ -46,9 +59,9 @@ class EventLog:
 
     @property
     def newest(self) -> Event | None:
-        """The last event; None where nothing was said yet."""
+        """The last event of this program; None where nothing was said yet."""
         with self._lock:
-            return self._events[-1] if self._events else None
+            return self._newest
 
     @property
     def events(self) -> tuple[Event, ...]:

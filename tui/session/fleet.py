@@ -26,6 +26,7 @@ from .connect.prepared_stop import prepared_stop
 from .connect.search import Search
 from .console import DriveConsole
 from .drive import DriveSession
+from .event_notes import EventNotes
 from .events import EventLog
 from .journal import FAULT_WHYS, Entry, Journal, entry_time
 from .monitor.alarms import LineAlarms, PresentFault
@@ -87,6 +88,7 @@ class Fleet:
         self._strangers = StrangersAsked(line, clock)
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
+        self.event_notes = EventNotes(line.facts, self.events)
         self.stopper = Stopper(line, journal, self.events)
         self.alarms = LineAlarms(self.events, self._record_fault)
         """The faults of all of them."""

@@ -13,6 +13,7 @@ from typing import Any
 from ..errors import OWNER_SILENT, NotShared
 from ..link import label
 from ..model import LineStatus
+from ..notes import LineNote
 from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
 from .messages import (
@@ -232,6 +233,8 @@ class ShareClient:
                 self._hear_facts(message)
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
+            case LineNote():
+                facts.notes.hear(message)
             case StopGiven(devices=devices, by=by, program=program) if program.id != facts.me.id:
                 counts, who = message.counts, f"{by}, {program.text}"
                 facts.stops.note(program.id, devices, counts, who, message.when)

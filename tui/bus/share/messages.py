@@ -33,6 +33,7 @@ from ..bounds import (
 )
 from ..limits import Limits
 from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
+from ..notes import LineNote
 from ..program import Program
 from ..trace import FrameDirection
 from .failures import ErrorForm
@@ -204,10 +205,7 @@ class Told(Message, frozen=True):
 
 
 class PollWish(Message, frozen=True):
-    """The share of the line's time that a program's polls take, by device.
-
-    `trace` where it shows frames.
-    """
+    """The share of the line's time that polls take, by device; `trace` where frames are shown."""
 
     shares: Shares
     trace: bool
@@ -255,7 +253,7 @@ class Goodbye(Message, frozen=True):
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
     | Alive | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
-    | Facts | News | Goodbye | Armed
+    | Facts | News | Goodbye | Armed | LineNote
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

@@ -8,6 +8,7 @@ from contextlib import suppress
 
 from ..limits import CAUTIOUS
 from ..link import label
+from ..notes import LineNote
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
@@ -226,6 +227,11 @@ class ShareServer:
             case Told(device=device, text=text):
                 self._inside.facts.hear_text(device, text)
                 self._tell_all(message, but=client.program.id)
+            case LineNote(data=b""):
+                for note in self._inside.facts.notes.of(message.device, message.kind):
+                    client.say(note)
+            case LineNote():
+                self._inside.facts.notes.keep(message)
             case _ if not self._commanding.hears(client.program, message):
                 raise NoMessage(type(message).__name__)
 
@@ -240,6 +246,11 @@ class ShareServer:
         match message:
             case StopGiven():
                 self._tell_stop(message)
+            case LineNote(data=b""):
+                for note in self._inside.facts.notes.of(message.device, message.kind):
+                    self._inside.facts.notes.hear(note)
+            case LineNote():
+                pass  # kept already
             case _ if not self._commanding.hears(self._inside.facts.me, message):
                 self._tell_all(message)
 

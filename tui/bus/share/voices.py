@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from ..bounds import MOST_NOTICE, MOST_TEXT
 from ..leases import WriteLease
+from ..notes import LineNote
 from ..shared_facts import SharedFacts
 from .messages import (
     AnyMessage,
@@ -56,9 +57,13 @@ class ProgramVoice:
         """This program has something for all to read."""
         self._send(Told(device, text[:MOST_TEXT]))
 
+    def noted(self, note: LineNote) -> None:
+        """This program leaves a note, or asks for some."""
+        self._send(note)
+
 
 def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
-    """Send the holder of a line what this program has armed, commands or leaves alone."""
+    """Send the holder of a line what this program has armed, commands, leaves alone or noted."""
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
         send(Armed(device, lease.stamp, lease.until, lease.care))
@@ -68,6 +73,8 @@ def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
     for device, (program, why) in facts.hushed.items():
         if program == me:
             send(Hush(device, why))
+    for note in facts.notes.all:
+        send(note)
 
 
 def give_up_own(facts: SharedFacts, why: str) -> None:

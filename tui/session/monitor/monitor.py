@@ -25,6 +25,7 @@ from ..reading import Reading
 from .rates import SLOW_FACTOR, Rates, rates_of
 from .snapshot import Snapshot, stale_after
 from .trend import Trend, TrendPoint
+from .trend_notes import TrendNotes
 
 log = logging.getLogger(__name__)
 
@@ -74,6 +75,7 @@ class Monitor:
         self._stirs = 0
         self._learn_due = True
         self._trend = Trend(session.profile)
+        self._notes = TrendNotes(session.line.facts.notes, session.device, self._trend)
         self._listeners: tuple[Listener, ...] = ()
         self._worker: LineWorker | None = None
 
@@ -114,6 +116,7 @@ class Monitor:
         target cycle time in seconds.
         """
         self.stop()
+        self._notes.ask()
         self.period = period
         rates = rates_of(self.profile) if codes is None else Rates(tuple(dict.fromkeys(codes)))
         known = {*rates.fast, *rates.changing, *rates.slow}
@@ -271,7 +274,7 @@ class Monitor:
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot
-        self._trend.add(snapshot)
+        self._notes.add(self._trend.add(snapshot))
         self._hand_out(snapshot)
 
 

@@ -35,6 +35,7 @@ class Trend:
     """Keeps TREND_QUANTITIES of one drive for TREND_SECONDS."""
 
     def __init__(self, profile: Profile, points: Iterable[TrendPoint] = ()) -> None:
+        self._profile = profile
         self._points = deque(points)
         found = (profile.quantity(quantity) for quantity in TREND_QUANTITIES)
         self._codes = [parameter.code if parameter else None for parameter in found]
@@ -44,8 +45,24 @@ class Trend:
         """The trend of the last minutes, oldest first."""
         return tuple(self._points)
 
-    def add(self, snapshot: Snapshot) -> None:
-        """A failed cycle leaves a gap in the trend, never a repeated value."""
+    @property
+    def kind(self) -> str:
+        """What its values are: those of trends with the same kind belong together."""
+        parts = [f"trend {self._profile.id}"]
+        for code in self._codes:
+            one = self._profile[code] if code else None
+            parts.append(f"{one.code} {one.unit}" if one is not None else "-")
+        return ", ".join(parts)
+
+    def join(self, earlier: Iterable[TrendPoint]) -> None:
+        """Add points of another program, at their times."""
+        points = {one.time: one for one in (*earlier, *self._points)}
+        last = max(points, default=0.0)
+        times = sorted(one for one in points if one >= last - TREND_SECONDS)
+        self._points = deque(points[one] for one in times)
+
+    def add(self, snapshot: Snapshot) -> TrendPoint:
+        """Add a cycle; one that failed leaves a gap in the trend, never a repeated value."""
         readings = snapshot.readings
         values = tuple(
             trend_value(readings[code], snapshot.state)
@@ -53,9 +70,11 @@ class Trend:
             else None
             for code in self._codes
         )
-        self._points.append(TrendPoint(snapshot.time, values))
+        point = TrendPoint(snapshot.time, values)
+        self._points.append(point)
         while self._points[0].time < snapshot.time - TREND_SECONDS:
             self._points.popleft()
+        return point
 
 
 def trend_value(reading: Reading, state: DriveState) -> float | None:

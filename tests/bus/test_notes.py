@@ -1,0 +1,81 @@
+"""Notes for the next program on a line: kept for some time, within bounds, given to who asks."""
+
+from __future__ import annotations
+
+from tui.bus.notes import MOST_NOTE, MOST_NOTES, NOTES_KEPT, LineNote, Notes
+
+from .conftest import Share
+from .peer import PtyPeer, eventually, honest
+
+
+class Bench:
+    """Notes of a holder, with a clock that is moved on."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.notes = Notes(lambda: None, lambda: self.now)
+
+
+def test_a_note_is_kept_for_ten_minutes_and_no_longer() -> None:
+    bench = Bench()
+    bench.notes.keep(LineNote(1, "a", b"old"))
+    bench.now += NOTES_KEPT - 1
+    bench.notes.keep(LineNote(1, "a", b"new"))
+    assert [one.data for one in bench.notes.of(1, "a")] == [b"old", b"new"]
+    bench.now += 2
+    assert [one.data for one in bench.notes.of(1, "a")] == [b"new"]
+    assert NOTES_KEPT == 600
+
+
+def test_the_same_note_is_kept_once() -> None:
+    bench = Bench()
+    for _ in range(3):
+        bench.notes.keep(LineNote(1, "a", b"same"))
+    assert len(bench.notes.all) == 1
+
+
+def test_the_oldest_notes_make_room_for_new_ones() -> None:
+    bench = Bench()
+    for number in range(2 * MOST_NOTES // MOST_NOTE):
+        bench.notes.keep(LineNote(1, "a", number.to_bytes(4, "big") * (MOST_NOTE // 4)))
+    kept = bench.notes.all
+    assert sum(len(one.data) for one in kept) <= MOST_NOTES
+    assert len(kept) > 100
+    assert kept[-1].data.startswith((2 * MOST_NOTES // MOST_NOTE - 1).to_bytes(4, "big"))
+
+
+async def test_a_program_that_asks_finds_what_one_that_left_has_noted(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        lines.open("panel")
+        first = lines.open("watch")
+        await first.read(1, 100)
+        for data in (b"one", b"two"):
+            first.facts.notes.leave(LineNote(1, "trend", data))
+        first.facts.notes.leave(LineNote(2, "trend", b"other"))
+        first.close()
+        heard: list[bytes] = []
+        following = lines.open("watch")
+        await following.read(1, 100)
+        following.facts.notes.on_note(lambda note: heard.append(note.data))
+        following.facts.notes.ask(1, "trend")
+        eventually(lambda: heard == [b"one", b"two"])
+
+
+async def test_the_next_holder_of_the_line_has_the_notes_of_programs_that_stay(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, stays = lines.open("panel"), lines.open("watch")
+        await owner.read(1, 100)
+        await stays.read(1, 100)
+        stays.facts.notes.leave(LineNote(1, "trend", b"kept"))
+        owner.close()
+        await stays.read(1, 100)
+        third = lines.open("backup")
+        await third.read(1, 100)
+        heard: list[bytes] = []
+        third.facts.notes.on_note(lambda note: heard.append(note.data))
+        third.facts.notes.ask(1, "trend")
+        eventually(lambda: heard == [b"kept"])

@@ -1,0 +1,178 @@
+"""Trends and messages that a program leaves for the next one on the line."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import pytest
+
+from tui.bus.notes import LineNote
+from tui.bus.program import Program
+from tui.bus.share.messages import AnyMessage
+from tui.bus.share.voices import ProgramVoice
+from tui.bus.shared_facts import SharedFacts
+from tui.drive.profile import library
+from tui.session.event_notes import EVENTS_OF_LINE, EventNotes, LeftEvent
+from tui.session.events import Event, EventLog
+from tui.session.monitor.trend import TREND_SECONDS, Trend, TrendPoint
+from tui.session.monitor.trend_notes import NOTED_EVERY, TrendNotes
+
+ATV71 = library.load("atv71")
+
+
+class LineHolder:
+    """Gives programs the notes that they ask for, as the holder of their line does."""
+
+    def __init__(self) -> None:
+        self.facts = SharedFacts(Program("keeper", "keeper"))
+
+    def program(self, name: str) -> SharedFacts:
+        """The facts of one more program on the line."""
+        facts = SharedFacts(Program(name, name))
+
+        def send(message: AnyMessage) -> None:
+            assert isinstance(message, LineNote)
+            if message.data:
+                self.facts.notes.keep(message)
+            else:
+                for note in self.facts.notes.of(message.device, message.kind):
+                    facts.notes.hear(note)
+
+        facts.voice = ProgramVoice(facts, send)
+        return facts
+
+
+class TrendOf:
+    """The trend of drive 2 in one program."""
+
+    def __init__(self, holder: LineHolder, name: str, family: str = "atv71") -> None:
+        self.trend = Trend(library.load(family))
+        self.facts = holder.program(name)
+        self.notes = TrendNotes(self.facts.notes, 2, self.trend)
+
+    def add(self, *times: float) -> None:
+        """Points whose frequency is their time."""
+        for time in times:
+            point = TrendPoint(time, (time, None, 1.0))
+            self.trend.join([point])
+            self.notes.add(point)
+
+    @property
+    def times(self) -> list[float]:
+        return [one.time for one in self.trend.points]
+
+
+def test_the_next_program_has_the_points_at_their_times() -> None:
+    holder = LineHolder()
+    TrendOf(holder, "panel").add(100.0, 100.5, 101.0, 101.5, 102.0)
+    following = TrendOf(holder, "next")
+    following.notes.ask()
+    following.add(110.0)
+    assert following.times == [100.0, 100.5, 101.0, 101.5, 102.0, 110.0]
+    assert following.trend.points[0].values == (100.0, None, 1.0)
+
+
+def test_a_killed_program_has_left_all_but_the_last_two_seconds() -> None:
+    holder = LineHolder()
+    TrendOf(holder, "panel").add(*(100.0 + 0.5 * one for one in range(9)))
+    following = TrendOf(holder, "next")
+    following.notes.ask()
+    following.add(110.0)
+    assert following.times[-2] >= 104.0 - NOTED_EVERY
+    assert NOTED_EVERY <= 2.0
+
+
+def test_points_older_than_the_trend_are_left_out() -> None:
+    holder = LineHolder()
+    TrendOf(holder, "panel").add(100.0, 200.0, 300.0, 310.0)
+    following = TrendOf(holder, "next")
+    following.notes.ask()
+    following.add(150.0 + TREND_SECONDS)
+    assert following.times == [200.0, 300.0, 310.0, 150.0 + TREND_SECONDS]
+
+
+def test_a_trend_of_another_family_at_the_same_address_is_not_taken() -> None:
+    holder = LineHolder()
+    TrendOf(holder, "panel").add(100.0, 103.0)
+    following = TrendOf(holder, "next", "atv31")
+    following.notes.ask()
+    for note in holder.facts.notes.all:
+        following.facts.notes.hear(note)  # another part of the same program asked for it
+    following.add(110.0)
+    assert following.times == [110.0]
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [TrendPoint(math.nan, (1.0, 1.0, 1.0))],
+        [TrendPoint(100.0, (math.inf, 1.0, 1.0))],
+        [TrendPoint(100.0, (1.0,))],
+    ],
+)
+def test_points_that_cannot_be_drawn_are_left_out(points: list[TrendPoint]) -> None:
+    holder = LineHolder()
+    kind = Trend(ATV71).kind
+    holder.facts.notes.keep(LineNote(2, kind, b"no points"))
+    holder.facts.notes.keep(LineNote(2, kind, msgspec.msgpack.encode(points)))
+    following = TrendOf(holder, "next")
+    following.notes.ask()
+    following.add(110.0)
+    assert following.times == [110.0]
+
+
+def left(holder: LineHolder, name: str, *events: Event) -> None:
+    """Events that a program leaves."""
+    log = EventLog()
+    EventNotes(holder.program(name), log)
+    for event in events:
+        log.add(event.kind, event.text, event.device, event.wall)
+
+
+def found(holder: LineHolder, log: EventLog, name: str = "next") -> list[Event]:
+    """The events of a program that asks for those of others."""
+    EventNotes(holder.program(name), log).ask()
+    return list(log.events)
+
+
+def test_the_next_program_has_the_messages_with_their_time_drive_and_program() -> None:
+    holder, log = LineHolder(), EventLog(lambda: 50.0)
+    left(holder, "run", Event(40.0, 2, "stop", "Stopped."), Event(60.0, 3, "fault", "OCF."))
+    log.add("told", "Own.")
+    who = holder.program("run").me.text
+    assert found(holder, log) == [
+        Event(40.0, 2, "stop", f"Stopped. ({who})"),
+        Event(50.0, None, "told", "Own."),
+        Event(60.0, 3, "fault", f"OCF. ({who})"),
+    ]
+
+
+def test_a_message_of_another_program_is_not_the_newest() -> None:
+    holder, log = LineHolder(), EventLog(lambda: 50.0)
+    left(holder, "run", Event(60.0, 3, "fault", "OCF."))
+    assert found(holder, log)
+    assert log.newest is None
+    log.add("told", "Own.")
+    found(holder, log)
+    assert log.newest == Event(50.0, None, "told", "Own.")
+
+
+def test_a_message_of_several_programs_at_once_is_kept_once() -> None:
+    holder, log = LineHolder(), EventLog()
+    for name in ("panel", "watch"):
+        left(holder, name, Event(60.0, 3, "told", "Stopped."), Event(90.0, 3, "told", "Again."))
+    assert len(found(holder, log)) == 2
+
+
+def test_own_messages_do_not_come_back() -> None:
+    holder, log = LineHolder(), EventLog()
+    left(holder, "panel", Event(60.0, 3, "told", "Stopped."))
+    assert found(holder, log, "panel") == []
+
+
+def test_a_message_cannot_reach_the_terminal_with_control_characters() -> None:
+    holder, log = LineHolder(), EventLog()
+    data = msgspec.msgpack.encode(LeftEvent("run", Event(1.0, 2, "told", "\x1b[2J")))
+    holder.facts.notes.keep(LineNote(0, EVENTS_OF_LINE, data))
+    assert [one.text for one in found(holder, log)] == ["?[2J (run)"]

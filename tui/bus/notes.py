@@ -1,0 +1,104 @@
+"""Notes that programs leave for the next one on the line, for ten minutes."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+from msgspec import Meta
+
+from .bounds import DeviceId, Word
+from .facts_heard import heard, subscribed
+
+if TYPE_CHECKING:
+    from .facts_heard import LineVoice
+
+NOTES_KEPT = 600.0
+"""Seconds for which a note is kept."""
+MOST_NOTE, MOST_NOTES = 1 << 14, 1 << 21
+"""Bytes of one note, and of all that are kept; the oldest ones make room."""
+NOTE_COSTS = 200
+"""Bytes that a note takes beside its data, about."""
+
+
+class LineNote(msgspec.Struct, frozen=True, tag=True):
+    """Something about a device, 0 for the line, that the next program is to find.
+
+    Without data it asks for the notes of its device and kind.
+    """
+
+    device: DeviceId
+    kind: Word
+    data: Annotated[bytes, Meta(max_length=MOST_NOTE)] = b""
+
+
+NoteListener = Callable[[LineNote], None]
+
+
+class Notes:
+    """The notes of one line: in its holder those of all programs, elsewhere this program's own.
+
+    What they say is the business of who leaves them. May be used from any thread.
+    """
+
+    def __init__(
+        self, voice: Callable[[], LineVoice | None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """`voice` finds how other programs are told, None while there is no other."""
+        self._voice = voice
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._kept: dict[LineNote, float] = {}
+        """When each note came, the oldest first."""
+        self._size = 0
+        self._on_note: list[NoteListener] = []
+
+    def leave(self, note: LineNote) -> None:
+        """Leave a note from here."""
+        self.keep(note)
+        if (voice := self._voice()) is not None:
+            voice.noted(note)
+
+    def ask(self, device: int, kind: str) -> None:
+        """Have the notes of a device and kind given to whoever listens; they come one by one."""
+        if (voice := self._voice()) is not None:
+            voice.noted(LineNote(device, kind))
+
+    def on_note(self, listener: NoteListener) -> Callable[[], None]:
+        """Call `listener` with notes that were asked for, in the line's thread."""
+        return subscribed(self._on_note, listener)
+
+    def hear(self, note: LineNote) -> None:
+        """A note that was asked for has come."""
+        for listener in tuple(self._on_note):
+            heard(listener, note)
+
+    def keep(self, note: LineNote) -> None:
+        """Keep a note; one that is there already is kept once."""
+        now = self._clock()
+        with self._lock:
+            if note not in self._kept:
+                self._kept[note] = now
+                self._size += _size(note)
+            while self._size > MOST_NOTES or now - next(iter(self._kept.values())) > NOTES_KEPT:
+                old = next(iter(self._kept))
+                del self._kept[old]
+                self._size -= _size(old)
+
+    def of(self, device: int, kind: str) -> tuple[LineNote, ...]:
+        """The notes of a device and kind, the oldest first."""
+        return tuple(one for one in self.all if (one.device, one.kind) == (device, kind))
+
+    @property
+    def all(self) -> tuple[LineNote, ...]:
+        """All notes that are kept, the oldest first."""
+        with self._lock:
+            oldest = self._clock() - NOTES_KEPT
+            return tuple(one for one, when in self._kept.items() if when >= oldest)
+
+
+def _size(note: LineNote) -> int:
+    return len(note.data) + NOTE_COSTS

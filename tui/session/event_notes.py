@@ -1,0 +1,59 @@
+"""Messages about the drives of a line, left for the next program on it."""
+
+from __future__ import annotations
+
+import msgspec
+
+from tui.bus.notes import MOST_NOTE, LineNote
+from tui.bus.program import readable
+from tui.bus.shared_facts import SharedFacts
+
+from .events import Event, EventLog
+
+EVENTS_OF_LINE = "events"
+MOST_CHARACTERS = MOST_NOTE // 8
+SAME_WITHIN = 2.0
+"""Seconds in which several programs say the same of one thing that they all were told."""
+
+
+class LeftEvent(msgspec.Struct, frozen=True):
+    """An event with the program that has left it."""
+
+    program: str
+    event: Event
+
+
+class EventNotes:
+    """Leaves the events of one log, and puts into it those that other programs have left."""
+
+    def __init__(self, facts: SharedFacts, events: EventLog) -> None:
+        self._facts = facts
+        self._events = events
+        self._heard: list[Event] = []
+        events.left = self._leave
+        facts.notes.on_note(self._hear)
+
+    def ask(self) -> None:
+        """Ask for the events of other programs."""
+        self._facts.notes.ask(0, EVENTS_OF_LINE)
+
+    def _leave(self, event: Event) -> None:
+        left = LeftEvent(self._facts.me.text, event._replace(text=event.text[:MOST_CHARACTERS]))
+        self._facts.notes.leave(LineNote(0, EVENTS_OF_LINE, msgspec.msgpack.encode(left)))
+
+    def _hear(self, note: LineNote) -> None:
+        if (note.device, note.kind) != (0, EVENTS_OF_LINE):
+            return
+        left = msgspec.msgpack.decode(note.data, type=LeftEvent)
+        if left.program != self._facts.me.text and not self._is_known(left.event):
+            self._heard.append(left.event)
+            text = readable(f"{left.event.text} ({left.program})")
+            self._events.join(left.event._replace(text=text))
+
+    def _is_known(self, event: Event) -> bool:
+        """True if another program has left the same."""
+        return any(
+            (one.device, one.kind, one.text) == (event.device, event.kind, event.text)
+            and abs(one.wall - event.wall) < SAME_WITHIN
+            for one in self._heard
+        )

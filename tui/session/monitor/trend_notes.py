@@ -1,0 +1,63 @@
+"""The trend of a drive, left for the next program on the line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import msgspec
+
+from tui.bus.notes import LineNote, Notes
+
+from .trend import TREND_QUANTITIES, Trend, TrendPoint
+
+NOTED_EVERY = 2.0
+"""Seconds of the trend in one note, about: so many are lost with a program that is killed."""
+MOST_NOTED = 100
+"""Points in one note."""
+
+
+class TrendNotes:
+    """Leaves the points of one trend, and takes those that other programs have left.
+
+    Times are those of the machine's monotonic clock, which all its programs share.
+    """
+
+    def __init__(self, notes: Notes, device: int, trend: Trend) -> None:
+        self._notes = notes
+        self._device = device
+        self._trend = trend
+        self._kind = trend.kind
+        self._points: list[TrendPoint] = []
+        self._others: list[TrendPoint] = []
+        """Points of other programs that are not in the trend yet."""
+        self._end: Callable[[], None] | None = None
+
+    def ask(self) -> None:
+        """Ask for the trend of other programs; once is enough."""
+        if self._end is None:
+            self._end = self._notes.on_note(self._hear)
+            self._notes.ask(self._device, self._kind)
+
+    def add(self, point: TrendPoint) -> None:
+        """Leave a point, together with those around it."""
+        if self._others:
+            self._trend.join(self._others)
+            self._others = []
+        self._points.append(point)
+        if point.time - self._points[0].time >= NOTED_EVERY or len(self._points) >= MOST_NOTED:
+            data = msgspec.msgpack.encode(self._points)
+            self._points = []
+            self._notes.leave(LineNote(self._device, self._kind, data))
+
+    def _hear(self, note: LineNote) -> None:
+        if (note.device, note.kind) != (self._device, self._kind):
+            return
+        points = msgspec.msgpack.decode(note.data, type=list[TrendPoint])
+        self._others += [one for one in points if _is_whole(one)]
+
+
+def _is_whole(point: TrendPoint) -> bool:
+    """True if a trend can be drawn of it."""
+    numbers = [point.time, *(one for one in point.values if one is not None)]
+    return len(point.values) == len(TREND_QUANTITIES) and all(map(math.isfinite, numbers))
