@@ -20,6 +20,8 @@ NOTES_KEPT = 600.0
 """Seconds for which a note is kept."""
 MOST_NOTE, MOST_NOTES = 1 << 14, 1 << 21
 """Bytes of one note, and of all that are kept; the oldest ones make room."""
+NOTES_A_LOOK = 50
+"""Notes that a new holder is given at a time: they are not as urgent as a stop."""
 NOTE_COSTS = 200
 """Bytes that a note takes beside its data, about."""
 

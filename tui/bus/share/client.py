@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import OWNER_SILENT, NotShared
 from ..link import label
 from ..model import LineStatus
-from ..notes import LineNote
+from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
 from .messages import (
@@ -187,12 +187,14 @@ class ShareClient:
 
     async def _watch(self) -> None:
         """Notice an owner that does not answer any more, and one that does again."""
+        notes = iter(self._inside.facts.notes.all)
         for turn in itertools.count():
             await asyncio.sleep(WATCH_INTERVAL)
-            inside = self._inside
+            for note in itertools.islice(notes, NOTES_A_LOOK * self.taken_in):
+                self._tell(note)
             if turn % LOOKS_A_SIGN == 0:
                 self._tell(Alive())
-            wish = inside.pace.own, inside.around.trace.looked_at
+            wish = self._inside.pace.own, self._inside.around.trace.looked_at
             if wish != self._wish:
                 self._wish = wish
                 self._tell(PollWish(*wish))

@@ -63,7 +63,7 @@ class ProgramVoice:
 
 
 def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
-    """Send the holder of a line what this program has armed, commands, leaves alone or noted."""
+    """Send the holder of a line what this program has armed, commands or leaves alone."""
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
         send(Armed(device, lease.stamp, lease.until, lease.care))
@@ -73,8 +73,6 @@ def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
     for device, (program, why) in facts.hushed.items():
         if program == me:
             send(Hush(device, why))
-    for note in facts.notes.all:
-        send(note)
 
 
 def give_up_own(facts: SharedFacts, why: str) -> None:
