@@ -195,3 +195,26 @@ async def test_plain_stop_of_another_user_is_refused(
         monkeypatch.setattr("tui.bus.share.greeting.peer_of", lambda _: Peer(4711, 0))
         assert await asyncio.to_thread(give, lines, b" 3\n") == GIVEN
         assert len(heard) == 1
+
+
+async def test_a_client_stops_by_a_connection_of_its_own(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, client = lines.open("panel"), lines.open("run")
+        await client.read(1, 100)
+        due: list[tuple[int, ...]] = []
+        owner.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        heard = heard_by(client)
+        assert client.facts.voice is not None
+        await asyncio.to_thread(client.facts.voice.stop_directly, (1, 3))
+        eventually(lambda: due == [(1, 3)])
+        eventually(lambda: [one[0] for one in heard] == [(1, 3)])
+
+
+async def test_the_holder_of_a_line_has_nobody_else_to_stop_directly(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        owner = share(peer.path).open("panel")
+        await owner.read(1, 100)
+        assert owner.facts.voice is not None
+        owner.facts.voice.stop_directly((1,))
+        assert owner.facts.stops.plain == {}

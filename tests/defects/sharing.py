@@ -553,4 +553,22 @@ DEFECTS = (
         "The message line shows, as if it were new, what another program said minutes ago.",
         ("tests/session/test_trend_notes.py::test_a_message_of_another_program_is_not_the_newest",),
     ),
+    Defect(
+        "stop-waits-for-a-hung-loop",
+        "tui/session/command/under_way.py",
+        "            if not given and now > hangs_at:",
+        "            if given and now > hangs_at:",
+        "The line's loop hangs in the panel, and its stop key acts after 2 s.",
+        (
+            "tests/session/test_hung_loop.py::test_the_keeper_stops_drives_whose_stop_does_not_begin",
+        ),
+    ),
+    Defect(
+        "direct-stop-without-its-end",
+        "tui/bus/share/plain_stop.py",
+        'b"%s %s\\n" % (STOP_HEAD',
+        'b"%s %s" % (STOP_HEAD',
+        "The keeper waits for the end of the line, and no drive is stopped.",
+        ("tests/bus/test_plain_stop.py::test_a_client_stops_by_a_connection_of_its_own",),
+    ),
 )

@@ -39,6 +39,9 @@ class Told:
     def stop_given(self, devices: tuple[int, ...], by: str) -> None:
         self.said.append(("stop", devices, by))
 
+    def stop_directly(self, devices: tuple[int, ...]) -> None:
+        self.said.append(("directly", devices))
+
     def claim(self, device: int, take: bool) -> None:
         self.said.append(("claim", device, take))
 

@@ -23,6 +23,9 @@ class LineVoice(Protocol):
     def stop_given(self, devices: tuple[int, ...], by: str) -> None:
         """Devices are stopped from here."""
 
+    def stop_directly(self, devices: tuple[int, ...]) -> None:
+        """Have another holder of the line stop devices, around a loop that hangs here."""
+
     def claim(self, device: int, take: bool) -> None:
         """This program commands a device now, or no longer."""
 

@@ -130,7 +130,7 @@ class ShareClient:
     def _greet(self) -> None:
         facts = self._inside.facts
         # first: what is given from here on is told by itself, what was before in the greeting
-        facts.voice = ProgramVoice(facts, self._soon)
+        facts.voice = ProgramVoice(facts, self._soon, self._owner.socket)
         given, times = facts.stops.plain, facts.stops.late_times
         self._tell(Hello(VERSION, facts.me, label(self._inside.link), given, times))
 

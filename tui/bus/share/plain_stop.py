@@ -10,18 +10,22 @@ The shell's short way sends it before anything slow is imported: tui.cli.short_s
 from __future__ import annotations
 
 import asyncio
+import socket
 import uuid
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
+from pathlib import Path
 
 from ..program import Program
 from .messages import NoMessage, StopGiven
-from .place import Peer
+from .place import Peer, short_path
 
 STOP_HEAD = b"STOP"
 """Read as the length of a message, this is longer than any."""
 GIVEN = b"GIVEN\n"
 LONGEST_PLAIN_STOP = 1100
 """Bytes of such a line after its head; all addresses take fewer."""
+GIVEN_WITHIN = 0.5
+"""Seconds for each step of sending such a line."""
 _DEVICES = range(1, 248)
 _ADDRESSES = {str(device).encode(): device for device in _DEVICES}
 _ALL = [b"all"]
@@ -42,6 +46,16 @@ async def plain_stop(
     devices = stop_devices(line, known)
     program = Program(uuid.uuid4().hex, "stop", peer.pid if peer is not None else 0)
     return StopGiven(devices, (1,) * len(devices), _BY, program)
+
+
+def send_plain_stop(address: Path, devices: Iterable[int]) -> None:
+    """Send such a line to the socket of a holder, and await its answer. Raises OSError."""
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.settimeout(GIVEN_WITHIN)
+        with short_path(address) as short:
+            connection.connect(short)
+        connection.sendall(b"%s %s\n" % (STOP_HEAD, " ".join(map(str, devices)).encode()))
+        connection.recv(len(GIVEN))
 
 
 def stop_devices(line: bytes, known: Collection[int]) -> tuple[int, ...]:

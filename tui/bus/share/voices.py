@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 from ..bounds import MOST_NOTICE, MOST_TEXT
 from ..leases import WriteLease
@@ -18,12 +19,19 @@ from .messages import (
     StopGiven,
     Told,
 )
+from .plain_stop import send_plain_stop
 
 
 class ProgramVoice:
-    """Makes messages of it for whoever hands them on; `send` may be called in any thread."""
+    """Makes messages of it for whoever hands them on; `send` may be called in any thread.
 
-    def __init__(self, facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
+    `holder` is the socket of another program that holds the line.
+    """
+
+    def __init__(
+        self, facts: SharedFacts, send: Callable[[AnyMessage], None], holder: str = ""
+    ) -> None:
+        self._holder = holder
         self._facts = facts
         self._send = send
 
@@ -32,6 +40,11 @@ class ProgramVoice:
         me, stops = self._facts.me, self._facts.stops
         when = max(stops.times.get(one, 0.0) for one in devices) if devices else None
         self._send(StopGiven(devices, stops.of(me.id, devices), by[:MOST_TEXT], me, when))
+
+    def stop_directly(self, devices: tuple[int, ...]) -> None:
+        """Have another holder of the line stop devices; raises OSError, waits a moment at most."""
+        if self._holder:
+            send_plain_stop(Path(self._holder), devices)
 
     def claim(self, device: int, take: bool) -> None:
         """This program commands a device now, or no longer."""

@@ -6,14 +6,18 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from tui.bus.api import LineStatus, LineWorker
 from tui.bus.model import Timing
 from tui.drive.profile.schema import OrderId
 
+from ..carry_on import carried_on
 from ..drive import DriveSession
 from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
 
+HANGS_AFTER = 0.25
+"""Seconds in which a stop begins, unless the line's loop in this program hangs."""
 FIRST_FRAME_EACH = 0.3
 """Seconds that the first frame of each of several stops may take, on the slowest line."""
 SLOWEST_READS = 6
@@ -57,14 +61,19 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
     if not begun:
         return
     longest = timing.first_timeout
+    hangs_at = time.monotonic() + HANGS_AFTER
     begin_by = time.monotonic() + longest
     send_by = begin_by + SLOWEST_READS * longest + FIRST_FRAME_EACH * len(begun)
 
     def watch() -> None:
         left = list(begun)
+        given = False
         while left:
             time.sleep(STANDSTILL_POLL_INTERVAL)
             now = time.monotonic()
+            if not given and now > hangs_at:
+                given = True
+                carried_on(partial(_stop_directly, [one for one in left if not one.stop.begun]))
             for one in [each for each in left if each.is_lost(now > begin_by, now > send_by)]:
                 error = TimeoutError("its frame was not sent in time")
                 send_last(one.stop.session, one.stop.ordered, error)
@@ -72,3 +81,11 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
             left = [one for one in left if not (one.stop.sent or one.stop.over)]
 
     threading.Thread(target=watch, name="stops sent", daemon=True).start()
+
+
+def _stop_directly(hanging: Sequence[UnderWay]) -> None:
+    """Have the keeper of the line stop drives whose stops did not even begin here."""
+    if hanging:
+        line = hanging[0].stop.session.line
+        if (voice := line.facts.voice) is not None:
+            voice.stop_directly(tuple(one.stop.session.device for one in hanging))

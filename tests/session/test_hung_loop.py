@@ -1,0 +1,70 @@
+"""A stop while the loop of the line hangs in its program: the keeper carries it out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from tui.bus.api import LineWorker
+from tui.bus.fake import FakeLine
+from tui.drive.profile import library
+from tui.session.command import under_way
+from tui.session.command.stop import Stopper
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+
+from .test_handover import Told
+
+DRIVES = (1, 2, 3)
+
+
+class NeverBegins:
+    """Work that waits for a loop which hangs."""
+
+    def cancel(self) -> None:
+        """It never ends."""
+
+    def done(self) -> bool:
+        return False
+
+
+class HungLine(FakeLine):
+    """A line whose loop does not come to new work."""
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        return NeverBegins()
+
+
+def stopped(line: FakeLine) -> Told:
+    """What other programs hear of a stop of all drives."""
+    voice = line.facts.voice = Told()
+    stopper = Stopper(line, Journal())
+    stopper.stop([DriveSession(line, one, library.load("atv71")) for one in DRIVES])
+    return voice
+
+
+async def direct_stop(voice: Told) -> tuple[object, ...] | None:
+    """The first stop that goes around the loop, if one does within some seconds."""
+    for _ in range(500):
+        if found := [one for one in voice.said if one[0] == "directly"]:
+            return found[0]
+        await asyncio.sleep(0.01)
+    return None
+
+
+async def test_the_keeper_stops_drives_whose_stop_does_not_begin() -> None:
+    voice = stopped(HungLine({one: {} for one in DRIVES}))
+    assert await direct_stop(voice) == ("directly", DRIVES)
+
+
+async def test_a_loop_that_works_needs_no_other_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(under_way, "HANGS_AFTER", 3.0)
+    voice = stopped(FakeLine({one: {} for one in DRIVES}))
+    assert await direct_stop(voice) is None
+
+
+def test_a_loop_counts_as_hung_before_a_person_presses_again() -> None:
+    assert under_way.HANGS_AFTER <= 0.3
