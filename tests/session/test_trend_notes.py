@@ -9,7 +9,7 @@ import pytest
 
 from tui.bus.notes import LineNote
 from tui.bus.program import Program
-from tui.bus.share.messages import AnyMessage
+from tui.bus.share.messages import LENGTH, AnyMessage, packed, unpacked
 from tui.bus.share.voices import ProgramVoice
 from tui.bus.shared_facts import SharedFacts
 from tui.drive.profile import library
@@ -101,6 +101,18 @@ def test_a_trend_of_another_family_at_the_same_address_is_not_taken() -> None:
         following.facts.notes.hear(note)  # another part of the same program asked for it
     following.add(110.0)
     assert following.times == [110.0]
+
+
+def test_notes_of_a_profile_with_long_names_are_messages_too() -> None:
+    holder = LineHolder()
+    panel = TrendOf(holder, "panel")
+    panel.trend = Trend(library.load("atv71"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Trend, "kind", "x" * 1000)
+        panel.notes = TrendNotes(panel.facts.notes, 2, panel.trend)
+    panel.add(100.0, 103.0)
+    (note,) = holder.facts.notes.all
+    assert unpacked(packed(note)[LENGTH:]) == note
 
 
 @pytest.mark.parametrize(

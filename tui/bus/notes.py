@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 from msgspec import Meta
 
-from .bounds import DeviceId, Word
+from .bounds import DeviceId
 from .facts_heard import heard, subscribed
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 NOTES_KEPT = 600.0
 """Seconds for which a note is kept."""
+LONGEST_KIND = 200
+"""Characters of the kind of a note."""
 MOST_NOTE, MOST_NOTES = 1 << 14, 1 << 21
 """Bytes of one note, and of all that are kept; the oldest ones make room."""
 NOTES_A_LOOK = 50
@@ -33,7 +35,7 @@ class LineNote(msgspec.Struct, frozen=True, tag=True):
     """
 
     device: DeviceId
-    kind: Word
+    kind: Annotated[str, Meta(max_length=LONGEST_KIND)]
     data: Annotated[bytes, Meta(max_length=MOST_NOTE)] = b""
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from tui.bus.notes import LineNote, Notes
+from tui.bus.notes import LONGEST_KIND, LineNote, Notes
 
 from .trend import TREND_QUANTITIES, Trend, TrendPoint
 
@@ -27,7 +27,7 @@ class TrendNotes:
         self._notes = notes
         self._device = device
         self._trend = trend
-        self._kind = trend.kind
+        self._kind = trend.kind[:LONGEST_KIND]
         self._points: list[TrendPoint] = []
         self._others: list[TrendPoint] = []
         """Points of other programs that are not in the trend yet."""
