@@ -217,6 +217,23 @@ def test_after_three_deaths_the_programs_hold_the_line_themselves(programs: Exit
         assert turns(simulation)
 
 
+def test_a_program_without_a_keeper_says_so(
+    terminal_with: Callable[[list[str]], Terminal],
+) -> None:
+    with bench() as (_, line):
+        # where the lock of the line would lie
+        state = Path(os.environ["DRIVEPANEL_STATE"])
+        state.mkdir(exist_ok=True)
+        (state / "lines").write_text("no folder")
+        done = read(line)
+        assert done.returncode == 0
+        assert "holds the line itself, as its keeper has no folder" in done.stderr
+        panel = terminal_with([*DRIVEPANEL, line, "-d", "1"])
+        panel.wait_for("NO KEEPER")
+        panel.wait_for("holds the line itself")
+        assert keepers() == []
+
+
 def test_a_program_that_died_before_the_keeper_is_not_forgotten(
     programs: ExitStack, terminal_with: Callable[[list[str]], Terminal]
 ) -> None:

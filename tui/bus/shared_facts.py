@@ -42,6 +42,8 @@ class SharedFacts(FactsHeard):
         """Which program may write to which device."""
         self.notes = Notes(lambda: self.voice)
         """Notes for the next program on the line."""
+        self.unkept = ""
+        """Why this program holds the line in place of a keeper; empty where that is meant so."""
         self.gated = False
         """True on a line where nothing is written to a device that its program has not armed."""
         self.holder = HolderHeard()

@@ -82,6 +82,8 @@ class FrameSource:
             parts.append(f"1 of {len(self._app.panel_lines)} lines")
         if fleet is not None and (others := fleet.line.facts.others):
             parts.append(f"shared by {len(others) + 1}")
+        if fleet is not None and fleet.line.facts.unkept:
+            parts.insert(0, "NO KEEPER")  # first: a narrow terminal clips the end
         return " · ".join(parts)
 
     def _measured(self, now: float) -> float | None:

@@ -88,6 +88,8 @@ class LineOwner(Panel):
         self.show_line(one)
         self._look_after(fleet)
         fleet.event_notes.ask()
+        if unkept := opened.line.facts.unkept:
+            events.add("alarm", unkept)
         log.info("opened %s", opened.label)
         self.opening.connected = True
 

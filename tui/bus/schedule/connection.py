@@ -194,7 +194,7 @@ class Connection:
             task.result()
 
     def _say_opened(self, note: str) -> None:
-        self._say(LineStatus.CONNECTED, note)
+        self._say(LineStatus.CONNECTED, f"{self._dispatcher.facts.unkept} {note}".strip())
 
     def _say_of_owner(self, status: LineStatus, text: str, error: LineError | None) -> None:
         """What the program tells that owns the line; its requests are its own business."""

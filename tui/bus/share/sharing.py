@@ -40,6 +40,11 @@ NO_OWNER = 3.0
 """Seconds after which a locked line without an owner that answers is given up."""
 AWAY_FOR = 0.5
 """Seconds without an owner after which that is shown."""
+UNKEPT = (
+    "This program holds the line itself, as its keeper {why}. If this program is killed, nothing"
+    " stops the motors that it has started."
+)
+DIED_OFTEN = f"has died {MOST_DEATHS} times within a minute"
 HOLDER_AWAY = "The process that held the line has ended; the next one starts."
 KEEPER_STARTS = 20.0
 """Seconds that the keeper of a line has to listen: a small computer starts it slowly."""
@@ -92,6 +97,7 @@ class Sharing:
                 # without a lock nobody else can attach; a serial port stays locked by itself
                 log.error("the line cannot be shared: %s", error)
                 self._off = True
+                self._hold_unkept(f"has no folder that can be used ({error.strerror or error})")
                 return
             owner = owner_of(self._place)
             if taken and not self._give_to_keeper():
@@ -122,7 +128,10 @@ class Sharing:
         """Start the line's keeper, which has the lock from then on; False where it cannot be."""
         now = self._inside.clock()
         self._keeper_lives = bool
-        if not self._keeper or len(self._lock.deaths) >= MOST_DEATHS:
+        if not self._keeper:
+            return False
+        if len(self._lock.deaths) >= MOST_DEATHS:
+            self._hold_unkept(DIED_OFTEN)
             return False
         facts, place = self._inside.facts, self._place
         self._learn_of_before()
@@ -138,13 +147,21 @@ class Sharing:
             self._keeper_lives = start_keeper(order, self._lock.descriptor, started)
         except OSError as error:
             log.error("the keeper of the line could not be started: %s", error)
+            self._hold_unkept(f"could not be started ({error.strerror or error})")
             return False
         self._starts_until = now + KEEPER_STARTS
         self._lock.hand_over()
         return True
 
+    def _hold_unkept(self, why: str) -> None:
+        """This program holds a line that a keeper was to hold; a person is to know."""
+        if self._keeper:
+            self._inside.facts.unkept = text = UNKEPT.format(why=why)
+            self._inside.facts.hear_text(0, text)
+
     async def _attend(self, owner: Owner, say: Say) -> None:
         """Be a client of an owner until it ends."""
+        self._inside.facts.unkept = ""
         self._client = client = ShareClient(self._inside, owner, say)
         client.again = self._attached
         try:

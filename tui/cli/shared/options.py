@@ -183,6 +183,8 @@ def on_line(
         stack.callback(opened.close)
         if opened.line.facts.voice is not None and opened.line.facts.others:
             say(f"drivepanel: {opened.line.state.reason}", err=True)
+        if unkept := opened.line.facts.unkept:
+            say(f"drivepanel: {unkept}", err=True)
         stack.callback(guard_motors(opened))
         try:
             mind_the_line(opened)

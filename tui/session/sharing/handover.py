@@ -190,7 +190,7 @@ class Handover:
                 self._events.add("stop", f"Stop from {program.text} ({by}).", device)
 
     def _told(self, device: int, text: str) -> None:
-        self._events.add("stop", text, device)
+        self._events.add("stop", text, device or None)
 
     def _changed(self) -> None:
         """Tell who came to the line, who left it, and who commands what."""
