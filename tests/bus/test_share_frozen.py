@@ -92,17 +92,17 @@ async def test_a_client_that_has_nothing_to_say_is_kept(share: Share) -> None:
 async def test_a_disk_that_hangs_holds_up_neither_the_line_nor_its_signs_of_life(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    goes_on, hangs, utime = threading.Event(), threading.Event(), os.utime
+    goes_on, hangs, access = threading.Event(), threading.Event(), os.access
 
-    def hanging(*args: Any) -> None:
+    def hanging(*args: Any) -> bool:
         hangs.set()
         goes_on.wait(60)
-        utime(*args)
+        return access(*args)
 
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("watch"), lines.open("panel")
-        monkeypatch.setattr("tui.bus.share.listening.os.utime", hanging)
+        monkeypatch.setattr("tui.bus.share.listening.os.access", hanging)
         try:
             await come(hangs.is_set)
             reasons: list[str] = []

@@ -75,14 +75,14 @@ class Listening:
         self._tell()
 
     def keep(self) -> None:
-        """Begin to note a sign of life on the socket; a disk that hangs is not waited for."""
+        """Begin to look after the socket and the lock; a disk that hangs is not waited for."""
         if self._keeping is None or self._keeping.done():
             self._keeping = asyncio.create_task(self._keep(), name="socket of the line")
 
     async def _keep(self) -> None:
-        """Note it; make the socket anew where its folder was taken away.
+        """Make the socket anew if its folder was taken away, as at the end of a log-in.
 
-        As at the end of a log-in. The lock is taken anew where its file was taken away.
+        The lock is taken anew if its file was taken away.
         """
         if not await asyncio.to_thread(lambda: self._lock.stands):
             self._renew_lock()
@@ -94,14 +94,11 @@ class Listening:
             await self.start()
 
     def _note(self, path: Path) -> bool:
-        """Note a sign of life, and what was stopped since; False if the socket is gone."""
+        """Write down what was stopped since; False if the socket is gone."""
         if self._facts.stops.late_times != self._stopped:
             with suppress(OSError):
                 self._tell()
-        with suppress(OSError):
-            os.utime(path)  # the last sign of life, should this program be killed
-            return True
-        return False
+        return os.access(path, os.F_OK)
 
     def _renew_lock(self) -> None:
         with suppress(OSError):

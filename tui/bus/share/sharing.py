@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 
 from ..errors import NotShared
 from ..link import label
@@ -192,8 +189,10 @@ class Sharing:
         inside = self._inside
         if (before := owner_of(self._place)) is not None:
             inside.facts.stops.learn_times(before.stopped)
-            left = _left_of(before, inside.timing.late_reply, inside.clock())
-            self._quiet_until = max(self._quiet_until, inside.clock() + left)
+            now, until = inside.clock(), before.quiet_until
+            # one that was killed has left its socket: it may have sent until a moment ago
+            latest = inside.timing.late_reply if before.socket else min(until - now, LONGEST_QUIET)
+            self._quiet_until = max(self._quiet_until, now + latest)
 
     def _doubt_replies(self) -> None:
         """Trust no reply of a drive that may be one to an earlier request."""
@@ -242,16 +241,3 @@ class Sharing:
         me, stopped = self._inside.facts.me, self._inside.facts.stops.late_times
         last = Owner(VERSION, me, "", now + quiet if quiet > 0 else 0.0, stopped)
         self._lock.give_back(last if quiet > 0 or stopped else None)
-
-
-def _left_of(before: Owner, lateness: float, now: float) -> float:
-    """Seconds for which a reply to an owner that has ended may still come.
-
-    One that was killed has left its socket, touched by each sign of life.
-    """
-    if not before.socket:
-        return min(LONGEST_QUIET, max(0.0, before.quiet_until - now))
-    with suppress(OSError):
-        last = Path(before.socket).stat().st_mtime
-        return min(lateness, max(0.0, last + lateness + 1.0 - time.time()))
-    return lateness
