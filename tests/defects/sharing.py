@@ -334,6 +334,14 @@ DEFECTS = (
         (ENDS, STEP),
     ),
     Defect(
+        "killed-holder-not-doubted",
+        "tui/bus/share/sharing.py",
+        "inside.timing.late_reply if before.socket else",
+        "0.0 if before.socket else",
+        "The first value after a holder that was killed is the reply to its last request.",
+        (f"{ENDS}::test_one_that_comes_after_a_killed_owner_keeps_the_same_silence",),
+    ),
+    Defect(
         "any-reply-proves-the-step",
         "tui/bus/schedule/step_proof.py",
         "            if result.kind is ResultKind.REPLY:",
