@@ -48,6 +48,10 @@ ENDS = 30.0
 """Seconds in which a program has to end when it is told to."""
 LEFT = 15.0
 """Seconds that processes have to end after the last program."""
+ROUND_SETTING = "CHAOS_ROUND"
+"""Environment variable of all programs of a round, and of their keepers: its folder."""
+OUTSIDE = ("runuser", "unshare")
+"""Commands that wait for the program that they have started in another place."""
 TURNS = 0.5
 """Frequency in Hz above which a motor counts as turning."""
 
@@ -106,6 +110,10 @@ class ChaosLine:
             [(at, word) for at, word in told["commands"]], [Moment(*one) for one in told["moments"]]
         )
 
+    def plug(self, *, plugged: bool) -> None:
+        """Plug the adapter in, or unplug it: its pseudo-terminal goes with it."""
+        self._worker.ask(plugged=plugged)
+
     def close(self) -> None:
         """End the simulator."""
         self._worker.close()
@@ -152,7 +160,9 @@ def serve() -> None:
     threading.Thread(target=_look, args=(simulation, moments), daemon=True).start()
     answer: dict[str, Any] = {"line": text}
     print(json.dumps(answer), flush=True)
-    for _ in sys.stdin:
+    for text in sys.stdin:
+        if (plugged := json.loads(text).get("plugged")) is not None:
+            (simulation.replug if plugged else simulation.unplug)()
         print(json.dumps({"commands": line.commands, "moments": moments}), flush=True)
     simulation.stop()
 
@@ -166,6 +176,14 @@ def _look(simulation: Simulation, moments: list[tuple[float, float, bool, int]])
 
 
 _STARTING = threading.Lock()
+
+
+def inside(pid: int) -> int:
+    """The program that a command has started in another place, or the command itself."""
+    with suppress(OSError, IndexError):
+        while Path(f"/proc/{pid}/comm").read_text().strip() in OUTSIDE:
+            pid = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
+    return pid
 
 
 class ProgramOnTerminal:
@@ -222,7 +240,8 @@ class ProgramOnTerminal:
     def send(self, number: signal.Signals) -> None:
         """Send it a signal, if it lives."""
         if not self._ended.is_set():
-            os.kill(self.pid, number)
+            with suppress(ProcessLookupError):
+                os.kill(inside(self.pid), number)
 
     def withstands(self, number: signal.Signals) -> bool:
         """True if it blocks, catches or ignores a signal, once it has started.
@@ -263,12 +282,15 @@ class ProgramOnTerminal:
 class Observer:
     """`watch` of both drives, with the time at which each of its lines came."""
 
-    def __init__(self, line: str, folder: Path, environment: dict[str, str]) -> None:
+    def __init__(
+        self, line: str, folder: Path, environment: dict[str, str], before: Sequence[str] = ()
+    ) -> None:
+        """`before` are the words that start a program in another place."""
         self._errors = folder / "observer"
         codes = ("RFR", "ACC", "DEC", COUNTER, "-d", "1", "-d", "2", "-p", "atv71")
         with self._errors.open("w") as errors:
             self._process = subprocess.Popen(
-                [*DRIVEPANEL, "watch", line, *codes, "--every", str(EVERY), "--json"],
+                [*(before or DRIVEPANEL), "watch", line, *codes, "--every", str(EVERY), "--json"],
                 env=os.environ | environment,
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True,
             )  # fmt: skip
@@ -293,7 +315,7 @@ class Observer:
 
     def good(self) -> list[float]:
         """When it had good values of drive 2, which never trips."""
-        return [at for at, one in self.lines if one["device"] == 2 and _is_good(one)]
+        return [at for at, one in self.lines if one.get("device") == 2 and _is_good(one)]
 
     def close(self) -> None:
         """End it."""
@@ -340,9 +362,9 @@ def _seconds(text: str) -> float:
     return datetime.fromisoformat(text).timestamp()
 
 
-def processes_of(state: Path) -> list[int]:
-    """Programs and keepers that live with this state folder."""
-    wanted, found = f"DRIVEPANEL_STATE={state}".encode(), []
+def processes_of(folder: Path) -> list[int]:
+    """Programs and keepers of the round that has this folder."""
+    wanted, found = f"{ROUND_SETTING}={folder}".encode(), []
     for place in Path("/proc").glob("[0-9]*/environ"):
         try:
             if wanted in place.read_bytes().split(b"\0") and is_running(int(place.parts[2])):
@@ -361,7 +383,8 @@ class Stage:
         self.state = self.folder / "state"
         self.programs: list[ProgramOnTerminal] = []
         self.observer: Observer | None = None
-        self._environment = {
+        self.environment = {
+            ROUND_SETTING: str(self.folder),
             "DRIVEPANEL_STATE": str(self.state),
             "DRIVEPANEL_CONFIG": str(self.folder / "config"),
             "XDG_RUNTIME_DIR": str(self.folder),
@@ -369,16 +392,19 @@ class Stage:
         }
         self.line = self._open.enter_context(closing(ChaosLine(baud, self.folder)))
 
-    def observe(self) -> None:
+    def observe(self, *before: str) -> None:
         """Start the observer; returns once it has values."""
-        observer = Observer(self.line.text, self.folder, self._environment)
+        observer = Observer(self.line.text, self.folder, self.environment, before)
         self.observer = self._open.enter_context(closing(observer))
-        wait_until(lambda: len(observer.good()) > 1, "the observer has values")
+        try:
+            wait_until(lambda: len(observer.good()) > 1, "the observer has values")
+        except AssertionError as error:
+            raise AssertionError(f"{error}: {observer.said}{observer.lines[-1:]}") from None
 
     def start(self, *arguments: str, module: str = "tui") -> ProgramOnTerminal:
         """Start a program; the LINE takes the place of `LINE`."""
         words = [self.line.text if one == "LINE" else one for one in arguments]
-        program = ProgramOnTerminal(words, self._environment, module)
+        program = ProgramOnTerminal(words, self.environment, module)
         self.programs.append(self._open.enter_context(closing(program)))
         return program
 
@@ -408,7 +434,7 @@ class Stage:
 
     def send(self, pid: int, number: signal.Signals) -> None:
         """Send a keeper a signal, if it still lives."""
-        if pid in processes_of(self.state):
+        if pid in processes_of(self.folder):
             with suppress(ProcessLookupError):
                 os.kill(pid, number)
 
@@ -425,7 +451,7 @@ class Stage:
     def left(self) -> int:
         """How many processes are left 15 s later; they are killed."""
         end = time.monotonic() + LEFT
-        while (found := processes_of(self.state)) and time.monotonic() < end:
+        while (found := processes_of(self.folder)) and time.monotonic() < end:
             time.sleep(0.2)
         for pid in found:
             with suppress(ProcessLookupError):

@@ -67,10 +67,10 @@ def move(group: Path) -> None:
 
 
 @contextmanager
-def slow_group() -> Iterator[Path | None]:
+def slow_group(name: str = "") -> Iterator[Path | None]:
     """A control group with the quota; None if this user, or this system, can make none."""
     for folder in GROUPS:
-        group = Path(folder, f"drivepanel-{os.getpid()}")
+        group = Path(folder, f"drivepanel-{os.getpid()}{name}")
         with suppress(OSError):
             group.mkdir()
             try:

@@ -38,7 +38,7 @@ SMALL = {
 """The options with which each ends within a minute."""
 LARGE = {"instructions", "link", "panel", "share", "truth"}
 """Those that cannot be made small; they are run by hand."""
-NO_BENCHMARK = {"broken_panel", "faulty_line", "link_drive"}
+NO_BENCHMARK = {"broken_panel", "chaos_plant", "faulty_line", "in_place", "link_drive"}
 """Programs that benchmarks start."""
 
 

@@ -18,6 +18,7 @@ from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER
 from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
 from tui.bus.share.keeping import KeeperOrder
+from tui.bus.share.messages import VERSION
 from tui.bus.share.sharing import KEEPER_STARTS
 from tui.session.connect.share_place import this_program
 from tui.session.event_notes import EventNotes
@@ -106,6 +107,8 @@ class Keeper:
 def main() -> None:
     """Keep the line that standard input describes; the lock is inherited."""
     order = msgspec.json.decode(sys.stdin.buffer.read(), type=KeeperOrder)
+    if order.version != VERSION:
+        sys.exit("the program that starts this keeper has another version")  # it holds the line
     with open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), sys.stdin.fileno())
     signal.pthread_sigmask(signal.SIG_SETMASK, ())

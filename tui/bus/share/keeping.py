@@ -9,9 +9,9 @@ from time import monotonic, sleep
 
 import msgspec
 
-from ..bounds import Text
+from ..bounds import Number, Text
 from ..program import KEEPER, Program
-from .messages import LENGTH, Goodbye, packed
+from .messages import LENGTH, VERSION, Goodbye, packed
 from .place import Owner, OwnerLock, SharePlace, short_path
 
 
@@ -26,6 +26,8 @@ class KeeperOrder(msgspec.Struct, frozen=True):
     group: int | None
     before: tuple[Program, ...] = ()
     """Programs on the line until now; one that does not come back is gone."""
+    version: Number = VERSION
+    """Of the messages of the program that starts it."""
 
     @classmethod
     def of(cls, place: SharePlace, line: str, before: tuple[Program, ...]) -> KeeperOrder:

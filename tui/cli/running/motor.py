@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineError
+from tui.session.command.stop_report import Phase
 from tui.session.monitor.timeout import left_alone_text
 from tui.session.starts.keeper import StartKeeper
 
@@ -21,6 +22,7 @@ from ..commands.orders import (
     watch_of,
     watched,
 )
+from ..commands.stop import ended
 from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
 from ..shared.drive_status import fault_text
 from ..shared.errors import DRIVE_REFUSED, ENDED_AFTER_WRITING, REFUSED_HERE, Failure
@@ -198,10 +200,6 @@ class Run:
 
         Raises Failure where the drive answers and does not stop.
         """
-        from tui.session.command.stop_report import Phase
-
-        from ..commands.stop import ended
-
         session, stopper, failed = self.console.session, self.fleet.stopper, 0
         self.telling.tell("stopping", f"stopping ({self.ending.why or 'the run has ended'})")
         while True:
