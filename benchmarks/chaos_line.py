@@ -311,7 +311,7 @@ class Observer:
     @property
     def was_killed(self) -> bool:
         """True if it did not end in order."""
-        return self._process.returncode == -signal.SIGKILL
+        return self._process.returncode in (-signal.SIGKILL, 128 + signal.SIGKILL)
 
     def good(self) -> list[float]:
         """When it had good values of drive 2, which never trips."""
@@ -319,7 +319,8 @@ class Observer:
 
     def close(self) -> None:
         """End it."""
-        self._process.terminate()
+        with suppress(ProcessLookupError):
+            os.kill(inside(self._process.pid), signal.SIGTERM)
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(ENDS)
         self._process.kill()

@@ -229,8 +229,8 @@ DEFECTS = (
     Defect(
         "motor-of-a-living-program-left",
         "tui/session/sharing/guardian.py",
-        "absent = pids_absent(self._line.facts) | {program.pid}",
-        "absent = pids_absent(self._line.facts) - {program.pid}",
+        "absent = pids_absent(self._line.facts) | {program.process}",
+        "absent = pids_absent(self._line.facts) - {program.process}",
         "A recorder feeds the motor of a frozen program for ever.",
         ("tests/session/test_guardian.py",),
     ),

@@ -339,7 +339,7 @@ async def test_the_motor_of_a_frozen_program_may_be_taken_over(bench: Bench) -> 
     await frozen(bench)
     await come(lambda: bench.says("unless it comes back"))
     # as an attached panel finds it
-    (found,) = bench.starts.all_found(label(bench.line.link), {LIVING})
+    (found,) = bench.starts.all_found(label(bench.line.link), {FROZEN.process})
     assert bench.starts.all_found(label(bench.line.link)) == []
     taken = bench.starts.taken_over(found, label(bench.line.link), program="panel")
     await asyncio.to_thread(bench.starts.begin, taken)

@@ -671,3 +671,16 @@ def test_a_program_of_another_user_that_proc_does_not_show_lives(
 
     monkeypatch.setattr(os, "kill", nobody)
     assert not Processes(tmp_path).lives("", 4711, "100")
+
+
+def test_record_of_another_pid_namespace_is_kept_until_its_program_ends(tmp_path: Path) -> None:
+    """Its process id says nothing here: a container has its own."""
+    starts = Starts(tmp_path, processes=MadeUp())
+    there = replace(start(pid=ENDED), space="pid:[1]")
+    starts.begin(there)
+    assert starts.is_alive(there)
+    starts.end(LINE, there.device)
+    assert starts.close(PATIENCE)
+    assert starts.found(LINE, there.device) is None
+    assert starts.found(LINE, there.device, {there.process}) == there
+    assert starts.found(LINE, there.device, {("pid:[2]", ENDED)}) is None

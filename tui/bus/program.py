@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+import os
+from functools import cache
+
 import msgspec
 
 from .bounds import Number, ProgramId, Word
 
 KEEPER = "keeper"
 """The name of the process that holds a line for the programs on it."""
+
+
+ProcessKey = tuple[str, int]
+"""A PID namespace and a process id in it: each container has a process 1."""
+
+
+@cache
+def pid_namespace() -> str:
+    """The PID namespace of this program; empty if the system has none."""
+    try:
+        return os.readlink("/proc/self/ns/pid")
+    except OSError:
+        return ""
 
 
 LONGEST_NAME, LONGEST_SAID = 40, 500
@@ -31,6 +47,13 @@ class Program(msgspec.Struct, frozen=True):
     user: Word = ""
     where: Word = ""
     """Its terminal; empty where that is unknown."""
+    space: Word = ""
+    """Its PID namespace, in which `pid` counts; empty for the one of the reader."""
+
+    @property
+    def process(self) -> ProcessKey:
+        """Its process, among those of all containers."""
+        return self.space or pid_namespace(), self.pid
 
     @property
     def text(self) -> str:

@@ -23,7 +23,7 @@ import msgspec
 from msgspec import Meta
 
 from ..bounds import MonotonicTime, Number, StopTimes, Text
-from ..program import KEEPER, Program
+from ..program import KEEPER, Program, pid_namespace
 
 log = logging.getLogger(__name__)
 
@@ -260,7 +260,9 @@ def short_path(path: Path) -> Iterator[str]:
 
 
 def has_ended(program: Program) -> bool:
-    """Whether a program of this machine surely is no more."""
+    """Whether a program of this machine surely is no more; in doubt it lives."""
+    if program.process[0] != pid_namespace():
+        return False
     try:
         os.kill(program.pid, 0)
     except ProcessLookupError:

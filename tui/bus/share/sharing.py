@@ -9,7 +9,7 @@ from collections.abc import Callable
 from ..errors import NotShared
 from ..link import label
 from ..model import LineStatus
-from ..program import KEEPER, Program
+from ..program import KEEPER, Program, pid_namespace
 from ..schedule.inside import LineInside, Say, SharedLine
 from .client import OwnerAway, ShareClient
 from .keeping import KeeperOrder
@@ -136,7 +136,7 @@ class Sharing:
         order = KeeperOrder.of(place, label(self._inside.link), before)
 
         def started(pid: int) -> None:
-            keeper = Program(STARTING, KEEPER, pid)
+            keeper = Program(STARTING, KEEPER, pid, space=pid_namespace())
             stopped = facts.stops.late_times
             self._lock.tell(Owner(VERSION, keeper, "", self._quiet_until, stopped))
 

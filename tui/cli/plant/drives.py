@@ -232,7 +232,8 @@ def _is_orphan(session: DriveSession) -> bool:
 
     facts = session.line.facts
     commander = facts.commanders.get(session.device)
-    gateways = {one.pid for one in facts.others if one.name == GATEWAY and one.id != commander}
+    others = (one for one in facts.others if one.name == GATEWAY and one.id != commander)
+    gateways = {one.process for one in others}
     absent = pids_absent(facts) | gateways
     record = Starts().found(session.line_text, session.device, absent)
     return record is not None and not record.left_running

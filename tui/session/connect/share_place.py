@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import NotShared
-from tui.bus.program import Program
+from tui.bus.program import Program, pid_namespace
 
 from ..paths import state_folder
 from .line_key import line_key
@@ -88,7 +88,7 @@ def this_program(name: str) -> Program:
     # as others take it: the environment holds any bytes
     texts = (text.encode(errors="replace").decode()[:200] for text in (name, user, _terminal()))
     shown, user, terminal = texts
-    return Program(uuid.uuid4().hex, shown, os.getpid(), user, terminal)
+    return Program(uuid.uuid4().hex, shown, os.getpid(), user, terminal, pid_namespace())
 
 
 def _terminal() -> str:

@@ -204,7 +204,7 @@ class Guardian:
         self._tell(device, f"{program.text} {what}: its motor is stopped{unless}.")
 
     def _is_back(self, program: Program) -> bool:
-        return any(one.pid == program.pid for one in self._line.facts.programs)
+        return any(one.process == program.process for one in self._line.facts.programs)
 
     async def _is_left(self, device: int, program: Program) -> bool:
         """Whether no living program but that one has the motor's start on record."""
@@ -229,10 +229,11 @@ class Guardian:
 
     def _is_of(self, record: StartRecord, program: Program) -> bool:
         """True for a start by this program; one before a reboot had its number by chance."""
-        return record.pid == program.pid and self._starts.processes.is_same_boot(record.boot_id)
+        same = record.process == program.process
+        return same and self._starts.processes.is_same_boot(record.boot_id)
 
     def _found(self, program: Program) -> list[StartRecord]:
-        absent = pids_absent(self._line.facts) | {program.pid}
+        absent = pids_absent(self._line.facts) | {program.process}
         text = label(self._line.link)
         if self._is_connected():
             self._key = line_key(text)

@@ -169,7 +169,7 @@ class Handover:
         """
         device, end = session.device, self._clock.monotonic() + TAKEN_WITHIN
         while starts.holds(device) and self._clock.monotonic() < end:
-            if await asyncio.to_thread(starts.started_by, session, program.pid):
+            if await asyncio.to_thread(starts.started_by, session, program.process):
                 starts.give_away(session)
                 session.note_given()
                 return

@@ -115,7 +115,7 @@ def _make_shared(folder: Path) -> None:
 
 def _name(record: StartRecord) -> str:
     """A name of its own for each program's starts of a drive, with something to read in it."""
-    origin = (record.line, record.device, record.boot_id, record.pid, record.started)
+    origin = (record.line, record.device, record.boot_id, *record.process, record.started)
     digest = hashlib.sha256(repr(origin).encode()).hexdigest()[:12]
     readable = re.sub(r"[^A-Za-z0-9]+", "-", record.line).strip("-")[:40]
     return f"{readable}-{record.device}-{digest}{ENDING}"

@@ -17,6 +17,7 @@ from .starts import Starts
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
+    from tui.bus.program import ProcessKey
     from tui.bus.shared_facts import SharedFacts
     from tui.drive.profile.profile import Profile
 
@@ -153,9 +154,9 @@ class StartKeeper:
         record = self._begun.get(device)
         return record is not None and not record.left_running
 
-    def started_by(self, session: Startable, pid: int) -> bool:
+    def started_by(self, session: Startable, process: ProcessKey) -> bool:
         """Whether a program has the motor on record as its own; reads files."""
-        return self._starts.is_on_record(session.line_text, session.device, pid)
+        return self._starts.is_on_record(session.line_text, session.device, process)
 
     def give_away(self, session: Startable) -> None:
         """Another program looks after the motor from now on."""
@@ -198,7 +199,7 @@ class StartKeeper:
         record = self._left.get(session.device)
         if record is None or session.device not in self._silent:
             return record
-        back = any(one.pid == record.pid for one in session.line.facts.programs)
+        back = any(one.process == record.process for one in session.line.facts.programs)
         return None if back else record
 
     def take_over(self, session: Startable) -> None:
@@ -225,10 +226,10 @@ class StartKeeper:
         self._starts.close()
 
 
-def pids_absent(facts: SharedFacts) -> frozenset[int]:
-    """The numbers of programs that have left the line, frozen ones among them."""
-    here = {one.pid for one in facts.programs}
-    return frozenset({one.pid for one in facts.departed} - here)
+def pids_absent(facts: SharedFacts) -> frozenset[ProcessKey]:
+    """The processes of programs that have left the line, frozen ones among them."""
+    here = {one.process for one in facts.programs}
+    return frozenset({one.process for one in facts.departed} - here)
 
 
 class NothingToTakeOver(DriveError):

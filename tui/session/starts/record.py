@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Literal
 
+from tui.bus.program import pid_namespace
+
 if TYPE_CHECKING:
+    from tui.bus.program import ProcessKey
+
     from ..connect.identify import DriveIdentity
 
 
@@ -39,6 +43,14 @@ class StartRecord:
     """True if the profile was a guess; it names the drive's family to nobody."""
     acts_after: float | None = None
     """Seconds of the drive's communication timeout, if it was known."""
+
+    space: str = ""
+    """The PID namespace of `pid`; empty in older records, and if the system has none."""
+
+    @property
+    def process(self) -> ProcessKey:
+        """The process of its program, among those of all containers."""
+        return self.space or pid_namespace(), self.pid
 
     @property
     def begun(self) -> datetime | None:

@@ -12,10 +12,12 @@ import os
 import threading
 from collections import deque
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
+
+from tui.bus.program import pid_namespace
 
 from ..clock import REAL_CLOCK, Clock
 from ..connect.known_lines import remembered_text
@@ -24,29 +26,17 @@ from .errors import OVERTAKEN, StartNotRecorded, StartOvertaken
 from .folders import start_records
 from .processes import Processes
 from .record import StartRecord
+from .task import DriveKey, StartTask
 
 if TYPE_CHECKING:
+    from tui.bus.program import ProcessKey
+
     from ..connect.identify import DriveIdentity
 
 log = logging.getLogger(__name__)
 
 START_PATIENCE = 5.0
 """Seconds that begin() waits for the disk; a slow memory card flushes in two."""
-
-DriveKey = tuple[str, int]
-"""A line's text and a device: one program calls one line by one text."""
-
-
-@dataclass(eq=False, slots=True)
-class _Task:
-    """Work for the disk: a record to write, or with None those of a drive to remove."""
-
-    drive: DriveKey
-    record: StartRecord | None
-    done: threading.Event = field(default_factory=threading.Event)
-    trouble: str = ""
-    void: bool = False
-    """Nobody waits for it any more, or a stop came first: it is not to be put in its place."""
 
 
 class Starts:
@@ -67,8 +57,8 @@ class Starts:
         self.processes = processes or Processes()
         self._changed = threading.Condition()
         """Guards all below; never held over disk work."""
-        self._waiting: deque[_Task] = deque()
-        self._current: _Task | None = None
+        self._waiting: deque[StartTask] = deque()
+        self._current: StartTask | None = None
         self._thread: threading.Thread | None = None
         self._sent: dict[DriveKey, float] = {}
         """Since when a standstill says that the motor stopped; never while a start is under way."""
@@ -108,6 +98,7 @@ class Starts:
             wall=datetime.now().astimezone().isoformat(timespec="milliseconds"),
             guessed=guessed,
             acts_after=acts_after,
+            space=pid_namespace(),
         )
 
     def taken_over(
@@ -118,6 +109,7 @@ class Starts:
         started = self.processes.started(pid) or ""
         return replace(
             found, line=line, boot_id=boot_id, pid=pid, started=started, program=program,
+            space=pid_namespace(),
             left_running=left_running,
         )  # fmt: skip
 
@@ -127,7 +119,7 @@ class Starts:
         Waits for the disk, at most `patience` seconds. Raises StartNotRecorded where the run is
         to be refused, StartOvertaken where a stop came meanwhile.
         """
-        task = _Task((record.line, record.device), record)
+        task = StartTask((record.line, record.device), record)
         with self._changed:
             before = self._sent.get(task.drive, -math.inf)
             self._sent[task.drive] = math.inf
@@ -178,28 +170,30 @@ class Starts:
                     task.done.set()
             self._take_away(drive)
 
-    def found(self, line: str, device: int, absent: Collection[int] = ()) -> StartRecord | None:
+    def found(
+        self, line: str, device: int, absent: Collection[ProcessKey] = ()
+    ) -> StartRecord | None:
         """The last start of a drive if its program ended, however the line was typed.
 
         None where a living program, this one too, has a start of this drive on record.
         """
         return next((one for one in self.all_found(line, absent) if one.device == device), None)
 
-    def all_found(self, line: str, absent: Collection[int] = ()) -> list[StartRecord]:
+    def all_found(self, line: str, absent: Collection[ProcessKey] = ()) -> list[StartRecord]:
         """The drives of a line that programs which ended have started, by device. Reads files.
 
-        `absent` are numbers of programs that count as ended: they left the line, or are frozen.
+        `absent` are processes of programs that count as ended: they left the line, or are frozen.
         """
         key = line_key(line)
         going = self._going(key)
         here = self._of(line)
-        alive = {one.device for one in here if one.pid not in absent and self.is_alive(one)}
+        alive = {one.device for one in here if one.process not in absent and self.is_alive(one)}
         newest = {one.device: one for one in here if one.device not in alive | going}
         return [newest[device] for device in sorted(newest)]
 
-    def is_on_record(self, line: str, device: int, pid: int) -> bool:
+    def is_on_record(self, line: str, device: int, process: ProcessKey) -> bool:
         """Whether a program has a start of a drive on record. Reads files."""
-        return any(one.device == device and one.pid == pid for one in self._of(line))
+        return any(one.device == device and one.process == process for one in self._of(line))
 
     def own(self, line: str, device: int) -> StartRecord | None:
         """The start of a drive that this very program has on record. Reads files."""
@@ -240,9 +234,9 @@ class Starts:
         for task in [task for task in self._waiting if task.drive == drive]:
             if task.record is None:
                 self._waiting.remove(task)  # the new one does its work
-        self._add(_Task(drive, None))
+        self._add(StartTask(drive, None))
 
-    def _add(self, task: _Task) -> None:
+    def _add(self, task: StartTask) -> None:
         self._waiting.append(task)
         if self._thread is not None:
             return
@@ -272,7 +266,7 @@ class Starts:
                 task.trouble = task.trouble or trouble
                 task.done.set()
 
-    def _trouble_with(self, task: _Task) -> str:
+    def _trouble_with(self, task: StartTask) -> str:
         """Do a task; what went wrong, or nothing."""
         try:
             if task.record is None:
@@ -303,8 +297,10 @@ class Starts:
         )
 
     def _own(self, record: StartRecord) -> bool:
-        return record.pid == os.getpid() and self.is_alive(record)
+        return record.process == (pid_namespace(), os.getpid()) and self.is_alive(record)
 
     def is_alive(self, record: StartRecord) -> bool:
-        """Whether the program of a start lives; in doubt it does."""
+        """Whether the program of a start lives; in doubt it does, as in another container."""
+        if record.process[0] != pid_namespace():
+            return self.processes.is_same_boot(record.boot_id)
         return self.processes.lives(record.boot_id, record.pid, record.started)
