@@ -21,7 +21,7 @@ from pathlib import Path
 
 from pymodbus.client import ModbusTcpClient
 
-from benchmarks.chaos_line import ProgramOnTerminal, Stage, processes_of
+from benchmarks.chaos_line import LineRecord, ProgramOnTerminal, Stage, processes_of
 from benchmarks.chaos_round import FROZEN, REPORTED, Outcome, Round
 from benchmarks.in_place import LEFT_ALONE, LOGGED_IN
 from benchmarks.plant_box import GROUP, LINGERS, PLACE, SERVICE, USERS, NoBox, plant_box
@@ -148,9 +148,15 @@ class PlantStage(Stage):
         own = {"DRIVEPANEL_SHARE_GROUP": GROUP, "DRIVEPANEL_SHARE_FOLDER": str(self.group)}
         self.environment |= own
 
-    def start_in(self, place: str, user: str, *arguments: str) -> ProgramOnTerminal:
-        """Start a program in another place."""
-        return self.start(place, user, *arguments, module="benchmarks.in_place")
+    def start_in(self, *arguments: str) -> ProgramOnTerminal:
+        """Start a program in another place: place, user, and its own arguments."""
+        return self.start(*arguments, module="benchmarks.in_place")
+
+    def start_keeper(self, *place: str) -> None:
+        """Have a command start the keeper, here or in another place."""
+        words = ("read", "LINE", "RFR", "-d", "1", "-p", "atv71")
+        starter = self.start_in(*place, *words) if place else self.start(*words)
+        assert starter.ends_within(PATIENCE), "read does not end"
 
     def run_motor_in(self, place: str, user: str) -> ProgramOnTerminal:
         """Start `run` in another place; returns once its motor was ordered to run."""
@@ -314,16 +320,17 @@ class LoggedOut(_InBox):
 class ForeignKeeper(_InBox):
     """The keeper is another user's, or in another PID namespace; `run` cannot kill it."""
 
+    _frozen = 0.0
+
     def _begin(self) -> None:
         stage = self._stage
         place = "namespace" if "namespace" in self._end else "user"
-        first = "root" if place == "namespace" else f"user{(self._outcome.number + 1) % USERS}"
+        first = f"user{(self._outcome.number + 1) % USERS}"
         if place == "user":
             stage.share()
-            starter = stage.start_in("user", first, "read", "LINE", "RFR", "-d", "1", "-p", "atv71")
+            stage.start_keeper(place, first)
         else:
-            starter = stage.start("read", "LINE", "RFR", "-d", "1", "-p", "atv71")
-        assert starter.ends_within(PATIENCE), "read does not end"
+            stage.start_keeper()
         self._owner = self._victim = stage.run_motor_in(place, self._user)
         self._ready = time.time()
         stage.observe_in(place, self._user)
@@ -334,6 +341,7 @@ class ForeignKeeper(_InBox):
         if "kill -9" in self._end:
             os.kill(keeper, signal.SIGKILL)
             return begun, None, True
+        self._frozen = begun
         os.kill(keeper, signal.SIGSTOP)
         time.sleep(self._chance.uniform(0.0, 2.5))
         begun = time.time()
@@ -348,6 +356,9 @@ class ForeignKeeper(_InBox):
             os.kill(keeper, signal.SIGCONT)
         return begun, time.time() - begun + BACK_AFTER, False
 
+    def _judge_values(self, record: LineRecord, begun: float) -> None:
+        super()._judge_values(record, self._frozen or begun)
+
 
 class KilledInNamespace(_InBox):
     """`run`, or the keeper with all else, is killed in a PID namespace of its own."""
@@ -355,6 +366,7 @@ class KilledInNamespace(_InBox):
     def _begin(self) -> None:
         stage = self._stage
         if self._outcome.program == "run":
+            stage.start_keeper()
             self._owner = self._victim = stage.run_motor_in("namespace", "root")
             self._ready = time.time()
             stage.observe_in("namespace", "root")  # both have process id 1

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
+import serial
 
 from tui.bus.errors import LineLost, PortMissing
+from tui.bus.share.keeper_share import ALARM_AFTER
 from tui.bus.transport import opening
-from tui.bus.transport.opening import opened_beside
+from tui.bus.transport.opening import closed_beside, opened_beside
+from tui.bus.transport.serial_posix import PosixSerial
 
 from .peer import eventually
 
@@ -78,3 +83,41 @@ async def test_a_port_whose_line_was_closed_meanwhile_is_closed(port: SlowPort) 
         await waiting
     port.may_open.set()
     assert await asyncio.to_thread(port.closed.wait, 20)
+
+
+async def test_loop_goes_on_while_system_closes_port(port: SlowPort) -> None:
+    begun = time.monotonic()
+    # a driver that waits for the last bytes of an adapter that takes none
+    closed_beside("port", port.open)
+    assert time.monotonic() - begun < ALARM_AFTER
+    with pytest.raises(LineLost, match="the system does not answer"):
+        await port.opened()
+    port.may_open.set()
+    eventually(lambda: not opening._ABANDONED)
+    assert await port.opened() is port
+
+
+async def test_port_is_closed_before_the_line_goes_on() -> None:
+    closed = threading.Event()
+    closed_beside("port", closed.set)
+    assert closed.is_set()
+    assert not opening._ABANDONED
+
+
+async def test_serial_line_does_not_wait_for_port_that_hangs_in_closing(
+    port: SlowPort, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    master, slave = os.openpty()
+    try:
+        serial_port = serial.Serial(os.ttyname(slave), timeout=0)
+        transport = PosixSerial(serial_port)
+        close = serial_port.close
+        monkeypatch.setattr(serial_port, "close", lambda: (port.open(), close()))
+        begun = time.monotonic()
+        transport.close()
+        assert time.monotonic() - begun < ALARM_AFTER
+        port.may_open.set()
+        eventually(lambda: not serial_port.is_open)
+    finally:
+        os.close(master)
+        os.close(slave)

@@ -1,4 +1,4 @@
-"""Opening a serial port in a thread of its own: the system may take seconds for it, or for ever."""
+"""Opening and closing a serial port in a thread: the system may take seconds, or for ever."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import TypeVar
 
 from ..errors import LineLost
@@ -15,8 +16,11 @@ T = TypeVar("T")
 OPENS_WITHIN = 10.0
 """Seconds that the system has to open a port."""
 
+CLOSES_WITHIN = 0.5
+"""Seconds for which a line waits until the system has closed its port, and sent the last bytes."""
+
 _ABANDONED: set[str] = set()
-"""Paths of ports that are still being opened, though nothing waits for them."""
+"""Paths of ports that are still being opened or closed, though nothing waits for them."""
 
 
 async def opened_beside(path: str, open_port: Callable[[], T], drop: Callable[[T], object]) -> T:
@@ -42,6 +46,26 @@ async def opened_beside(path: str, open_port: Callable[[], T], drop: Callable[[T
             _ABANDONED.add(path)
             opening.add_done_callback(lambda _: _end(path, opening, drop))
     return port
+
+
+def closed_beside(path: str, close: Callable[[], object]) -> None:
+    """Close a port; if the system takes too long, it goes on alone, and opens no such port yet.
+
+    The loop of the line waits for it, so that the port is usually closed afterwards.
+    """
+
+    def work() -> None:
+        with suppress(OSError):
+            close()
+        _ABANDONED.discard(path)
+
+    closing = threading.Thread(target=work, name="close", daemon=True)
+    closing.start()
+    closing.join(CLOSES_WITHIN)
+    if closing.is_alive():
+        _ABANDONED.add(path)
+        if not closing.is_alive():
+            _ABANDONED.discard(path)
 
 
 def _open(opening: Future[T], open_port: Callable[[], T]) -> None:

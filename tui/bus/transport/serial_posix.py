@@ -10,6 +10,7 @@ import time
 import serial
 
 from .base import Receiver
+from .opening import closed_beside
 from .port_errors import PortErrors, port_errors
 
 LUMP = 4096
@@ -119,4 +120,4 @@ class PosixSerial:
         asyncio.get_running_loop().remove_reader(self._fd)
         self._fd = None
         self._receiver = None
-        self._port.close()
+        closed_beside(str(self._port.port), self._port.close)
