@@ -110,10 +110,26 @@ DEFECTS = (
     Defect(
         "queue-serves-polls-first",
         "tui/bus/schedule",
-        "for job in sorted(self._jobs, key=lambda job: (job.priority, job.order)):",
-        "for job in sorted(self._jobs, key=lambda job: (-job.priority, job.order)):",
+        "if job.priority is Priority.STOP:\n            return 0.0, 0.0",
+        "if job.priority is Priority.STOP:\n            return 3.0, 0.0",
         "A stop waits behind every poll of the line.",
         ("tests/bus/test_queue.py",),
+    ),
+    Defect(
+        "kinds-are-owed-nothing",
+        "tui/bus/schedule",
+        "if owed > OVERDUE:",
+        "if False:",
+        "Polls of many drives leave a search, and whoever reads, waiting for good.",
+        ("tests/bus/test_line_shares.py",),
+    ),
+    Defect(
+        "program-with-many-polls-has-the-line",
+        "tui/bus/schedule",
+        "self._had[mine] = self._had.get(mine, 0.0) + seconds",
+        "self._had[mine] = 0.0",
+        "A program that polls 31 drives leaves another one a thirtieth of the line.",
+        ("tests/bus/test_line_shares.py",),
     ),
     Defect(
         "full-queue-refuses-a-stop",

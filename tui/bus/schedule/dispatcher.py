@@ -228,6 +228,7 @@ class Dispatcher:
             job.fail(LineFailed(with_fate(job, f"The request failed: {error!r}.")))
             raise
         self.in_flight = False
+        self._queue.count(job, self._clock() - begun)
         self._conclude(job, result)
 
     def _conclude(self, job: Job, result: ExchangeResult) -> None:

@@ -12,6 +12,7 @@ from ..expectation import Expectation
 from ..limits import Limits
 from ..model import Priority, Reply
 from ..requests import BROADCAST, Request
+from .shares import LineShares
 
 
 @dataclass(eq=False, slots=True)
@@ -73,10 +74,14 @@ class Job:
 
 
 class JobQueue:
-    """Bounded queue: by priority, then first come first served, skipping what must wait yet."""
+    """Bounded queue: by shares and priority, then first come first served.
+
+    It passes by what must wait yet.
+    """
 
     def __init__(self, length: int) -> None:
         self._length = length
+        self._shares = LineShares()
         self._orders = itertools.count()
         self._jobs: list[Job] = []
 
@@ -100,6 +105,7 @@ class JobQueue:
         if job.priority is not Priority.STOP and waiting >= room:
             raise LineBusy(f"{waiting} requests wait for the line already; try again.")
         job.order = next(self._orders)
+        self._shares.come(job, self._jobs)
         self._jobs.append(job)
 
     def _replaced_by(self, job: Job) -> Job | None:
@@ -130,13 +136,17 @@ class JobQueue:
         """The job that goes out now, or when one may; both None when nothing waits."""
         earliest: float | None = None
         self._jobs = [job for job in self._jobs if not self._withdrawn(job)]
-        for job in sorted(self._jobs, key=lambda job: (job.priority, job.order)):
+        for job in sorted(self._jobs, key=self._shares.rank):
             ready = not_before(job)
             if ready <= now:
                 self._jobs.remove(job)
                 return job, None
             earliest = ready if earliest is None else min(earliest, ready)
         return None, earliest
+
+    def count(self, job: Job, seconds: float) -> None:
+        """A job that was taken has kept the line for so long."""
+        self._shares.count(job, seconds, self._jobs)
 
     @staticmethod
     def _withdrawn(job: Job) -> bool:

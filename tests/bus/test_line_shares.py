@@ -1,0 +1,184 @@
+"""Who gets the line's time when more is asked than it carries; by a clock of the test's own."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+
+import pytest
+
+from tui.bus.api import Priority
+from tui.bus.errors import LineLost
+from tui.bus.line import Timing
+from tui.bus.master import Sending
+from tui.bus.requests import Read
+from tui.bus.result import ExchangeResult, ResultKind
+from tui.bus.schedule.dispatcher import Dispatcher
+from tui.bus.schedule.patience import Devices
+from tui.bus.schedule.queue import Job
+from tui.bus.schedule.shares import MINIMUM_SHARES
+from tui.bus.tally import Tally
+
+from .conftest import WIDE
+
+EXCHANGE = 0.03
+"""Seconds of one exchange on the line of these tests."""
+
+
+class TimedLine:
+    """A dispatcher with a master whose exchanges move the clock, until the time is up."""
+
+    def __init__(self) -> None:
+        self.failure: LineLost | None = None
+        self.now = 100.0
+        self.end = 0.0
+        self.sent: list[Job] = []
+        self.round_trip = False
+        """Whether programs ask again during the next exchange only."""
+        self._later: list[tuple[Priority, str, int]] = []
+        self._again: list[tuple[Priority, str, int]] = []
+        self._waiting: list[Job] = []
+        timing = Timing()
+        devices = Devices(timing, mistakable=False)
+        self.dispatcher = Dispatcher(devices, Tally(), timing, lambda: self.now, gateway=False)
+
+    def ask(self, priority: Priority, program: str = "a", device: int = 1) -> Job:
+        """Hand over a request."""
+        job = Job(Read(device, 0, 1), priority, WIDE, program=program, asked=self.now)
+        self._waiting.append(job)
+        self.dispatcher.submit(job)
+        return job
+
+    def keep_asking(self, priority: Priority, program: str = "a", count: int = 4) -> None:
+        """Have so many requests wait at any time."""
+        for device in range(1, count + 1):
+            self._again.append((priority, program, device))
+            self.ask(priority, program, device)
+
+    async def quiet(self) -> None:
+        """End what is served once the time is up."""
+        if self.now >= self.end:
+            raise LineLost("the time is up")
+
+    async def exchange(self, sending: Sending) -> ExchangeResult:
+        """Answer, and ask again for what was asked."""
+        sending.look()
+        self.now += EXCHANGE
+        later, self._later = self._later, []
+        for one in later:
+            self.ask(*one)
+        job = next(one for one in self._waiting if one.begun)
+        self._waiting.remove(job)
+        self.sent.append(job)
+        again = job.priority, job.program, job.request.device
+        if again in self._again and self.round_trip:
+            self._later.append(again)
+        elif again in self._again:
+            self.ask(*again)
+        return ExchangeResult(ResultKind.REPLY, bytes([3, 2, 0, 0]), end=self.now, turnaround=0.01)
+
+    def serve(self, seconds: float) -> None:
+        """Serve for so long by the clock."""
+        self.end = self.now + seconds - EXCHANGE / 2
+
+        async def served() -> None:
+            with pytest.raises(LineLost):
+                await self.dispatcher.serve(self)  # type: ignore[arg-type]
+
+        asyncio.run(served())
+
+    def shares(self) -> dict[Priority, float]:
+        """The share of the time that each kind of request had."""
+        counted = Counter(job.priority for job in self.sent)
+        return {priority: count / counted.total() for priority, count in counted.items()}
+
+
+URGENT = (Priority.FEED, Priority.OPERATOR_WRITE)
+SHARED = tuple(MINIMUM_SHARES)
+STARVED = [(low, high) for low in SHARED for high in (*URGENT, *SHARED) if high < low]
+
+
+@pytest.mark.parametrize(("low", "high"), STARVED)
+def test_full_line_leaves_each_kind_its_minimum_share(low: Priority, high: Priority) -> None:
+    line = TimedLine()
+    line.keep_asking(high)
+    line.keep_asking(low)
+    line.serve(60.0)
+    assert line.shares()[low] == pytest.approx(MINIMUM_SHARES[low], rel=0.1)
+
+
+def test_all_kinds_at_once_have_their_minimum_shares() -> None:
+    line = TimedLine()
+    for priority in (*URGENT, *SHARED):
+        line.keep_asking(priority)
+    line.serve(60.0)
+    shares = line.shares()
+    assert all(shares[one] == pytest.approx(MINIMUM_SHARES[one], rel=0.1) for one in SHARED)
+    assert shares[Priority.FEED] == pytest.approx(1 - sum(MINIMUM_SHARES.values()), rel=0.1)
+
+
+def test_stop_goes_before_kinds_that_are_owed_time() -> None:
+    line = TimedLine()
+    for priority in (*URGENT, *SHARED):
+        line.keep_asking(priority)
+    line.serve(1.0)
+    for _ in range(40):
+        stop = line.ask(Priority.STOP)
+        before = len(line.sent)
+        line.serve(EXCHANGE)
+        assert line.sent[before] is stop
+
+
+def test_line_with_time_to_spare_goes_by_priority() -> None:
+    line = TimedLine()
+    line.keep_asking(Priority.POLL)
+    line.serve(10.0)
+    line.sent.clear()
+    commands = [line.ask(Priority.OPERATOR_WRITE) for _ in range(3)]
+    reads = [line.ask(Priority.OPERATOR_READ) for _ in range(3)]
+    line.serve(6 * EXCHANGE)
+    assert line.sent == commands + reads
+
+
+def test_search_that_asks_one_by_one_has_its_share_and_no_more() -> None:
+    line = TimedLine()
+    line.round_trip = True
+    line.keep_asking(Priority.POLL)
+    line.keep_asking(Priority.BACKGROUND, count=1)
+    line.serve(60.0)
+    share = MINIMUM_SHARES[Priority.BACKGROUND]
+    assert line.shares()[Priority.BACKGROUND] == pytest.approx(share, rel=0.1)
+
+
+@pytest.mark.parametrize("priority", SHARED)
+def test_programs_share_evenly_however_much_each_asks(priority: Priority) -> None:
+    line = TimedLine()
+    line.keep_asking(priority, "many", count=31)
+    line.keep_asking(priority, "few", count=2)
+    line.serve(30.0)
+    counted = Counter(job.program for job in line.sent)
+    assert counted["few"] == pytest.approx(counted["many"], rel=0.05)
+
+
+def test_program_that_asks_seldom_waits_for_no_more_than_two_exchanges() -> None:
+    line = TimedLine()
+    line.keep_asking(Priority.POLL, "many", count=31)
+    line.serve(5.0)
+    for _ in range(20):
+        poll = line.ask(Priority.POLL, "few")
+        before = len(line.sent)
+        line.serve(2 * EXCHANGE)
+        assert poll in line.sent[before:]
+        line.serve(5 * EXCHANGE)
+
+
+def test_program_that_was_away_makes_up_for_nothing() -> None:
+    line = TimedLine()
+    line.keep_asking(Priority.POLL, "here")
+    line.ask(Priority.POLL, "away")
+    line.serve(60.0)
+    line.sent.clear()
+    line.keep_asking(Priority.POLL, "away")
+    line.serve(3.0)
+    counted = Counter(job.program for job in line.sent)
+    assert counted["here"] == pytest.approx(counted["away"], rel=0.05)
