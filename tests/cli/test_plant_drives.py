@@ -93,6 +93,14 @@ async def test_a_drive_that_is_away_keeps_no_other_from_being_read(
     assert said.count("It is tried on.") == 2
 
 
+async def test_drive_never_polled_comes_before_one_that_is_away(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(drives, "FIND_AGAIN", 60.0)
+    await wait_for(lambda: bench.good(OTHER))
+    assert not bench.good(AWAY)
+
+
 async def test_a_drive_that_was_long_silent_is_asked_anew_who_it_is(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-FIRST_LOOK_WITHIN = 5.0
+FIRST_LOOK_WITHIN = 15.0
 """Seconds after which those drives are read that were found, at the latest."""
 FIND_AGAIN = 3.0
 """Seconds between two looks for drives that are not there, one after the other on each line."""
@@ -64,15 +64,31 @@ class PlantLine:
 
         All are looked for before any is read: on a line full of polls that takes far longer.
         """
-        finding, begin = asyncio.Lock(), asyncio.Event()
+        search = DriveSearch()
         async with asyncio.TaskGroup() as tasks:
             for one in self.drives:
-                tasks.create_task(one.run(finding, begin), name=f"plant {one.device}")
+                tasks.create_task(one.run(search), name=f"plant {one.device}")
             with suppress(TimeoutError):
                 async with asyncio.timeout(FIRST_LOOK_WITHIN):
-                    for one in self.drives:
-                        await one.looked_for.wait()
-            begin.set()
+                    await self._first_looks()
+            search.begin.set()
+            await self._first_looks()
+            search.retry.set()
+
+    async def _first_looks(self) -> None:
+        for one in self.drives:
+            await one.looked_for.wait()
+
+
+class DriveSearch:
+    """Looks for the drives of one line, one at a time."""
+
+    def __init__(self) -> None:
+        self.turn = asyncio.Lock()
+        self.begin = asyncio.Event()
+        """Set once the drives that were found are read."""
+        self.retry = asyncio.Event()
+        """Set once each drive was looked for, and those not found may be looked for again."""
 
 
 class PlantDrive:
@@ -107,14 +123,11 @@ class PlantDrive:
             return DriveSight(self.device, self._session, None, self._error)
         return drive_sight(self.device, self._session, self._cycle, now)
 
-    async def run(self, finding: asyncio.Lock, begin: asyncio.Event) -> None:
-        """Find it, read it until it is lost, and again; ends by being cancelled only.
-
-        One drive of a line is looked for at a time; none is read before `begin`.
-        """
+    async def run(self, search: DriveSearch) -> None:
+        """Find it, read it until it is lost, and again; ends by being cancelled only."""
         while True:
-            session = await self._found(finding, begin)
-            await begin.wait()
+            session = await self._found(search)
+            await search.begin.wait()
             if self._session is None or session.profile.id != self._session.profile.id:
                 self._cycle = None
             self._session = session
@@ -122,29 +135,25 @@ class PlantDrive:
 
     # Who it is
 
-    async def _found(self, finding: asyncio.Lock, begin: asyncio.Event) -> DriveSession:
+    async def _found(self, search: DriveSearch) -> DriveSession:
         while True:
-            async with finding:
+            async with search.turn:
+                if self.looked_for.is_set():
+                    await asyncio.sleep(FIND_AGAIN)
                 session = await self._asked()
                 self.looked_for.set()
                 if session is not None:
                     return session
-                if begin.is_set():
-                    await asyncio.sleep(FIND_AGAIN)
-            await begin.wait()
+            await search.retry.wait()
 
     async def _asked(self) -> DriveSession | None:
         """The drive, or None with why not, which is said when it changes."""
-        from tui.bus.api import Priority
-        from tui.session.connect.identify import identify_drive
-
         if self._sign(self.device) is not None:
             # who it is was not asked before: nothing feeds a motor whose client may have died
             self._error = f"Device {self.device} is not asked who it is: a client runs its motor."
             return None
         try:
-            # nobody waits as long for a drive that may not be there: others are on the line
-            await identify_drive(self._opened.line, self.device, priority=Priority.BACKGROUND)
+            await self._answers()
             session = await connect_drive(self._opened, self._target)
         except Exception as error:
             self._tell(failure_of(error).message)
@@ -157,6 +166,22 @@ class PlantDrive:
                 return None
         self._tell("")
         return session
+
+    async def _answers(self) -> None:
+        """Ask once, with little patience: others are on the line. Raises NoAnswer if silent."""
+        from tui.bus.api import Priority
+        from tui.bus.errors import DeviceException
+        from tui.drive.profile import library
+        from tui.session.connect.contradiction import read_status
+        from tui.session.connect.identify import identify_drive
+
+        line, named = self._opened.line, self._target.profile_id
+        with suppress(DeviceException):
+            # the status word answers at once where function 43 meets silence
+            if named is None or not await read_status(
+                line, self.device, library.load(named), Priority.BACKGROUND
+            ):
+                await identify_drive(line, self.device, priority=Priority.BACKGROUND)
 
     def _tell(self, error: str) -> None:
         if error and error != self._error:

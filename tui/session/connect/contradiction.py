@@ -13,6 +13,9 @@ from tui.drive.profile.profile import Profile
 
 from .identify import Askable, DriveIdentity, identity_told
 
+BRIEFLY = 0.4
+"""Seconds in which a drive answers that has the function although its family lacks it."""
+
 
 class Contradiction(DriveError):
     """A drive that says it is another than the profile named for it."""
@@ -27,22 +30,25 @@ async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdenti
     """
     # a family that has the function is waited for as always; the others are silent
     has_it = profile.function(IDENTIFY) is not None
-    priority = Priority.OPERATOR_READ if has_it else Priority.BACKGROUND
+    priority, within = (Priority.OPERATOR_READ, None) if has_it else (Priority.BACKGROUND, BRIEFLY)
     try:
-        answer = await line.identify(device, priority=priority)
+        answer = await line.identify(device, priority=priority, within=within)
     except NoAnswer:
         with suppress(ExchangeError):
-            await _show_itself(line, device, profile)
+            await read_status(line, device, profile, Priority.OPERATOR_READ)
         return None
     except (ExchangeError, RequestRefused):
         return None
     return await identity_told(device, answer)
 
 
-async def _show_itself(line: Askable, device: int, profile: Profile) -> None:
+async def read_status(line: Askable, device: int, profile: Profile, priority: Priority) -> bool:
+    """Read a drive's status word; False if it cannot be asked for before the drive is known."""
     status = profile.quantity("status_word")
-    if status is not None and status.function == 3:
-        await line.read(device, status.address, 1, priority=Priority.OPERATOR_READ)
+    if status is None or status.function != 3:
+        return False
+    await line.read(device, status.address, 1, priority=priority)
+    return True
 
 
 def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
