@@ -35,3 +35,18 @@ def test_an_answer_is_asked_for_anew_where_it_waited_and_not_where_it_is_long(
     devices.answered(1, job.request.expectation(), 0.005, 0.0)
     result = ExchangeResult(ResultKind.REPLY, sent=0.0, end=end, turnaround=turnaround)
     assert outcomes.waited_for_us(job, result) is anew
+
+
+def test_device_never_polled_silent_or_refusing_are_three_states() -> None:
+    devices = Devices(Timing(), mistakable=True)
+    expected = Read(1, 0, 1).expectation()
+    assert devices.state(1).contact == "not_polled"
+    devices.silent(1, expected, 0.0, 1.0)
+    assert devices.state(1).contact == "silent"
+    devices.answered(1, expected, 0.01, 2.0, refused=True)
+    assert devices.state(1).contact == "refused"
+    copied = Devices(Timing(), mistakable=True)
+    copied.copy(1, devices.state(1))
+    assert copied.state(1).contact == "refused"
+    devices.answered(1, expected, 0.01, 3.0)
+    assert devices.state(1).contact == "answers"

@@ -78,7 +78,7 @@ def failed(seen: Snapshot, error: str) -> Snapshot:
     """The values of before, as a cycle that failed has them."""
     readings = {c: replace(r, quality=Quality.STALE) for c, r in seen.readings.items()}
     state = drive_state(small_drive(), readings)
-    return replace(seen, readings=readings, state=state, error=error)
+    return replace(seen, readings=readings, state=state, error=error, contact="silent")
 
 
 def counted(turnarounds: Sequence[int]) -> LineCounters:

@@ -64,7 +64,8 @@ def test_watch_prints_one_object_a_cycle() -> None:
     assert len(cycles) == 3
     for cycle in cycles:
         keys = {"time", "line", "device", "profile", "values", "state", "direction", "error"}
-        assert set(cycle) == HEAD | keys | {"timeout"}
+        assert set(cycle) == HEAD | keys | {"timeout", "contact", "cycle"}
+        assert (cycle["contact"], cycle["cycle"]["wished"]) == ("answers", 0.1)
         assert list(cycle["values"]) == ["RFR", "ETA"]
         assert all(
             set(value) == VALUE_KEYS | {"time", "error"} for value in cycle["values"].values()

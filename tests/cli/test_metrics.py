@@ -8,10 +8,12 @@ import socket
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from decimal import Decimal
+from typing import get_args
 
 import pytest
 import pytest_asyncio
 
+from tui.bus.api import Contact
 from tui.cli.plant.metrics import BASE_UNITS, metrics_text, value_metric
 from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
 from tui.cli.plant.sights import DriveSight, LineSight
@@ -92,6 +94,29 @@ def test_what_nobody_is_sure_of_is_no_number_and_a_taught_scale_is_marked() -> N
     text = text_of(line_of(drive_of(replace(seen, readings=readings))))
     assert "drivepanel_value_hertz" not in text
     assert f'drivepanel_value_ratio{{{WHERE},code="THD",taught="true"}} 0.5' in text
+
+
+@pytest.mark.parametrize("contact", get_args(Contact))
+def test_result_of_the_last_requests_is_one_of_five(contact: Contact) -> None:
+    seen = samples(line_of(DriveSight(2, error="Why.", contact=contact)))
+    contacts = [one for one in seen if one.startswith("drivepanel_drive_contact")]
+    assert len(contacts) == len(get_args(Contact))
+    expected = f'drivepanel_drive_contact{{{WHERE},contact="{contact}"}} 1'
+    assert [one for one in contacts if one.endswith(" 1")] == [expected]
+    assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen  # no cycle was read
+
+
+def test_drive_that_was_not_polled_for_long_is_not_silent() -> None:
+    good = cycle(small_drive(), ETA=0x27)
+    assert drive_of(good, now=NOW + 60).contact == "not_polled"
+    assert drive_of(failed(good, "No answer."), now=NOW + 60).contact == "silent"
+
+
+def test_cycle_time_is_published_with_the_wished_one() -> None:
+    slow = replace(cycle(small_drive(), ETA=0x27), period=5.8, wished=1.0)
+    seen = samples(line_of(drive_of(slow)))
+    assert f"drivepanel_drive_cycle_seconds{{{WHERE}}} 5.8" in seen
+    assert f"drivepanel_drive_cycle_wished_seconds{{{WHERE}}} 1" in seen
 
 
 def test_a_drive_that_was_never_found_is_down_and_nothing_else() -> None:

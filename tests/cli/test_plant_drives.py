@@ -6,7 +6,7 @@ import asyncio
 import time
 from collections.abc import AsyncIterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 import pytest_asyncio
@@ -81,12 +81,14 @@ async def test_a_drive_that_is_away_keeps_no_other_from_being_read(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert bench.sight(HERE).error == "Device 1 was not asked yet."
+    assert bench.sight(HERE).contact == "not_polled"
     await wait_for(lambda: bench.good(HERE) and bench.good(OTHER))
     assert bench.changes
     before = bench.asked(HERE)
     await wait_for(lambda: bench.asked(HERE) > before + 20)
     assert bench.asked(AWAY) < before
     assert "did not answer" in bench.sight(AWAY).error
+    assert (bench.sight(AWAY).contact, bench.sight(HERE).contact) == ("silent", "answers")
     await wait_for(lambda: "name its profile" in bench.sight(NAMELESS).error)
     said = capsys.readouterr().err
     assert said.count("Device 9 did not answer") == 1
@@ -99,6 +101,28 @@ async def test_drive_never_polled_comes_before_one_that_is_away(
     monkeypatch.setattr(drives, "FIND_AGAIN", 60.0)
     await wait_for(lambda: bench.good(OTHER))
     assert not bench.good(AWAY)
+
+
+async def test_line_that_is_full_is_reported_once_until_it_is_not(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(drives, "RATE_LOOK_INTERVAL", 0.01)
+    one = bench.plant.drives[0]
+    await wait_for(lambda: one.cycle is not None)
+    assert one.cycle is not None
+    slow = PlantDrive(bench.opened, Target(LINE, HERE, None), (), 1.0, lambda: None)
+    slow.cycle = replace(one.cycle, error="", period=5.8, wished=1.0)
+    capsys.readouterr()
+    task = asyncio.create_task(PlantLine("fan", bench.opened, (slow,)).report_rate())
+    await asyncio.sleep(0.1)
+    slow.cycle = replace(slow.cycle, period=1.0)
+    await asyncio.sleep(0.1)
+    task.cancel()
+    lines = [one for one in capsys.readouterr().err.splitlines() if "fan" in one]
+    assert lines == [
+        "drivepanel: fan: a cycle takes up to 5.8 s: the line is full.",
+        "drivepanel: fan: the cycle time is kept again.",
+    ]
 
 
 async def test_a_drive_that_was_long_silent_is_asked_anew_who_it_is(

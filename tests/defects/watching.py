@@ -136,7 +136,7 @@ DEFECTS = (
     Defect(
         "failed-cycle-looks-well",
         "tui/session/monitor",
-        "error = str(fault)\n                    failures += 1",
+        "error, contact = str(fault), contact_of(fault)\n                    failures += 1",
         "failures += 1",
         "A drive that does not answer looks alive.",
         ("tests/session/test_monitor_faults.py",),

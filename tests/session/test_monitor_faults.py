@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tui.bus.api import LineWorker, Priority
-from tui.bus.errors import LineLost, NoAnswer
+from tui.bus.errors import ChecksumFault, LineLost, NoAnswer
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor
 from tui.session.monitor.snapshot import Snapshot
@@ -255,3 +255,41 @@ async def test_a_drive_that_is_held_back_is_not_asked_and_says_why(bench: Bench)
     assert told[-1][0].error == "Left alone."
     bench.monitor.held_back = lambda: ""
     assert not (await bench.run(3))[-1][0].error
+
+
+@pytest.mark.parametrize(
+    ("fault", "contact"),
+    [
+        (NoAnswer(1, 3, STATE), "silent"),
+        (ChecksumFault(1, 3, STATE), "damaged"),
+        (LineLost("The line is lost."), "not_polled"),
+    ],
+)
+async def test_failed_cycle_tells_silence_damage_and_no_poll_apart(
+    bench: Bench, fault: Exception, contact: str
+) -> None:
+    good, _ = (await bench.run(1))[0]
+    assert good.contact == "answers"
+    failed, _ = (await bench.fail(fault, cycles=2))[-1]
+    found = {one.contact for one, _ in bench.cycles if one.error}
+    assert found == {contact}, failed
+
+
+async def test_drive_that_refuses_every_read_is_neither_silent_nor_read(bench: Bench) -> None:
+    for address in (STATE, SPEED, *(FIRST_SLOW + 100 * i for i in range(SLOW))):
+        bench.line.fail_read(1, address, 2)
+    seen, _ = (await bench.run(2))[-1]
+    assert seen.contact == "refused"
+
+
+async def test_wish_that_others_tell_in_the_first_cycle_stretches_it(bench: Bench) -> None:
+    before_read = bench.line.before_read
+
+    async def claimed(device: int, registers: range, priority: Priority) -> None:
+        bench.line.pace.claim("another", 2, 1.0, 0.1)
+        await before_read(device, registers, priority)
+
+    bench.line.before_read = claimed  # type: ignore[method-assign]
+    seen, _ = (await bench.run(1))[0]
+    assert seen.period >= 10 * seen.wished
+    assert seen.too_slow

@@ -36,7 +36,8 @@ from tui.session.drive_state import DriveState, drive_state
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
 from tui.session.monitor.alarms import FaultOnsets
-from tui.session.monitor.line_watch import LineWatch, Look
+from tui.session.monitor.line_watch import LineWatch
+from tui.session.monitor.look import Look
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.trend import Trend, TrendPoint

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from tui.bus.api import LineState
+from tui.bus.api import Contact, LineState
 from tui.bus.errors import PortBusy
 from tui.screens.open_lines import LineOpening
 from tui.session.connect.identify import DriveIdentity
@@ -20,7 +20,7 @@ from tui.session.connect.named_lines import settings_file
 from tui.session.connect.search import Search
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
-from tui.session.monitor.line_watch import Look
+from tui.session.monitor.look import Look
 from tui.session.paths import remember_line
 
 from . import fakes
@@ -186,7 +186,19 @@ async def lost_drive(app: Any, pilot: Pilot[None]) -> None:
     looks: dict[int, Look] = fleet.line_watch.looks  # type: ignore[assignment]
     for device, age in ((2, 47.0), (4, 5.0)):
         before = replace(looks[device], time=fakes.NOW - age)
-        looks[device] = Look(None, "Device did not answer.", fakes.NOW - 1, None, {}, before)
+        looks[device] = Look(
+            None, "Device did not answer.", fakes.NOW - 1, None, {}, before, "silent"
+        )
+    await show(app, pilot, fleet, fakes.CONNECTED)
+
+
+async def not_answering(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(5)
+    looks: dict[int, Look] = fleet.line_watch.looks  # type: ignore[assignment]
+    contacts: tuple[Contact, ...] = ("silent", "refused", "damaged")
+    for device, contact in enumerate(contacts, start=2):
+        looks[device] = Look(None, "In vain.", fakes.NOW - 1, None, {}, None, contact)
+    del looks[5]
     await show(app, pilot, fleet, fakes.CONNECTED)
 
 
@@ -220,6 +232,7 @@ STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
     "five": five,
     "thirty-one": thirty_one,
     "lost-drive": lost_drive,
+    "not-answering": not_answering,
     "line-lost": line_lost,
     "wrong-addresses": wrong_addresses,
     "dialog": dialog,

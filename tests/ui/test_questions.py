@@ -26,7 +26,7 @@ from tui.screens.dialogs.question import Question, void_questions
 from tui.screens.keys.help import HelpScreen
 from tui.screens.parameters.results import RestQuestion
 from tui.screens.parameters.screen import ParametersScreen
-from tui.session.monitor.line_watch import Look
+from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot
 from tui.widgets.motor_now import motor_now
 

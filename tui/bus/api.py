@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from .expectation import IDENTIFY
 from .model import (
     TURNAROUND_EDGES,
+    Contact,
     DeviceCounters,
     DeviceState,
     IdentificationObjects,
@@ -22,6 +23,7 @@ from .model import (
     Priority,
     Reply,
     Timing,
+    contact_of,
 )
 from .trace import Frame
 
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "TURNAROUND_EDGES",
+    "Contact",
     "DeviceCounters",
     "DeviceState",
     "Frame",
@@ -45,6 +48,7 @@ __all__ = [
     "ModbusLine",
     "Priority",
     "Reply",
+    "contact_of",
 ]
 
 

@@ -103,7 +103,14 @@ class FakeDevice:
     def noted(self, error: ExchangeError | None, now: float) -> None:
         """An exchange with it has ended."""
         if error is None or isinstance(error, DeviceException):
-            self.state = replace(self.state, answers=True, failures=0, silent_since=None, heard=now)
+            self.state = replace(
+                self.state,
+                answers=True,
+                failures=0,
+                silent_since=None,
+                heard=now,
+                refused=error is not None,
+            )
         elif isinstance(error, NoAnswer):
             self.state = replace(
                 self.state,

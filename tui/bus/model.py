@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -18,6 +18,7 @@ from .bounds import (
     Seconds,
     Text,
 )
+from .errors import ChecksumFault, DeviceException, NoAnswer, WrongReply
 
 
 class Priority(IntEnum):
@@ -55,6 +56,23 @@ class LineState:
     """When a lost line is tried again."""
 
 
+Contact = Literal["answers", "not_polled", "silent", "refused", "damaged"]
+"""Result of the last request to a device; `not_polled` if none was sent."""
+
+
+def contact_of(error: BaseException) -> Contact:
+    """Result of a request that failed by an error; `not_polled` if none was sent."""
+    match error:
+        case NoAnswer():
+            return "silent"
+        case ChecksumFault() | WrongReply():
+            return "damaged"
+        case DeviceException():
+            return "refused"
+        case _:
+            return "not_polled"
+
+
 @dataclass(frozen=True, slots=True)
 class DeviceState:
     """What the line has seen of one device."""
@@ -76,6 +94,17 @@ class DeviceState:
     """Seconds by which a reply came after its time-out, the longest; fades with those in time."""
     copies_within: Seconds = 0.0
     """Seconds after a reply in which it may come once more; 0 where none ever came twice."""
+    refused: bool = False
+    """True if its last reply was a refusal."""
+
+    @property
+    def contact(self) -> Contact:
+        """Result of the last request to it."""
+        if self.answers is None:
+            return "not_polled"
+        if not self.answers:
+            return "silent"
+        return "refused" if self.refused else "answers"
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
     from tui.session.fleet import Fleet
-    from tui.session.monitor.line_watch import Look
+    from tui.session.monitor.look import Look
     from tui.session.reading import Reading
 
     from .app_port import Panel

@@ -7,7 +7,8 @@ from rich.text import Text
 from tui.bus.api import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
-from tui.session.monitor.line_watch import GLANCE, Look
+from tui.session.monitor.line_watch import GLANCE
+from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.reading import Quality
 

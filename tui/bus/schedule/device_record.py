@@ -36,6 +36,8 @@ class Device:
     limits: Limits = CAUTIOUS
     answers: bool | None = None
     ever_answered: bool = False
+    refused: bool = False
+    """True if its last reply was a refusal."""
     failures: int = 0
     silent_since: float | None = None
     next_try: float | None = None

@@ -76,8 +76,9 @@ class Outcomes:
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._tally.count_reply(request.device, result.turnaround)
             exchanged = (job.pdu, result.pdu)
+            refused = result.kind is ResultKind.EXCEPTION
             self._devices.answered(
-                request.device, job.expectation, result.turnaround, now, exchanged
+                request.device, job.expectation, result.turnaround, now, exchanged, refused=refused
             )
         unexplained = self.note_strays(result.strays, result.end)
         if result.kind is ResultKind.WRONG and result.strays and request.device not in unexplained:

@@ -66,6 +66,7 @@ class Devices:
             record.heard,
             record.lateness,
             max(record.settle, self._settle),
+            record.refused,
         )
 
     @property
@@ -77,6 +78,7 @@ class Devices:
         """Take over what the program that owns the line has seen of a device."""
         record = self[device]
         record.answers, record.failures = state.answers, state.failures
+        record.refused = state.refused
         record.silent_since, record.next_try = state.silent_since, state.next_try
         record.turnaround, record.told_usual = state.turnaround, state.usual_turnaround
         record.heard, record.repeated = state.heard, state.heard or 0.0
@@ -177,11 +179,14 @@ class Devices:
         turnaround: float,
         now: float,
         exchanged: tuple[bytes, bytes] = (b"", b""),
+        *,
+        refused: bool = False,
     ) -> None:
         """A reply came, or a refusal; `exchanged` are the request and its reply."""
         record = self[device]
         record.answers = record.ever_answered = True
         record.heard = now
+        record.refused = refused
         record.failures = 0
         record.silent_since = record.next_try = None
         note_turnaround(record, expectation.function, turnaround)

@@ -7,6 +7,8 @@ from typing import Literal
 import msgspec
 from msgspec import UNSET, UnsetType
 
+from tui.bus.api import Contact
+
 from .counter_parts import (
     CountingTestTold,
     DifferenceTold,
@@ -62,6 +64,15 @@ class ReadTold(OfDriveTold, kw_only=True):
     values: dict[str, ValueTold]
 
 
+class CycleTime(msgspec.Struct, forbid_unknown_fields=True):
+    """Seconds from one cycle of a drive to the next."""
+
+    seconds: float
+    """As they were."""
+    wished: float
+    """As `--every` asks for them."""
+
+
 class CycleTold(OfDriveTold, kw_only=True):
     """`watch`: one cycle."""
 
@@ -71,6 +82,8 @@ class CycleTold(OfDriveTold, kw_only=True):
     state: str | None
     direction: str | None
     error: str | None
+    contact: Contact
+    cycle: CycleTime
 
 
 class IdentityTold(OfDriveTold, kw_only=True):

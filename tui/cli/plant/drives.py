@@ -17,6 +17,7 @@ from ..shared.say import say
 from .sights import DriveSight, LineSight, drive_sight
 
 if TYPE_CHECKING:
+    from tui.bus.api import Contact
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.monitor.snapshot import Snapshot
@@ -30,6 +31,8 @@ FIND_AGAIN = 3.0
 SILENT_FOR_LONG = 60.0
 """Seconds without a good cycle after which it is asked anew who the drive is."""
 PLANT_LOOK_INTERVAL = 2.0
+RATE_LOOK_INTERVAL = 10.0
+"""Seconds between two looks whether the line keeps the wished cycle time."""
 TIMEOUT_READ_AGAIN = 20.0
 """Seconds after which a drive's communication time-out is read anew."""
 
@@ -74,6 +77,20 @@ class PlantLine:
             search.begin.set()
             await self._first_looks()
             search.retry.set()
+            await self.report_rate()
+
+    async def report_rate(self) -> None:
+        """Say when the line does not carry the wished cycle time, and when it does again."""
+        full = False
+        while True:
+            await asyncio.sleep(RATE_LOOK_INTERVAL)
+            cycles = [one.cycle for one in self.drives if one.cycle is not None]
+            slowest = max((one.period for one in cycles if not one.error), default=0.0)
+            if full != any(one.too_slow for one in cycles if not one.error):
+                full = not full
+                text = f"a cycle takes up to {slowest:.1f} s: the line is full."
+                text = text if full else "the cycle time is kept again."
+                say(f"drivepanel: {self.name}: {text}", err=True)
 
     async def _first_looks(self) -> None:
         for one in self.drives:
@@ -113,15 +130,17 @@ class PlantDrive:
         self.looked_for = asyncio.Event()
         """Set once it was asked who it is, whatever it came to."""
         self._session: DriveSession | None = None
-        self._cycle: Snapshot | None = None
+        self.cycle: Snapshot | None = None
+        """Its last cycle."""
         self._error = f"Device {self.device} was not asked yet."
+        self._contact: Contact = "not_polled"
         self._good = 0.0
 
     def sight(self, now: float) -> DriveSight:
         """What is known of it; `now` is on the monotonic clock."""
-        if self._cycle is None:
-            return DriveSight(self.device, self._session, None, self._error)
-        return drive_sight(self.device, self._session, self._cycle, now)
+        if self.cycle is None:
+            return DriveSight(self.device, self._session, None, self._error, self._contact)
+        return drive_sight(self.device, self._session, self.cycle, now)
 
     async def run(self, search: DriveSearch) -> None:
         """Find it, read it until it is lost, and again; ends by being cancelled only."""
@@ -129,7 +148,7 @@ class PlantDrive:
             session = await self._found(search)
             await search.begin.wait()
             if self._session is None or session.profile.id != self._session.profile.id:
-                self._cycle = None
+                self.cycle = None
             self._session = session
             await self._read(session)
 
@@ -148,6 +167,8 @@ class PlantDrive:
 
     async def _asked(self) -> DriveSession | None:
         """The drive, or None with why not, which is said when it changes."""
+        from tui.bus.api import contact_of
+
         if self._sign(self.device) is not None:
             # who it is was not asked before: nothing feeds a motor whose client may have died
             self._error = f"Device {self.device} is not asked who it is: a client runs its motor."
@@ -156,8 +177,10 @@ class PlantDrive:
             await self._answers()
             session = await connect_drive(self._opened, self._target)
         except Exception as error:
+            self._contact = contact_of(error)
             self._tell(failure_of(error).message)
             return None
+        self._contact = "not_polled"  # it answered, and no cycle was read yet
         if self._codes:
             try:
                 self._shown(session)
@@ -216,13 +239,13 @@ class PlantDrive:
                 await asyncio.sleep(PLANT_LOOK_INTERVAL)
                 if any(one.name == GATEWAY for one in session.line.facts.others):
                     looks_on.orphan |= await asyncio.to_thread(_is_orphan, session)
-                if self._cycle is not None and not self._cycle.error:
+                if self.cycle is not None and not self.cycle.error:
                     self._good = loop.time()
                     due = loop.time() - learned > TIMEOUT_READ_AGAIN
                     if due and not looks_on.held_back():
                         learned = loop.time()
                         await _learn_timeout(session)
-                elif self._cycle is not None and looks_on.waits:
+                elif self.cycle is not None and looks_on.waits:
                     self._good = loop.time()
         finally:
             leave()
@@ -230,7 +253,7 @@ class PlantDrive:
 
     def _take(self, cycles: Cycles, loop: asyncio.AbstractEventLoop, snapshot: Snapshot) -> None:
         """Keep a cycle as it was read; in the line's thread."""
-        self._cycle = cycles.as_read(snapshot)
+        self.cycle = cycles.as_read(snapshot)
         loop.call_soon_threadsafe(self._changed)
 
 

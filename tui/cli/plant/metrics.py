@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING, NamedTuple, get_args
 
-from tui.bus.api import TURNAROUND_EDGES, DeviceCounters, LineStatus
+from tui.bus.api import TURNAROUND_EDGES, Contact, DeviceCounters, LineStatus
 from tui.drive.profile.schema import StateKind
 
 from .sights import DriveSight, LineSight
@@ -89,6 +89,9 @@ METRICS: Mapping[str, MetricHead] = {
     "line_busy_seconds_total": MetricHead("counter", "Time in which the line was taken."),
     "drive_info": MetricHead("gauge", "The profile of the drive, and what it says of itself."),
     "drive_up": MetricHead("gauge", "Whether the last cycle brought the values of the drive."),
+    "drive_contact": MetricHead("gauge", "1 for the result of the last requests to the drive."),
+    "drive_cycle_seconds": MetricHead("gauge", "Time from one cycle to the next, as it was."),
+    "drive_cycle_wished_seconds": MetricHead("gauge", "The same as --every asks for it."),
     "drive_state": MetricHead("gauge", "1 for the state that the drive is in."),
     "drive_fault_info": MetricHead("gauge", "The fault that the drive is in now."),
     "drive_alarm": MetricHead("gauge", "Whether the drive tells an alarm."),
@@ -195,7 +198,9 @@ def _of_counters(where: Labels, counted: DeviceCounters | None) -> Iterator[Metr
 
 
 def _of_drive(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSample]:
-    yield MetricSample("drive_up", where, drive.cycle is not None and not drive.error)
+    yield MetricSample("drive_up", where, drive.cycle is not None and drive.contact == "answers")
+    for contact in get_args(Contact):
+        yield MetricSample("drive_contact", {**where, "contact": contact}, contact == drive.contact)
     if drive.session is None:
         return
     said = drive.session.known_identity.reference
@@ -203,6 +208,8 @@ def _of_drive(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSa
     yield MetricSample("drive_info", info, 1)
     if drive.cycle is None:
         return
+    yield MetricSample("drive_cycle_seconds", where, round(drive.cycle.period, 3))
+    yield MetricSample("drive_cycle_wished_seconds", where, drive.cycle.wished)
     state = drive.cycle.state
     if state.headline and not drive.error:
         for kind in get_args(StateKind):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tui.bus.api import LineCounters, LineState
+    from tui.bus.api import Contact, LineCounters, LineState
     from tui.session.drive import DriveSession
     from tui.session.monitor.snapshot import Snapshot
 
@@ -22,6 +22,8 @@ class DriveSight:
     """As it was read: what was not read in it is not good."""
     error: str = ""
     """Why there are no values of now; empty where there are."""
+    contact: Contact = "not_polled"
+    """Result of the last requests to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,7 @@ def drive_sight(
     """
     if session is not None and cycle.is_stale(now):
         cycle = _outdated(session, cycle, now)
-    return DriveSight(device, session, cycle, cycle.error)
+    return DriveSight(device, session, cycle, cycle.error, cycle.contact)
 
 
 def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
@@ -58,5 +60,6 @@ def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
         readings=readings,
         state=drive_state(session.profile, readings),
         rate=0.0,
+        contact=cycle.contact if cycle.error else "not_polled",
         error=cycle.error or f"Device {session.device} was not asked for {now - cycle.time:.0f} s.",
     )

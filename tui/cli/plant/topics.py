@@ -78,6 +78,7 @@ def _drive(line: LineSight, drive: DriveSight) -> dict[str, Any]:
             "schema": JSON_SCHEMA, "time": None, "line": line.text, "device": drive.device,
             "profile": profile, "timeout": None, "values": {}, "state": None, "direction": None,
             "fault": None, "error": drive.error or "No cycle has ended yet.",
+            "contact": drive.contact, "cycle": None,
         }  # fmt: skip
     fault = drive.cycle.state.fault
     return {

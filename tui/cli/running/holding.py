@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
-    from tui.session.monitor.line_watch import Look
+    from tui.session.monitor.look import Look
 
 Tell = Callable[[str, int, str], None]
 """Is given an event, a device and a sentence."""

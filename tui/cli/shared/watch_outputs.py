@@ -97,12 +97,21 @@ def cycle_json(line_text: str, session: DriveSession, snapshot: Snapshot) -> dic
         "state": known_state(snapshot.state),
         "direction": snapshot.state.direction,
         "error": snapshot.error or None,
+        "contact": snapshot.contact,
+        "cycle": {"seconds": round(snapshot.period, 3), "wished": snapshot.wished},
     }
 
 
 def known_state(state: DriveState) -> str | None:
     """The kind of a state that was read; None where its words were not, or tell nothing."""
     return state.kind if state.headline and state.kind != "unknown" else None
+
+
+def late_text(snapshot: Snapshot) -> str:
+    """The cycle time as it is, if the line does not keep the wished one; else nothing."""
+    if not snapshot.too_slow or snapshot.error:
+        return ""
+    return f"(a cycle takes {snapshot.period:.1f} s, not {snapshot.wished:g} s: the line is full)"
 
 
 class LineOutput:
@@ -115,7 +124,8 @@ class LineOutput:
         """Print one cycle as a line; a value that is not good is in brackets."""
         values = "  ".join(_shown(code, read) for code, read in snapshot.readings.items())
         who = self._several.who(one)
-        parts = (_clock(snapshot), who, snapshot.state.headline, values, snapshot.error)
+        late, state = late_text(snapshot), snapshot.state.headline
+        parts = (_clock(snapshot), who, state, values, snapshot.error, late)
         say("  ".join(part for part in parts if part))
 
 
@@ -137,7 +147,8 @@ class TableOutput:
             if latest is None:
                 continue
             parts = (
-                _clock(latest)[:8], self._several.who(drive), latest.state.headline, latest.error
+                _clock(latest)[:8], self._several.who(drive), latest.state.headline, latest.error,
+                late_text(latest),
             )  # fmt: skip
             title = "  ".join(part for part in parts if part)
             tables.append(readings_table(latest.readings, title, width=self._live.console.width))

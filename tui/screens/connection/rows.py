@@ -10,17 +10,26 @@ from .found import profile_text
 from .wall import WallRow
 
 if TYPE_CHECKING:
+    from tui.bus.api import Contact
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
     from tui.session.fleet import Fleet, FoundDrive
-    from tui.session.monitor.line_watch import Look
+    from tui.session.monitor.look import Look
     from tui.session.reading import Reading
 
 TRUSTED_LOOKS = 3
 """Looks after which a value is no longer taken for the present one."""
 
-Seen = tuple["DriveState | None", Mapping[str, "Reading"], float | None, bool, bool]
-"""State, readings, their age in s, whether that is too old, whether the last look was in vain."""
+VAIN: Mapping[str, tuple[str, str]] = {
+    "silent": ("no answer", "lost"),
+    "refused": ("refuses", "refuses"),
+    "damaged": ("damaged", "damaged"),
+    "not_polled": ("not polled", "not polled"),
+}
+"""Words for a look in vain: at first, and once nothing is current any more."""
+
+Seen = tuple["DriveState | None", Mapping[str, "Reading"], float | None, bool, "Contact"]
+"""State, readings, their age in s, whether that is too old, the result of the last look."""
 
 
 def rows_of(fleet: Fleet, now: float, *, connected: bool) -> dict[int, WallRow]:
@@ -39,7 +48,7 @@ def _row(
     who = identity.reference or profile_text(drive) or "unknown drive"
     if console is None:
         return WallRow(identity.device, who, identity.name, words="no profile")
-    state, readings, age, old, vain = _seen(console, look, *at)
+    state, readings, age, old, contact = _seen(console, look, *at)
     report = fleet.stopper.reports.get(identity.device)
     kind, words = said_state(console, state, report, at[0], readings)
     if kind not in ("stop", "stop failed"):
@@ -48,8 +57,8 @@ def _row(
         words = f"no commander, {words}"
     if not connected:
         kind, words, old = "none", "not known", True
-    elif vain:
-        kind, words = "unknown", "lost" if old else "no answer"
+    elif contact != "answers":
+        kind, words = "none" if contact == "not_polled" else "unknown", VAIN[contact][old]
     return WallRow(
         device=identity.device,
         drive=who,
@@ -74,14 +83,14 @@ def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -
         each = max(snapshot.period, 1.0) if console.monitor.running else period
         longest = TRUSTED_LOOKS * each
         old = age is None or age > longest
-        return snapshot.state, snapshot.readings, age, old, bool(snapshot.error)
+        return snapshot.state, snapshot.readings, age, old, snapshot.contact
     if look is None:
-        return None, {}, None, False, False
+        return None, {}, None, False, "not_polled"
     brought = look.before if look.error else look
     if brought is None:
-        return None, {}, None, True, True
+        return None, {}, None, True, look.contact
     age = max(0.0, now - brought.time)
-    return brought.state, brought.readings, age, age > TRUSTED_LOOKS * period, bool(look.error)
+    return brought.state, brought.readings, age, age > TRUSTED_LOOKS * period, look.contact
 
 
 def _called(state: DriveState | None, words: str) -> str:

@@ -35,7 +35,7 @@ from .wall import WallRow, column_heads, columns_for, heading, in_order, wall_li
 if TYPE_CHECKING:
     from tui.session.connect.search import Search
     from tui.session.fleet import FoundDrive
-    from tui.session.monitor.line_watch import Look
+    from tui.session.monitor.look import Look
 
 log = logging.getLogger(__name__)
 

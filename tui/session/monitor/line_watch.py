@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from tui.bus.api import LineWorker, ModbusLine, Priority
+from tui.bus.api import Contact, LineWorker, ModbusLine, Priority, contact_of
 from tui.bus.errors import LineError
 from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, watched_codes
@@ -23,10 +23,10 @@ from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.presence import presence_read
 from ..read.reader import Reader
-from ..reading import Reading
 from ..timeout_told import TimeoutWatch
 from .alarms import FaultOnsets
 from .load import unread_limit
+from .look import Look, last_that_brought
 from .monitor import Monitor
 from .timeout import TOLD_SHARE, TimeoutWarning, has_begun, read_timeout
 
@@ -49,21 +49,6 @@ UNKNOWN_TIMEOUT = 2.0
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
 SHORTEST = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """What the last look at a drive brought."""
-
-    state: DriveState | None
-    error: str
-    time: float
-    timeout: float | None
-    """The drive's communication time-out in seconds, if it is one that runs already."""
-    readings: Mapping[str, Reading] = field(default_factory=dict)
-    """What was read with the state: output frequency, its reference, motor current."""
-    before: Look | None = None
-    """The last look that brought something, where this one brought nothing."""
 
 
 @dataclass(slots=True)
@@ -258,6 +243,7 @@ class LineWatch:
             return GLANCE / 10
         profile, device = kept.session.profile, kept.session.device
         state, error, readings = None, "", {}
+        contact: Contact = "answers"
         try:
             codes = [*_state_codes(profile), *_glance_codes(profile), *unread_limit(kept.session)]
             told = channel_codes(profile)
@@ -268,11 +254,13 @@ class LineWatch:
             state = drive_state(profile, settings | readings)
             self.onsets.note(device, state, kept.session.clock.wall())
         except LineError as fault:
-            error = str(fault)
+            error, contact = str(fault), contact_of(fault)
         timeout = watch.timeout if (watch := self._watch(kept)) and watch.active else None
         if self._kept.get(device) is kept:
-            before = _last_that_brought(self._looks.get(device)) if error else None
-            look = Look(state, error, kept.session.clock.monotonic(), timeout, readings, before)
+            before = last_that_brought(self._looks.get(device)) if error else None
+            look = Look(
+                state, error, kept.session.clock.monotonic(), timeout, readings, before, contact
+            )
             self._looks = {**self._looks, device: look}
         return self.glance_period if kept.learned is not None else GLANCE / 10
 
@@ -291,10 +279,6 @@ class LineWatch:
         kept.watch, kept.unknown = found.watch, not found.known
         kept.learned = kept.session.clock.monotonic()
         return LEARN_AGAIN
-
-
-def _last_that_brought(look: Look | None) -> Look | None:
-    return look.before if look is not None and look.error else look
 
 
 def _glance_codes(profile: Profile) -> list[str]:

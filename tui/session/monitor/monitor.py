@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from tui.bus.api import LineWorker, Priority
+from tui.bus.api import Contact, LineWorker, Priority, contact_of
 from tui.bus.errors import LineClosed, LineError, LineLost
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
@@ -21,7 +21,7 @@ from ..drive import DriveSession
 from ..drive_state import drive_state
 from ..read.reader import Reader
 from ..read.rotation import Rotation
-from ..reading import Reading
+from ..reading import Quality, Reading
 from .rates import SLOW_FACTOR, Rates, rates_of
 from .snapshot import Snapshot, stale_after
 from .trend import Trend, TrendPoint
@@ -30,6 +30,7 @@ from .trend_notes import TrendNotes
 log = logging.getLogger(__name__)
 
 SHORTEST_PERIOD = 0.05
+CONTACT_MADE: Contact = "answers"
 RESET_NEAR = frozenset({"fault", "starting", "unknown"})
 """Kinds of state in or after which a drive is reset, maybe without falling silent."""
 FORGOTTEN_AFTER = 3
@@ -174,7 +175,7 @@ class Monitor:
             while True:
                 started = self.session.clock.monotonic()
                 cycle += 1
-                error = ""
+                error, contact = "", CONTACT_MADE
                 period = self._period(rates)
                 self.reader.max_age = period * SHARED_AGE
                 if self._all_due or self._stirs != self.session.stirs:
@@ -188,7 +189,7 @@ class Monitor:
                     turn = due.turn(seldom, self.reader.groups)
                     readings.update(await self._cycle(rates, readings, turn))
                 except (LineError, DriveError) as fault:
-                    error = str(fault)
+                    error, contact = str(fault), contact_of(fault)
                     failures += 1
                     begun.clear()
                     due.failed(self.reader.groups)
@@ -199,7 +200,9 @@ class Monitor:
                     failures = 0
                     due.came()
                     begun.append(started)
-                self._publish(cycle, readings, rates, _span(begun, period), error)
+                # by now other monitors have told their wishes
+                period = self._period(rates)
+                self._publish(cycle, readings, rates, _span(begun, period), error, contact)
                 if not error:
                     await self._learn(cycle)
                 rest = started + period - self.session.clock.monotonic()
@@ -250,12 +253,14 @@ class Monitor:
         rates: Rates,
         span: float,
         error: str,
+        contact: Contact,
     ) -> None:
         now = self.session.clock.monotonic()
         aged = {
             code: reading.aged(now, stale_after(span, often=code in rates.fast))
             for code, reading in readings.items()
         }
+        refused = not error and all(one.quality is Quality.BAD for one in aged.values())
         snapshot = Snapshot(
             cycle=cycle,
             time=now,
@@ -267,6 +272,8 @@ class Monitor:
             line=self.line.state,
             block=self._using,
             period=span,
+            wished=max(self.period, SHORTEST_PERIOD),
+            contact="refused" if refused else contact,
         )
         if not error and snapshot.state.kind != self._kind:
             self._kind = snapshot.state.kind

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.bus.api import LineState
+from tui.bus.api import Contact, LineState
 
 from ..drive_state import DriveState
 from ..reading import Reading
@@ -13,6 +13,8 @@ from .rates import SLOW_FACTOR
 
 STALE_CYCLES = 3
 """Cycles after which a value is no longer taken for the present one."""
+TOO_SLOW = 1.2
+"""A cycle takes too long from so many times the wished one."""
 STALE_LEAST = 1.5
 """Seconds for which a snapshot counts however fast the cycles are."""
 
@@ -45,6 +47,15 @@ class Snapshot:
     """The block or scanner that brought some of the values."""
     period: float = 0.5
     """Seconds from one cycle to the next, as they were."""
+    wished: float = 0.5
+    """Seconds from one cycle to the next, as they should be."""
+    contact: Contact = "answers"
+    """Result of the requests of this cycle."""
+
+    @property
+    def too_slow(self) -> bool:
+        """True if the line does not keep the wished cycle time."""
+        return self.period > TOO_SLOW * self.wished
 
     def is_stale(self, now: float) -> bool:
         """Whether no cycle has ended for so long that nothing here is the present any more."""

@@ -1,0 +1,33 @@
+"""Looks at a drive that no monitor watches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tui.bus.api import Contact
+
+from ..drive_state import DriveState
+from ..reading import Reading
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the last look at a drive brought."""
+
+    state: DriveState | None
+    error: str
+    time: float
+    timeout: float | None
+    """The drive's communication time-out in seconds, if it is one that runs already."""
+    readings: Mapping[str, Reading] = field(default_factory=dict)
+    """What was read with the state: output frequency, its reference, motor current."""
+    before: Look | None = None
+    """The last look that brought something, where this one brought nothing."""
+    contact: Contact = "answers"
+    """Result of the requests of this look."""
+
+
+def last_that_brought(look: Look | None) -> Look | None:
+    """The look itself if it brought something, else the last one before that did."""
+    return look.before if look is not None and look.error else look
