@@ -1,29 +1,38 @@
 """Many simulated drives on one line, all watched at once: how full, how even, at what cost.
 
     python -m benchmarks.fleet [--drives N] [--seconds S] [--period S]
+    python -m benchmarks.fleet --serve [--lines N] [--drives N] [--seconds S]
 
-Once all drives answer; once, from the same start, one of them is switched off. All drives read
-their slow values at about the same time, in every tenth cycle: a stretch of time holds that or
-not, so only stretches at the same distance from the start can be compared.
+With --serve `drivepanel serve` reads them for Prometheus, with a cycle wished each second. Without,
+this program reads them: once all drives answer; once, from the same start, one of them is switched
+off. All drives read their slow values at about the same time, in every tenth cycle: a stretch of
+time holds that or not, so only stretches at the same distance from the start can be compared.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import re
 import resource
+import signal
+import subprocess
 import sys
+import tempfile
 import time
+import urllib.request
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from statistics import median
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.wire import Record, WireLine, Worker, share
+from benchmarks.wire import ROOT, Record, WireLine, Worker, share
 from tui.bus.line import Line
 from tui.bus.link import parse_link
 from tui.drive.profile.library import load
@@ -154,6 +163,120 @@ def full_sets(wire: WireLine, drives: Mapping[int, str]) -> float:
     return values / seconds
 
 
+# Through serve
+
+READ_WITHIN = 40.0
+"""Seconds from the start of serve in which each drive is to be read."""
+SAMPLE = re.compile(r"^drivepanel_(\w+)\{(.*)\} (\S+)$", re.MULTILINE)
+
+
+def named_drives(wires: Sequence[WireLine], drives: Mapping[int, str]) -> str:
+    """The settings file that names the profile of each drive."""
+    return "".join(
+        f'[lines.l{number}d{address}]\nline = "{wire.text}"\n'
+        f'device = {address}\nprofile = "{family}"\n'
+        for number, wire in enumerate(wires)
+        for address, family in drives.items()
+    )
+
+
+def scraped(url: str) -> dict[str, list[tuple[str, float]]]:
+    """The samples of each metric, with their labels."""
+    found: dict[str, list[tuple[str, float]]] = {}
+    with urllib.request.urlopen(url, timeout=30) as answer:
+        for name, labels, value in SAMPLE.findall(answer.read().decode()):
+            found.setdefault(name, []).append((labels, float(value)))
+    return found
+
+
+def served(given: argparse.Namespace) -> dict[str, Any]:
+    """Figures of serve, from its start until so many seconds after every drive was read."""
+    drives, wires = fleet(given.drives), [WireLine() for _ in range(given.lines)]
+    with tempfile.TemporaryDirectory() as name:
+        config = Path(name, "config")
+        config.mkdir()
+        try:
+            for wire in wires:
+                wire.set_up(drives, LineTiming(given.baud, "8E1", True))
+            Path(config, "settings.toml").write_text(named_drives(wires, drives), "utf-8")
+            places = {"DRIVEPANEL_STATE": f"{name}/state", "DRIVEPANEL_CONFIG": str(config)}
+            command = [sys.executable, "-m", "tui", "serve", "--metrics", "127.0.0.1:0"]
+            command += ["--every", "1", *(f"{wire.text}@1-{given.drives}" for wire in wires)]
+            begun = time.monotonic()
+            with subprocess.Popen(
+                command, env=os.environ | places, cwd=ROOT, text=True,
+                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            ) as process:  # fmt: skip
+                try:
+                    return followed(process, begun, given)
+                finally:
+                    process.send_signal(signal.SIGTERM)
+        finally:
+            for wire in wires:
+                wire.close()
+
+
+def followed(
+    process: subprocess.Popen[str], begun: float, given: argparse.Namespace
+) -> dict[str, Any]:
+    """What its metrics tell, looked at each second."""
+    assert process.stdout is not None
+    url = re.search(r"metrics at (http:\S+metrics)", process.stdout.readline())
+    assert url is not None, "serve did not start"
+    first: dict[str, float] = {}
+    """When each drive was seen to be read, in seconds from the start."""
+    not_read: list[dict[str, int]] = []
+    """Drives without current values at each look after that, by the reason."""
+    cycles: dict[str, list[float]] = {}
+    count, end = given.lines * given.drives, begun + READ_WITHIN + given.seconds
+    while (now := time.monotonic()) < end:
+        seen = scraped(url[1])
+        for labels, value in seen["drive_up"]:
+            if value:
+                first.setdefault(labels, now - begun)
+        if len(first) == count:
+            contacts = Counter(
+                labels.rpartition("contact=")[2].strip('"')
+                for labels, value in seen["drive_contact"]
+                if value
+            )
+            not_read.append({one: n for one, n in contacts.items() if one != "answers"})
+            for labels, value in seen["drive_cycle_seconds"]:
+                cycles.setdefault(labels, []).append(value)
+        time.sleep(max(0.0, now + 1.0 - time.monotonic()))
+    last = [values[-1] for values in cycles.values()]
+    return {
+        "drives": count,
+        "read": len(first),
+        "first_read": min(first.values(), default=None),
+        "last_read": max(first.values(), default=None),
+        "looks": len(not_read),
+        "looks_with_all_read": sum(not one for one in not_read),
+        "not_read": dict(sum((Counter(one) for one in not_read), Counter())),
+        "cycle": {"least": min(last), "median": median(last), "most": max(last)} if last else None,
+    }
+
+
+def show_served(console: Console, found: dict[str, Any], given: argparse.Namespace) -> None:
+    """Print the figures of serve."""
+    cycle = found["cycle"] or {"least": 0.0, "median": 0.0, "most": 0.0}
+    table = Table(title=f"serve, {given.lines} x {given.drives} drives at {given.baud} baud")
+    table.add_column("")
+    table.add_column("measured", justify="right")
+    for name, text in {
+        f"drives read (aim: within {READ_WITHIN:g} s)": f"{found['read']} of {found['drives']}",
+        "first read, s": f"{found['first_read'] or 0:.0f}",
+        "last read, s": f"{found['last_read'] or 0:.0f}",
+        "looks with all read": f"{found['looks_with_all_read']} of {found['looks']}",
+        "drives not read in the others": str(found["not_read"] or "none"),
+        "cycle, least / median / most, s": "{least:.1f} / {median:.1f} / {most:.1f}".format(
+            **cycle
+        ),
+    }.items():
+        table.add_row(name, text)
+    console.print(table)
+
+
 # What is printed
 
 
@@ -192,6 +315,8 @@ def options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Many drives on one line.")
     parser.add_argument("--drives", type=int, default=31)
     parser.add_argument("--baud", type=int, default=19200)
+    parser.add_argument("--serve", action="store_true", help="read them by drivepanel serve")
+    parser.add_argument("--lines", type=int, default=1, help="lines of serve")
     parser.add_argument("--seconds", type=float, default=20.0, help="length of each stretch")
     parser.add_argument("--period", type=float, default=0.1, help="wished cycle time in seconds")
     return parser.parse_args()
@@ -219,6 +344,11 @@ def main() -> None:
     """Measure, print the table, and all figures as JSON in the last line."""
     given = options()
     console = Console()
+    if given.serve:
+        found = served(given)
+        show_served(console, found, given)
+        print(json.dumps({"benchmark": "fleet", "lines": given.lines, "serve": found}))
+        return
     chosen = (given.drives + 1) // 2
     wire = WireLine()
     try:
