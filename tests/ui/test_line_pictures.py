@@ -11,6 +11,7 @@ from textual.pilot import Pilot
 
 from tui.bus.api import Contact, LineState
 from tui.bus.errors import PortBusy
+from tui.bus.program import KEEPER, Program
 from tui.screens.open_lines import LineOpening
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.known_line import KnownLine
@@ -202,6 +203,17 @@ async def not_answering(app: Any, pilot: Pilot[None]) -> None:
     await show(app, pilot, fleet, fakes.CONNECTED)
 
 
+async def shared(app: Any, pilot: Pilot[None]) -> None:
+    await show(app, pilot, wall(5), fakes.CONNECTED)
+    line = app.opened.line
+    others = [Program("2", "serve", 812), Program("3", "watch", 902), Program("4", "watch", 977)]
+    line.facts.set_programs((line.facts.me, *others, Program("5", KEEPER, 811)))
+    shares = {line.facts.me.id: 0.08, "2": 0.61, "3": 0.09}
+    line.counters = replace(line.counters, programs=shares)
+    app.connection.show_about()
+    await pilot.pause()
+
+
 async def line_lost(app: Any, pilot: Pilot[None]) -> None:
     await show(app, pilot, wall(5, line=fakes.LOST), fakes.LOST)
 
@@ -233,6 +245,7 @@ STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
     "thirty-one": thirty_one,
     "lost-drive": lost_drive,
     "not-answering": not_answering,
+    "shared": shared,
     "line-lost": line_lost,
     "wrong-addresses": wrong_addresses,
     "dialog": dialog,

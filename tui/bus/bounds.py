@@ -45,5 +45,6 @@ StopTimes = Annotated[dict[DeviceId, MonotonicTime], Meta(max_length=MOST_DEVICE
 """When each device was stopped last."""
 DeviceIds = Annotated[tuple[DeviceId, ...], Meta(max_length=MOST_DEVICES)]
 Shares = Annotated[dict[DeviceId, Share], Meta(max_length=MOST_DEVICES)]
+ProgramShares = Annotated[dict[ProgramId, Share], Meta(max_length=MOST_PROGRAMS)]
 ByProgram = Annotated[dict[StopperId, StopCount], Meta(max_length=MOST_STOPPERS)]
 StopsByDevice = Annotated[dict[DeviceId, ByProgram], Meta(max_length=MOST_DEVICES)]

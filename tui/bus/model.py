@@ -15,6 +15,7 @@ from .bounds import (
     DeviceId,
     MonotonicTime,
     Number,
+    ProgramShares,
     Seconds,
     Text,
 )
@@ -184,6 +185,8 @@ class LineCounters:
     overruns: Number = 0
     repeats: Number = 0
     """Requests that were sent again."""
+    programs: ProgramShares = field(default_factory=dict)
+    """The share of the line's time that each program had of late, by its id."""
     devices: Annotated[Mapping[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = field(
         default_factory=dict
     )

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .model import TURNAROUND_EDGES, DeviceCounters, LineCounters, Priority
+from .program_use import ProgramUse
 
-OF_DEVICES = "devices"
-_PLAIN = tuple(name for name in LineCounters.__slots__ if name != OF_DEVICES)
+_OF_SEVERAL = ("devices", "programs")
+_PLAIN = tuple(name for name in LineCounters.__slots__ if name not in _OF_SEVERAL)
 
 
 @dataclass(slots=True)
@@ -66,6 +67,9 @@ class Tally:
     overruns: int = 0
     repeats: int = 0
     devices: dict[int, DeviceTally] = field(default_factory=dict)
+    use: ProgramUse = field(default_factory=ProgramUse)
+    shares: dict[str, float] = field(default_factory=dict)
+    """The share of each program, from the program that owns the line."""
 
     def of(self, device: int) -> DeviceTally:
         """The counts of a device; in the line's thread only."""
@@ -123,6 +127,7 @@ class Tally:
         """Take over the counts of the program that owns the line, of devices those that changed."""
         for name in _PLAIN:
             setattr(self, name, getattr(counters, name))
+        self.shares = dict(counters.programs)
         for device, one in devices.items():
             self.devices[device] = DeviceTally(
                 **{n: getattr(one, n) for n in DeviceCounters.__slots__}
@@ -133,4 +138,5 @@ class Tally:
         # copy() runs without giving up the interpreter, so no device comes in between
         each = self.devices.copy()
         found = {device: one.frozen() for device, one in each.items()}
-        return LineCounters(**{n: getattr(self, n) for n in _PLAIN}, devices=found)
+        plain = {name: getattr(self, name) for name in _PLAIN}
+        return LineCounters(**plain, devices=found, programs=self.use.shares or self.shares)

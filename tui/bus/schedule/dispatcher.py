@@ -40,7 +40,7 @@ class Dispatcher:
         """What the programs that share the line must know of each other."""
         self._devices = devices
         self._clock = clock
-        self._queue = JobQueue(timing.queue_length)
+        self._queue = JobQueue(timing.queue_length, tally.use)
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
         self.proof = StepProof(devices, self._outcomes, clock)

@@ -13,6 +13,7 @@ from ..link import Link, TcpLink, label
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
 from ..prepared import PreparedWrite
+from ..program_use import ProgramUse
 from ..shared_facts import SharedFacts
 from ..tally import Tally
 from ..trace import Trace
@@ -53,7 +54,7 @@ class Engine:
         self.facts = facts or SharedFacts()
         self.pace = Pace()
         self.trace = Trace(timing.trace_length)
-        self.tally = Tally()
+        self.tally = Tally(use=ProgramUse(clock))
         self.devices = Devices(timing, mistakable=not isinstance(link, TcpLink))
         self.state = LineState(LineStatus.CLOSED, "", clock())
         self._link = link

@@ -11,6 +11,7 @@ from ..errors import LineBusy, LineError, LineFailed, Superseded
 from ..expectation import Expectation
 from ..limits import Limits
 from ..model import Priority, Reply
+from ..program_use import ProgramUse
 from ..requests import BROADCAST, Request
 from .shares import LineShares
 
@@ -79,8 +80,10 @@ class JobQueue:
     It passes by what must wait yet.
     """
 
-    def __init__(self, length: int) -> None:
+    def __init__(self, length: int, use: ProgramUse | None = None) -> None:
+        """`use` counts the time that each program has."""
         self._length = length
+        self._use = use or ProgramUse()
         self._shares = LineShares()
         self._orders = itertools.count()
         self._jobs: list[Job] = []
@@ -147,6 +150,7 @@ class JobQueue:
     def count(self, job: Job, seconds: float) -> None:
         """A job that was taken has kept the line for so long."""
         self._shares.count(job, seconds, self._jobs)
+        self._use.count(job.program, seconds)
 
     @staticmethod
     def _withdrawn(job: Job) -> bool:

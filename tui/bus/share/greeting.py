@@ -13,6 +13,7 @@ from typing import Protocol
 from ..bounds import MOST_PROGRAMS
 from ..link import label
 from ..schedule.inside import LineInside
+from .line_clients import LOOK_HEAD, look_answer
 from .messages import (
     LENGTH,
     VERSION,
@@ -72,6 +73,10 @@ class Greeting:
             head = await reader.readexactly(LENGTH)
             if head == STOP_HEAD:
                 await self._hear_stop(reader, writer)
+                return None
+            if head == LOOK_HEAD and not self._is_stranger(writer):
+                shares = self._inside.around.tally.use.shares
+                writer.write(look_answer(self._inside.facts.programs, shares))
                 return None
             message = await next_message(reader, head)
         leaves = isinstance(message, Goodbye)

@@ -58,12 +58,23 @@ class LeftOnLineDocument(LeftBehindDocument, kw_only=True):
     device: int
 
 
+class LineClientDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A program on a line that is open."""
+
+    program: str
+    pid: int
+    share: float
+    """Of the line's time, over about 10 s: 1 is all of it."""
+
+
 class OpenLineDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """A line that is open, and the process that holds it: `keeper` as a rule."""
 
     line: str
     program: str
     pid: int
+    clients: list[LineClientDocument] | None
+    """The programs on the line; null without an answer of its holder."""
 
 
 class LinesTold(DocumentTold, kw_only=True):

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tui.drive.plain import plain
-from tui.widgets.drawing import wrapped
+from tui.widgets.drawing import short, wrapped
 from tui.widgets.palette import ATTENTION, FAINT
 
 if TYPE_CHECKING:
+    from tui.bus.api import ModbusLine
     from tui.session.fleet import FoundDrive
 
 WATCHED_ONLY = "It is watched by that profile, and not armed."
@@ -52,13 +53,33 @@ def next_step(drive: FoundDrive) -> str:
     return ""
 
 
-def about_lines(drive: FoundDrive | None, left: str, width: int) -> list[Text]:
+def use_text(line: ModbusLine) -> str:
+    """The share of the line's time that each program has; empty if only this one is on it."""
+    facts = line.facts
+    if not facts.others:
+        return ""
+    from tui.bus.program import LONGEST_NAME, readable  # the first picture needs none of it
+    from tui.bus.program_use import use_by_program
+
+    found = use_by_program(facts.programs, line.counters.programs)
+    names = [one.name for one, _ in found]
+    parts = []
+    for one, share in found:
+        name = "this panel" if one.id == facts.me.id else readable(one.name, LONGEST_NAME)
+        several = names.count(one.name) > 1 and one.id != facts.me.id
+        parts.append(f"{name}{f' {one.pid}' if several else ''} {share:>3.0%}")
+    total = min(1.0, sum(share for _, share in found))
+    return " · ".join((f"In use {total:>4.0%}", *parts))
+
+
+def about_lines(drive: FoundDrive | None, left: str, width: int, use: str = "") -> list[Text]:
     """All that a drive says of itself, and what to do about one that does not.
 
-    First of all a motor that no program commands: `left` says who started it.
+    First of all a motor that no program commands: `left` says who started it. `use` is the use of
+    the line, if there is nothing to do about the drive.
     """
-    parts = [about_drive(drive), next_step(drive)] if drive else []
-    lines = [Text(f" {plain(part)}", FAINT) for part in parts]
+    parts = [about_drive(drive), next_step(drive) or use] if drive else ["", use] if use else []
+    lines = [Text(f" {short(plain(part), width - 2)}", FAINT) for part in parts]
     if left:
         del lines[1:]
         text = f"{left} Press Enter: then Space stops it, T takes it over."

@@ -1,0 +1,105 @@
+"""The share of a line's time that each program has, as the line counts it."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from tui.bus.bounds import MOST_PROGRAMS
+from tui.bus.line import Line
+from tui.bus.program import KEEPER, Program
+from tui.bus.program_use import USE_WINDOW, ProgramUse, use_by_program
+from tui.bus.share.line_clients import LineClient, line_clients, look_answer
+from tui.bus.share.place import Owner, owner_of_lock
+
+from .conftest import Share
+from .peer import PtyPeer, Step, eventually, reply
+from .sharing import SharedLines
+
+
+def slow(request: bytes, _count: int) -> Sequence[Step]:
+    return [0.1, reply(request)]
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_share_is_the_time_that_a_program_had_of_late() -> None:
+    clock = Clock()
+    use = ProgramUse(clock)
+    for step in range(600):
+        clock.now += 0.1
+        use.count("a", 0.06)
+        if step % 3 == 0:
+            use.count("b", 0.09)
+    assert use.shares == pytest.approx({"a": 0.6, "b": 0.3}, rel=0.02)
+    clock.now += USE_WINDOW
+    assert use.shares == pytest.approx({"a": 0.22, "b": 0.11}, rel=0.03)
+    clock.now += 10 * USE_WINDOW
+    assert use.shares == {}
+
+
+def test_use_is_bounded_to_the_programs_of_a_message() -> None:
+    use = ProgramUse(Clock())
+    for number in range(3 * MOST_PROGRAMS):
+        use.count(f"program {number}", 1.0 + number)
+    assert len(use.shares) <= MOST_PROGRAMS
+    assert f"program {3 * MOST_PROGRAMS - 1}" in use.shares
+
+
+def test_answer_to_a_look_names_programs_and_not_the_keeper() -> None:
+    programs = [Program("k", KEEPER, 1), Program("a", "watch\n", 3), Program("b", "serve", 2)]
+    found = msgspec.json.decode(look_answer(programs, {"b": 0.5, "k": 0.1}), type=list[LineClient])
+    assert found == [LineClient("serve", 2, 0.5), LineClient("watch?", 3, 0.0)]
+
+
+async def test_attached_programs_and_a_look_have_the_shares(share: Share) -> None:
+    with PtyPeer(slow) as peer:
+        lines = share(peer.path)
+        owner, client = lines.open("serve"), lines.open("panel")
+        for _ in range(5):
+            await client.read(1, 0)
+            await owner.read(1, 1)
+        ids = {client.facts.me.id, owner.facts.me.id}
+
+        def has_both(line: Line) -> bool:
+            return set(line.counters.programs) == ids
+
+        await asyncio.to_thread(eventually, lambda: has_both(owner) and has_both(client))
+        shares = owner.counters.programs
+        found = {one for one, _ in use_by_program(owner.facts.programs, shares)}
+        assert {one.id for one in found} == ids
+        answer = await asyncio.to_thread(clients, lines)
+        assert {one.program for one in answer} == {"serve", "panel"}
+        assert all(one.share > 0.0 for one in answer)
+
+
+def clients(lines: SharedLines) -> list[LineClient]:
+    """The answer to a program that looks at the line."""
+    (lock,) = (lines.folder / "lines").glob("*.lock")
+    owner = owner_of_lock(lock)
+    assert owner is not None
+    found = line_clients(owner)
+    assert found is not None
+    return found
+
+
+def test_look_without_an_answer_returns_none(tmp_path: Path) -> None:
+    holder = Program("k", KEEPER, 1)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        begun = time.monotonic()
+        assert line_clients(Owner(1, holder, str(tmp_path / "s"))) is None
+        assert time.monotonic() - begun < 5
+    assert line_clients(Owner(1, holder, str(tmp_path / "none"))) is None
