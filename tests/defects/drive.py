@@ -194,7 +194,7 @@ DEFECTS = (
     Defect(
         "option-bits-lost",
         "tui/drive/orders.py",
-        "kept = raws.get(where, 0) & keep",
+        "kept = raws.get(where, 0) & optional_bits(chart, where)",
         "kept = 0",
         "A run command switches an option of the drive off.",
         ("tests/session/test_command.py::test_options_of_an_altivar_21_stay_from_order_to_order",),

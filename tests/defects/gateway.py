@@ -65,6 +65,22 @@ DEFECTS = (
         (GATEWAY,),
     ),
     Defect(
+        "foreign-stop-waits-for-a-read",
+        "tui/session/gateway/gateway.py",
+        "            line.drives.keep_chart_known(device)\n",
+        "",
+        "A stop waits until another word is read.",
+        ("tests/session/test_gateway_stops.py",),
+    ),
+    Defect(
+        "foreign-stop-by-an-old-chart",
+        "tui/bus/schedule/dispatcher.py",
+        "            self._outcomes.values.drop(job.request.device)\n",
+        "            pass\n",
+        "A word runs the motor, as another program has just changed what it does.",
+        ("tests/session/test_gateway_stops.py",),
+    ),
+    Defect(
         "foreign-stop-unheard",
         "tui/session/gateway/commanding.py",
         'self._line.facts.give_stop([device], f"Modbus TCP client {client}")',

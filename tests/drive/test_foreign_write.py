@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tui.drive.foreign_write import (
     ALL,
@@ -119,5 +121,36 @@ def test_a_value_past_its_limits_is_refused() -> None:
     assert value_refusal(ATV71, acc, {acc.address: 60000})
 
 
-def test_what_decides_about_a_stop_can_be_read() -> None:
-    assert set(stop_deciding_codes(ATV71)) >= {"CHCF", "ETA", "CMD", "DOTD"}
+@pytest.mark.parametrize(
+    ("profile", "code", "word", "codes"),
+    [
+        (ATV71, "CMD", 0x0007, {"CHCF"}),
+        (ATV71, "CMD", 0x010F, {"CHCF", "DOTD", "ETA"}),
+        (ATV71, "CMD", 0x000F, set()),
+        (ATV71, "LFR", 300, set()),
+        (ATV31, "CMD", 0x0007, set()),
+        (ATV21, "FA00", 0xC003, {"FA00"}),
+        (POWERDRIVE, "6.42", 0x0001, {"10.40"}),
+    ],
+)
+def test_few_words_are_read_before_stop(
+    profile: Profile, code: str, word: int, codes: set[str]
+) -> None:
+    assert set(stop_deciding_codes(profile, {profile[code].address: word})) == codes
+
+
+@given(
+    word=st.sampled_from([0, 1, 2, 7, 0x0F, 0x010F, 0x080F, 0xC000, 0xC003, 0xC800, 0xD000]),
+    profile=st.sampled_from([ATV71, ATV31, ATV21, POWERDRIVE]),
+    values=st.lists(st.sampled_from([0, 1, 2, 3, 0x33, 0x37, 0xC403]), min_size=6, max_size=6),
+)
+def test_words_read_before_stop_decide(word: int, profile: Profile, values: list[int]) -> None:
+    """Whatever else is known changes nothing."""
+    charts = [chart for chart in profile.data.charts if chart.command]
+    known = [code for chart in charts for code in (chart.status, chart.command)]
+    names = dict.fromkeys([*known, "CHCF", "DOTD", "TCC", "RRS"])
+    raws = dict(zip([one for one in names if profile.get(one)], values, strict=False))
+    for chart in charts:
+        words = {profile[chart.command].address: word}
+        read = {code: raws[code] for code in stop_deciding_codes(profile, words)}
+        assert foreign_words(profile, words, raws) == foreign_words(profile, words, read)

@@ -243,19 +243,22 @@ async def test_a_word_that_stops_by_what_was_set_before_it_waits_for_that(bench:
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}), writes=allowed_codes("CHCF"))
     silent = asyncio.Event()
 
-    async def turn() -> None:
-        await silent.wait()
-
     assert await made.write(CMD, 0x0007) == 0
-    sent = len(made.line.trace)
+    sent = made.written()
     setting = struct.pack(">BHH", 6, ATV71["CHCF"].address, 3)
     stop = struct.pack(">BHH", 6, CMD, 0x0007)
-    tasks = [
-        asyncio.create_task(made.gateway.answer(TcpRequest(made.client, 1, pdu, turn=turn)))
-        for pdu in (setting, stop)
-    ]
+    tasks: list[asyncio.Task[bytes]] = []
+
+    async def turn() -> None:
+        await silent.wait()
+        if asyncio.current_task() is not tasks[0]:
+            await tasks[0]
+
+    for pdu in (setting, stop):
+        answer = made.gateway.answer(TcpRequest(made.client, 1, pdu, turn=turn))
+        tasks.append(asyncio.create_task(answer))
     await asyncio.sleep(0.1)
-    assert len(made.line.trace) == sent
+    assert made.written() == sent
     silent.set()
     assert [(await one)[:2].hex() for one in tasks] == ["0620", "8601"]
 

@@ -15,7 +15,7 @@ from typing import Literal
 from .channel import channel_codes
 from .chart import state_of
 from .errors import DriveError
-from .orders import WAYS_TO_STOP, deciding_codes, order_target, with_options
+from .orders import WAYS_TO_STOP, chart_codes, optional_bits, order_target, with_options
 from .profile.profile import Profile, is_verified
 from .profile.schema import Chart, Order, Parameter
 from .settings.writable import cuts_line, is_order, is_setting, never_set
@@ -132,9 +132,7 @@ def _is_stop(
     word: int,
     raws: Mapping[str, int],
 ) -> bool:
-    if order.id not in WAYS_TO_STOP or len(order.words) != 1:
-        return False
-    if order_target(profile, chart, order).address != parameter.address or is_field(parameter):
+    if not _may_stop(profile, chart, order, {parameter.address: word}):
         return False
     if not all(when.holds(raws) for when in order.when):
         return False
@@ -145,13 +143,40 @@ def _is_stop(
     return word in (order.words[0] & 0xFFFF, *with_options(chart, order, raws))
 
 
-def stop_deciding_codes(profile: Profile) -> list[str]:
-    """Codes of the words by which a stop is told from a run command."""
-    charts = [chart for chart in profile.data.charts if chart.orders]
-    own = (code for chart in charts for code in (chart.status, chart.command) if code)
+def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, int]) -> bool:
+    """Whether the words carry out an order that stops, should what it depends on be so."""
+    if order.id not in WAYS_TO_STOP or len(order.words) != 1:
+        return False
+    place = order_target(profile, chart, order)
+    word, own = words.get(place.address), order.words[0] & 0xFFFF
+    if word is None or is_field(place):
+        return False
+    optional = optional_bits(chart, place.code) if own else 0
+    return word | optional == own | optional
+
+
+def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]:
+    """Codes of the words that decide whether one of these words only stops; none where none can.
+
+    As few as possible: a stop waits until they are read.
+    """
+    found = [
+        (chart, order)
+        for chart in profile.data.charts
+        for order in chart.orders
+        if _may_stop(profile, chart, order, words)
+    ]
+    codes = chart_codes(profile) if found else []
+    for chart, order in found:
+        codes += [when.parameter for when in order.when]
+        place = order_target(profile, chart, order)
+        if order.states:
+            codes.append(chart.status)
+        if words[place.address] != order.words[0] & 0xFFFF:
+            codes.append(place.code)
     return [
         code
-        for code in dict.fromkeys((*own, *deciding_codes(profile)))
+        for code in dict.fromkeys(codes)
         if (one := profile.get(code)) is not None and one.access != "w"
     ]
 

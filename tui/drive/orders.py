@@ -27,13 +27,18 @@ class OrderRefused(DriveError):
 
 def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
     """The chart that surely holds; None while the word that decides between charts is unknown."""
-    deciding = {chart.when.parameter for chart in profile.data.charts if chart.when}
-    return profile.chart(raws) if deciding <= raws.keys() else None
+    return profile.chart(raws) if raws.keys() >= set(chart_codes(profile)) else None
+
+
+def chart_codes(profile: Profile) -> list[str]:
+    """Codes of the words that decide which chart holds; none for most families."""
+    codes = (chart.when.parameter for chart in profile.data.charts if chart.when)
+    return list(dict.fromkeys(codes))
 
 
 def deciding_codes(profile: Profile) -> list[str]:
     """Codes of the words on which it depends how an order is carried out, and by whom."""
-    codes = [chart.when.parameter for chart in profile.data.charts if chart.when]
+    codes = chart_codes(profile)
     for chart in profile.data.charts:
         codes += [when.parameter for order in chart.orders for when in order.when]
     return list(dict.fromkeys((*codes, *channel_codes(profile))))
@@ -203,12 +208,17 @@ def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[in
     Zeros hand the control back or lock the drive: they stay zeros.
     """
     where = order.parameter or chart.command
-    keep = 0
-    for option in chart.options:
-        if option.parameter == where:
-            keep |= option.mask
-    kept = raws.get(where, 0) & keep
+    kept = raws.get(where, 0) & optional_bits(chart, where)
     return [word & 0xFFFF | kept if word else 0 for word in order.words]
+
+
+def optional_bits(chart: Chart, code: str) -> int:
+    """The bits of a word that carry options beside a command."""
+    bits = 0
+    for option in chart.options:
+        if option.parameter == code:
+            bits |= option.mask
+    return bits
 
 
 def order_target(profile: Profile, chart: Chart, order: Order) -> Parameter:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from math import inf
 
 from tui.bus.api import LineState, LineStatus, ModbusLine, Priority
+from tui.bus.errors import LineError
 from tui.bus.limits import MAX_READ, Limits
 from tui.drive.foreign_write import WordKind, foreign_words
+from tui.drive.orders import chart_codes
 from tui.drive.profile import library
+from tui.drive.values import from_words, word_count
 
 from ..connect.contradiction import own_words
 from ..connect.identify import DriveIdentity, identify_drive
@@ -30,6 +35,9 @@ READ_THROUGH = Limits(
 WHO_AGAIN_AFTER = 30.0
 """Seconds after which a drive that did not say who it is is asked again."""
 
+CHART_READ_EACH = 1.5
+"""Seconds after which the word that decides between charts is read again for a client."""
+
 Note = Callable[[int, DriveIdentity | None, str], None]
 """Is given a device, what it says of itself, and the profile it is taken by."""
 
@@ -49,12 +57,15 @@ class GatewayDrives:
         """Families of which a nameless device may be."""
         self._asked: dict[int, float] = {}
         self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
+        self._charts: dict[int, float] = {}
+        """When the word that decides between charts was last asked for, by device."""
+        self._reads: set[asyncio.Task[None]] = set()
         self._leave = line.on_state(self._state)
 
     def close(self) -> None:
         """Look after nothing any more."""
         self._leave()
-        for task in self._tasks.values():
+        for task in (*self._tasks.values(), *self._reads):
             task.cancel()
 
     def known(self, device: int) -> DriveSession | None:
@@ -98,6 +109,37 @@ class GatewayDrives:
         """It was silent: who it is is asked again before anything but a stop is written to it."""
         self._doubtful |= {device}
         self._asked.pop(device, None)
+
+    async def read_raw(
+        self, session: DriveSession, code: str, *, priority: Priority, max_age: float
+    ) -> int:
+        """One word, also from a read by any program up to `max_age` seconds ago. Raises errors."""
+        one = session.profile.find(code)
+        reply = await self.line.read(
+            session.device, one.address, word_count(one),
+            priority=priority, function=one.function, max_age=max_age,
+        )  # fmt: skip
+        return from_words(one, reply.words)
+
+    def keep_chart_known(self, device: int) -> None:
+        """Read the word that distinguishes a stop from a run command, now and then; its client asks.
+
+        So a stop that follows needs not wait for it. The drive is asked just now in any case.
+        """
+        session = self._found.get(device)
+        codes = chart_codes(session.profile) if session is not None else []
+        now = asyncio.get_running_loop().time()
+        if session is None or not codes or now - self._charts.get(device, -inf) < CHART_READ_EACH:
+            return
+        self._charts[device] = now
+        task = asyncio.create_task(self._read_chart(session, codes), name=f"chart of {device}")
+        self._reads.add(task)
+        task.add_done_callback(self._reads.discard)
+
+    async def _read_chart(self, session: DriveSession, codes: list[str]) -> None:
+        with suppress(LineError):
+            for code in codes:
+                await self.read_raw(session, code, priority=Priority.POLL, max_age=CHART_READ_EACH)
 
     def _state(self, state: LineState) -> None:
         """Called in the line's thread."""

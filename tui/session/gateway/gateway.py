@@ -82,6 +82,7 @@ class Gateway:
         if not request.stale:
             # what waited while this program stood still says nothing of its client now
             line.commanding.heard(device, request.client.peer)
+            line.drives.keep_chart_known(device)
         try:
             asked = gateway_asked(request.pdu)
         except Unanswerable as refused:

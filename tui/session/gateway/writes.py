@@ -29,6 +29,7 @@ from tui.drive.foreign_write import (
     stop_deciding_codes,
     value_refusal,
 )
+from tui.drive.orders import chart_codes
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, needs_standstill
 from tui.drive.shown import depends_on
@@ -100,7 +101,8 @@ class GatewayWrite:
             return WordKind.STOP in kinds
         # the command before it tells the state, not what the word means
         own = {chart.command for chart in profile.data.charts}
-        deciding = [profile.find(one) for one in stop_deciding_codes(profile) if one not in own]
+        codes = stop_deciding_codes(profile, self._asked.words)
+        deciding = [profile.find(one) for one in codes if one not in own]
         registers = {one.address + i for one in deciding for i in range(word_count(one))}
         return not self._line.pending.changes_before(self._write, registers)
 
@@ -110,14 +112,29 @@ class GatewayWrite:
         found = foreign_words(profile, words, {})
         if not any(one.kind is WordKind.COMMAND for one in found):
             return found
-        return foreign_words(profile, words, await self._read(stop_deciding_codes(profile)))
+        codes = stop_deciding_codes(profile, words)
+        return foreign_words(profile, words, await self._read_deciding(codes)) if codes else found
+
+    async def _read_deciding(self, codes: list[str]) -> Mapping[str, int]:
+        """Raw values of words, read before all else; without those that cannot be read."""
+        chart, raws = chart_codes(self._session.profile), {}
+        for code in codes:
+            # a state may be another one already; which chart holds changes with a write only
+            age = JUST_READ if code in chart else 0.0
+            try:
+                raws[code] = await self._line.drives.read_raw(
+                    self._session, code, priority=Priority.STOP, max_age=age
+                )
+            except LineError as error:
+                log.info("%s, which decides about a stop, was not read: %s", code, error)
+        return raws
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
-        """Words that surely are as they are told now; before a stop nothing else is read."""
+        """Words that surely are as they are told now."""
         try:
             await Reader(self._session).read(codes, priority=Priority.OPERATOR_WRITE)
         except LineError as error:
-            log.info("what decides about a stop was not read: %s", error)
+            log.info("what decides about a write was not read: %s", error)
             return {}
         return self._session.image.fresh(JUST_READ)
 
@@ -155,8 +172,8 @@ class GatewayWrite:
         codes = [code for one in parameters for code in (one.code, *depends_on(one))]
         still = any(needs_standstill(profile, one) for one in parameters)
         if still:
-            codes += [*(chart.status for chart in profile.data.charts)]
-            codes += stop_deciding_codes(profile)
+            codes += [chart.status for chart in profile.data.charts]
+            codes += chart_codes(profile)
         raws = await self._read(list(dict.fromkeys(codes))) if codes else {}
         if still:
             motion = read_chart(profile, raws).motion

@@ -1,0 +1,134 @@
+"""How soon a stop word of a Modbus TCP client is on the wire, by the record of the drives."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass
+
+import pytest
+import pytest_asyncio
+
+from benchmarks.wire import Recording
+from tests.programs import wait_until
+from tui.bus.api import Priority
+from tui.bus.gateway.server import TcpClient, TcpRequest
+from tui.bus.line import Line
+from tui.bus.link import RtuTcpLink
+from tui.drive.profile import library
+from tui.session.gateway.drives import CHART_READ_EACH
+from tui.session.gateway.gateway import Gateway
+from tui.session.gateway.line import GatewayLine
+from tui.session.gateway.rules import GatewayRules, unit_map
+from tui.session.journal import Journal
+from tui.simulator import DriveSpec, Simulation
+from tui.simulator.server.conversation import RtuConversation
+
+from .test_stop import journal
+
+__all__ = ["journal"]
+
+ETA, CMD, ACC, CHCF = 3201, 8501, 9001, library.load("atv71")["CHCF"].address
+STOP = struct.pack(">BHH", 6, CMD, 0x0007)
+
+
+@dataclass(slots=True)
+class Wire:
+    """A gateway to a line whose drives record every exchange."""
+
+    line: Line
+    gateway: Gateway
+    recording: Recording
+    client: TcpClient
+
+    async def ask(self, pdu: bytes) -> bytes:
+        return await self.gateway.answer(TcpRequest(self.client, 1, pdu))
+
+    async def read(self, address: int) -> None:
+        assert (await self.ask(struct.pack(">BHH", 3, address, 1)))[0] == 3
+
+    def requests(self) -> list[bytes]:
+        """Function, address and word of each request that has come to the drives."""
+        return [one.request[1:6] for one in self.recording.exchanges]
+
+    async def known(self) -> None:
+        """A client has asked for the drive, and it was found out which it is."""
+        await self.read(ETA)
+        chart = struct.pack(">BHH", 3, CHCF, 1)
+        for _ in range(2):
+            await self.read(ETA)
+            await asyncio.to_thread(wait_until, lambda: b"\x2b" in map(_function, self.requests()),
+                                    "it is asked who it is")  # fmt: skip
+            await asyncio.sleep(0.2)
+        await self.read(ETA)
+        await asyncio.to_thread(wait_until, lambda: chart in self.requests(), "the chart is read")
+
+
+def _function(request: bytes) -> bytes:
+    return request[:1]
+
+
+@pytest.fixture
+def simulation() -> Iterator[tuple[Simulation, Recording]]:
+    with Simulation([DriveSpec("atv71", 1, sets={"CHCF": 1})]) as made:
+        recording = Recording(RtuConversation(made.line, made.faults))
+        made._rtu_unseen = lambda: recording  # type: ignore[method-assign]
+        yield made, recording
+
+
+@pytest_asyncio.fixture
+async def wire(simulation: tuple[Simulation, Recording], journal: Journal) -> AsyncIterator[Wire]:
+    made, recording = simulation
+    line = Line(RtuTcpLink(*made.serve_rtu_tcp()))
+    line.open(wait=5.0)
+    rules = GatewayRules(writes=frozenset({"ACC"}))
+    gateway = Gateway([GatewayLine(line, journal)], unit_map(1, ()), rules)
+    yield Wire(line, gateway, recording, TcpClient(1, "10.0.0.9:5000"))
+    await gateway.close()
+    line.close()
+
+
+async def test_stop_of_asking_client_is_next_request_on_wire(wire: Wire) -> None:
+    await wire.known()
+    before = len(wire.requests())
+    assert await wire.ask(STOP) == STOP
+    assert wire.requests()[before:] == [STOP]
+
+
+async def test_stop_passes_waiting_reads(wire: Wire) -> None:
+    await wire.known()
+    polls = [
+        asyncio.create_task(wire.line.read(1, 3000 + number, priority=Priority.OPERATOR_READ))
+        for number in range(20)
+    ]
+    before = len(wire.requests())
+    assert await wire.ask(STOP) == STOP
+    assert STOP in wire.requests()[before : before + 2]
+    await asyncio.gather(*polls, return_exceptions=True)
+
+
+async def test_stop_after_write_is_preceded_by_one_read(wire: Wire) -> None:
+    """It may have changed what the word does."""
+    await wire.known()
+    assert (await wire.ask(struct.pack(">BHH", 6, ACC, 57)))[0] == 6
+    before = len(wire.requests())
+    assert await wire.ask(STOP) == STOP
+    assert wire.requests()[before:] == [struct.pack(">BHH", 3, CHCF, 1), STOP]
+
+
+async def test_stop_word_is_checked_after_write_of_another_program(wire: Wire) -> None:
+    await wire.known()
+    await wire.line.write(1, CHCF, [3])
+    assert await wire.ask(STOP) == b"\x86\x01"
+    assert STOP not in wire.requests(), "it runs the motor in this profile"
+
+
+async def test_chart_is_read_now_and_then_only(wire: Wire) -> None:
+    await wire.known()
+    chart = struct.pack(">BHH", 3, CHCF, 1)
+    begun, count = asyncio.get_running_loop().time(), wire.requests().count(chart)
+    for _ in range(30):
+        await wire.read(ETA)
+    span = asyncio.get_running_loop().time() - begun
+    assert wire.requests().count(chart) - count <= 1 + span / CHART_READ_EACH
