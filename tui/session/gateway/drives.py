@@ -122,9 +122,9 @@ class GatewayDrives:
         return from_words(one, reply.words)
 
     def keep_chart_known(self, device: int) -> None:
-        """Read the word that distinguishes a stop from a run command, now and then; its client asks.
+        """Read what distinguishes a stop from a run command now and then, while a client asks.
 
-        So a stop that follows needs not wait for it. The drive is asked just now in any case.
+        So a stop that follows needs not wait for it.
         """
         session = self._found.get(device)
         codes = chart_codes(session.profile) if session is not None else []

@@ -15,6 +15,7 @@ from ..read.reader import Reader
 from .commanding import GatewayCommanding
 from .drives import GatewayDrives, Note
 from .in_turn import PendingWrites
+from .resting import RestingDrives
 from .started import StartedMotors
 
 NONE_NAMED: Mapping[int, str] = MappingProxyType({})
@@ -36,11 +37,13 @@ class GatewayLine:
         self.drives = GatewayDrives(line, note, profiles)
         self.pending = PendingWrites(line)
         self.started = StartedMotors(line, journal)
+        self.resting = RestingDrives(line)
         self.commanding = GatewayCommanding(line, self._stands, self.started)
 
     async def close(self) -> StopSummary | None:
         """Leave the line alone; what became of motors that clients had started, None for none."""
         summary = await self.started.end()
+        self.resting.close()
         self.commanding.close()
         self.drives.close()
         return summary

@@ -189,6 +189,7 @@ class GatewayWrite:
 
     async def _start(self, order: StartDirection) -> bytes:
         """Send what may start the motor, once that is on record. Raises StartNotRecorded."""
+        self._line.resting.release(self._session.device)
         begun = await self._line.started.begin(self._session, order)
         sent = True
         try:
@@ -204,6 +205,8 @@ class GatewayWrite:
         """Void what was meant for the drive before this request."""
         self._line.commanding.stop(self._session.device, self._client)
         self._line.pending.stops_by(self._write)
+        if self._line.drives.known(self._session.device) is self._session:
+            self._line.resting.keep(self._session)
 
     async def _send_alone(self, one: ForeignWord) -> None:
         self._stop()

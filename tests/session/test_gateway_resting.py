@@ -1,0 +1,69 @@
+"""A client stops its motor and leaves: its drive does not trip while serve holds the line."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from tui.bus.gateway.server import TcpClient
+from tui.simulator import DriveSpec
+
+from .test_gateway import CMD, LFR, Bench, Make, bench, start_motor
+from .test_stop import journal, start, wait_for
+
+__all__ = ["bench", "journal", "start"]
+
+TIMEOUT = 2.0
+ALTIVAR_71 = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": round(10 * TIMEOUT)})
+STOP_21 = 0xC000
+FAMILIES = {
+    "atv71": (ALTIVAR_71, CMD, 0x0007),
+    "atv21": (DriveSpec("atv21", 1, sets={"F803": 2}), 0xFA00, STOP_21),
+}
+
+
+def fault(made: Bench) -> object:
+    return made.simulation.drive(1).fault
+
+
+async def left_for(made: Bench, seconds: float) -> None:
+    """No client asks for so long."""
+    made.gateway.gone(made.client)
+    made.client = TcpClient(made.client.number + 1, "10.0.0.9:5001")
+    await asyncio.sleep(seconds)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_drive_stays_alive_after_stop_and_departure(bench: Make, family: str) -> None:
+    spec, register, word = FAMILIES[family]
+    made = bench(spec, commands=True)
+    assert await made.write(register, word) == 0
+    await left_for(made, 3 * TIMEOUT)
+    assert fault(made) is None
+
+
+async def test_drive_stays_alive_after_a_run(bench: Make) -> None:
+    made = bench(ALTIVAR_71, commands=True)
+    await start_motor(made)
+    assert await made.write(CMD, 0x0007) == 0
+    assert await made.write(LFR, 0) == 0
+    await left_for(made, 4 * TIMEOUT)
+    assert fault(made) is None
+
+
+async def test_running_motor_is_not_kept_alive(bench: Make) -> None:
+    """Its controller is gone: the drive's own timeout stops it."""
+    made = bench(ALTIVAR_71, commands=True)
+    assert await made.write(CMD, 0x0007) == 0
+    await start_motor(made)
+    await left_for(made, 0)
+    await wait_for(lambda: fault(made) is not None)
+
+
+async def test_motor_that_another_source_starts_is_not_kept_alive(bench: Make) -> None:
+    made = bench(ALTIVAR_71, commands=True)
+    assert await made.write(CMD, 0x0007) == 0
+    await left_for(made, TIMEOUT)
+    made.simulation.drive(1).run(30.0)
+    await wait_for(lambda: fault(made) is not None)

@@ -1,0 +1,108 @@
+"""Keeps drives from tripping on their communication timeout after a client has stopped them.
+
+A controller stops its motor and leaves. Without another request the drive trips.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from tui.bus.api import ModbusLine, Priority
+from tui.bus.errors import LineClosed, LineError
+from tui.drive.chart import read_chart
+from tui.drive.orders import chart_codes
+from tui.drive.settings.writable import AT_REST
+
+from ..drive import DriveSession
+from ..monitor.line_watch import ASKED_PER_TIMEOUT, LEARN_AGAIN, UNKNOWN_TIMEOUT
+from ..monitor.timeout import read_timeout
+from ..read.reader import Reader
+
+log = logging.getLogger(__name__)
+
+LONGEST_RAMP = 300.0
+"""Seconds after a stop in which the motor must come to rest; then the drive is left to itself."""
+JUST_SEEN = 2.0
+"""Seconds up to which a state counts as seen just now."""
+
+
+class RestingDrives:
+    """Reads the stopped drives of one line while no program does; lives in the gateway's loop.
+
+    Only while the motor is at rest: otherwise reads would keep it running for a dead controller.
+    """
+
+    def __init__(self, line: ModbusLine) -> None:
+        self._line = line
+        self._tasks: dict[int, asyncio.Task[None]] = {}
+
+    def keep(self, session: DriveSession) -> None:
+        """Keep a drive whose stop is being sent."""
+        device = session.device
+        before = self._tasks.get(device)
+        if before is None or before.done():
+            task = asyncio.create_task(self._work(session), name=f"resting {device}")
+            self._tasks[device] = task
+            task.add_done_callback(_ended)
+
+    def release(self, device: int) -> None:
+        """Leave a drive to its controller, which starts the motor."""
+        if (task := self._tasks.pop(device, None)) is not None:
+            task.cancel()
+
+    def close(self) -> None:
+        """Leave all drives alone."""
+        for device in tuple(self._tasks):
+            self.release(device)
+
+    async def _work(self, session: DriveSession) -> None:
+        clock = session.clock
+        ends: float | None = clock.monotonic() + LONGEST_RAMP
+        learned: float | None = None
+        reader = Reader(session)
+        while ends is None or clock.monotonic() < ends:
+            timeout = _timeout(session) if learned is not None else UNKNOWN_TIMEOUT
+            if timeout is None:
+                return
+            rest = timeout / ASKED_PER_TIMEOUT - self._silence(session)
+            if rest > 0:
+                await clock.sleep(rest)
+                continue
+            try:
+                if await self._is_at_rest(reader):
+                    ends = None
+                elif ends is None:
+                    return  # started by another source
+                if learned is None or clock.monotonic() - learned > LEARN_AGAIN:
+                    session.timeout = await read_timeout(reader, Priority.POLL)
+                    learned = clock.monotonic()
+            except LineClosed:
+                return
+            except LineError as error:
+                log.info("device %s is not kept alive: %s", session.device, error)
+                await clock.sleep(timeout / ASKED_PER_TIMEOUT)
+
+    async def _is_at_rest(self, reader: Reader) -> bool:
+        profile, image = reader.profile, reader.session.image
+        status = [chart.status for chart in profile.data.charts]
+        await reader.read([*status, *chart_codes(profile)], priority=Priority.FEED)
+        return read_chart(profile, image.fresh(JUST_SEEN)).motion in AT_REST
+
+    def _silence(self, session: DriveSession) -> float:
+        """Seconds since any program has heard the drive."""
+        heard = self._line.device_state(session.device).heard
+        return session.clock.monotonic() - session.clock.of_line(heard) if heard else 0.0
+
+
+def _ended(task: asyncio.Task[None]) -> None:
+    if not task.cancelled() and (error := task.exception()) is not None:
+        log.error("%s ended: %r", task.get_name(), error)
+
+
+def _timeout(session: DriveSession) -> float | None:
+    """The drive's communication timeout in seconds; None if it has none."""
+    read = session.timeout
+    if read is None or not read.known:
+        return UNKNOWN_TIMEOUT
+    return read.watch.timeout if read.watch is not None else None
