@@ -16,7 +16,7 @@ from tui.bus.errors import NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line
 
-from .conftest import NO_ECHO, WIDE, OpenLine, Share
+from .conftest import NO_ECHO, WIDE, OpenLine, Share, sent
 from .peer import PtyPeer, Step, eventually, reply
 from .sharing import QUICK, OtherProgram, other_program
 
@@ -145,3 +145,65 @@ async def test_a_stop_waits_for_one_request_of_a_proof_at_most(open_line: OpenLi
         assert [one[0] for one in peer.requests][:2] == [1, 2]
         assert [one[0] for one in peer.requests].count(1) == 1
         reading.cancel()
+
+
+def writes(peer: PtyPeer) -> list[int]:
+    """The words that were written, in their order."""
+    return [int.from_bytes(one[4:6], "big") for one in peer.requests if one[1] == 6]
+
+
+async def test_stop_is_repeated_when_line_is_quiet(open_line: OpenLine) -> None:
+    with PtyPeer(slow) as peer:
+        line = doubting(open_line, peer, 0.6)
+        line.describe(1, NO_ECHO)
+        until = time.monotonic() + 0.6
+        run = asyncio.create_task(line.write(1, 1, [15]))
+        await line.write(1, 1, [0], priority=Priority.STOP)
+        assert time.monotonic() < until
+        await run
+        assert writes(peer) == [0, 0, 15], "before what starts the motor again"
+        times = [at for at, one in zip(sent(line), functions(peer), strict=True) if one == 6]
+        assert times[0] < until - 0.3 < until - 0.1 < times[1]
+
+
+async def test_stop_is_repeated_when_drive_has_echoed_a_number(open_line: OpenLine) -> None:
+    with PtyPeer(slow) as peer:
+        line = doubting(open_line, peer, 60.0)
+        await line.write(1, 1, [0], priority=Priority.STOP)
+        await asyncio.to_thread(eventually, lambda: writes(peer) == [0, 0])
+        assert functions(peer) == [6, 3, 8, 6]
+        await line.write(1, 1, [0], priority=Priority.STOP)
+        await line.read(1, OTHER)
+        assert functions(peer) == [6, 3, 8, 6, 6, 3], "once is enough"
+
+
+async def test_unanswered_stop_is_repeated(open_line: OpenLine) -> None:
+    def deaf_at_first(request: bytes, count: int) -> Sequence[Step]:
+        return [] if count == 0 else [reply(request)]
+
+    with PtyPeer(deaf_at_first) as peer:
+        line = doubting(open_line, peer, 0.6)
+        line.describe(1, NO_ECHO)
+        with pytest.raises(NoAnswer):
+            await line.write(1, 1, [0], priority=Priority.STOP)
+        await asyncio.to_thread(eventually, lambda: writes(peer) == [0, 0])
+
+
+async def test_only_last_stop_of_a_drive_is_repeated(open_line: OpenLine) -> None:
+    with PtyPeer(slow) as peer:
+        line = doubting(open_line, peer, 0.6)
+        line.describe(1, NO_ECHO)
+        for word in (7, 0):
+            await line.write(1, 1, [word], priority=Priority.STOP)
+        await line.read(1, OTHER)
+        assert writes(peer) == [7, 0, 0]
+
+
+async def test_stop_of_one_drive_passes_repeat_of_another(open_line: OpenLine) -> None:
+    with PtyPeer(never_echoes) as peer:
+        line = doubting(open_line, peer, 60.0)
+        await line.write(1, 1, [0], priority=Priority.STOP)
+        before = len(peer.requests)
+        await line.write(2, 1, [0], priority=Priority.STOP)
+        # one of them may have been on the line
+        assert 2 in [one[0] for one in peer.requests[before : before + 2]]

@@ -579,4 +579,20 @@ DEFECTS = (
         "The keeper waits for the end of the line, and no drive is stopped.",
         ("tests/bus/test_plain_stop.py::test_a_client_stops_by_a_connection_of_its_own",),
     ),
+    Defect(
+        "stop-in-proof-not-repeated",
+        "tui/bus/schedule/dispatcher.py",
+        "        self.proof.sent(job, begun)\n",
+        "",
+        "A stop sent just after a keeper died is lost on a line that is not quiet yet.",
+        ("tests/bus/test_step_proof.py",),
+    ),
+    Defect(
+        "stop-repeated-after-a-start",
+        "tui/bus/schedule/step_proof.py",
+        "Job(job.request, Priority.FEED, job.limits, asked=time)",
+        "Job(job.request, Priority.BACKGROUND, job.limits, asked=time)",
+        "The repeated stop undoes a start that came after it.",
+        ("tests/bus/test_step_proof.py",),
+    ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..errors import LineClosed, LineError, LineFailed, LineLost, NoAnswer, RequestRefused
 from ..master import Master, MonotonicClock, Sending
@@ -43,7 +44,7 @@ class Dispatcher:
         self._queue = JobQueue(timing.queue_length, tally.use)
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
-        self.proof = StepProof(devices, self._outcomes, clock)
+        self.proof = StepProof(devices, self._outcomes, clock, self.submit)
         """Decides which replies are trusted after another process has used the line."""
         self.in_flight = False
         """Whether a request was sent whose end is not known yet."""
@@ -128,11 +129,9 @@ class Dispatcher:
             await self._sleep(pause)
 
     async def _sleep(self, pause: float | None) -> None:
-        try:
+        with suppress(TimeoutError):
             async with asyncio.timeout(pause):
                 await self._wake.wait()
-        except TimeoutError:
-            return
 
     def _not_before(self, job: Job) -> float:
         now = self._clock()
@@ -229,9 +228,10 @@ class Dispatcher:
             raise
         self.in_flight = False
         self._queue.count(job, self._clock() - begun)
-        self._conclude(job, result)
+        self._conclude(job, result, begun)
 
-    def _conclude(self, job: Job, result: ExchangeResult) -> None:
+    def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
+        self.proof.sent(job, begun)
         if self._outcomes.waited_for_us(job, result) or self._outcomes.conclude(job, result):
             self.put_back(job)
 

@@ -8,6 +8,7 @@ come, and could be taken for the reply to the first request sent from here. A di
 from __future__ import annotations
 
 import secrets
+from collections.abc import Callable
 
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority
@@ -26,24 +27,55 @@ MOST_TRIES = 3
 class StepProof:
     """Holds requests back until their drive has echoed a number, or no late reply may come.
 
-    The words of a stop wait for neither.
+    The words of a stop wait for neither, and are sent once more then.
     """
 
-    def __init__(self, devices: Devices, outcomes: Outcomes, clock: MonotonicClock) -> None:
+    def __init__(
+        self,
+        devices: Devices,
+        outcomes: Outcomes,
+        clock: MonotonicClock,
+        submit: Callable[[Job], None],
+    ) -> None:
         self._devices = devices
         self._outcomes = outcomes
         self._clock = clock
+        self._submit = submit
         self.busy = False
         """True while a reply to a request for a proof is due."""
         self._until = 0.0
         self._proved: set[int] = set()
         self._tries: dict[int, int] = {}
+        self._repeats: dict[int, Job] = {}
+        """The last stop of each device whose reply proves nothing."""
 
     def doubt(self, until: float) -> None:
         """Trust no reply before a time on the line's clock, unless its drive has proved itself."""
         self._until = until
         self._proved.clear()
         self._tries.clear()
+        for job in self._repeats.values():
+            job.answer.cancel()
+        self._repeats.clear()
+
+    @property
+    def repeats_wait(self) -> bool:
+        """True while a stop is still to be repeated."""
+        return not all(job.answer.done() for job in self._repeats.values())
+
+    def sent(self, job: Job, time: float) -> None:
+        """Repeat a stop that was sent at a time when no reply proves anything.
+
+        As soon as the device has proved itself, or no late reply may come. Nothing else that
+        changes the device goes before it.
+        """
+        stops, device = job.priority is Priority.STOP and job.request.changes, job.request.device
+        if not stops or time >= self._until or device in self._proved:
+            return
+        if (before := self._repeats.get(device)) is not None:
+            before.answer.cancel()
+        self._repeats[device] = again = Job(job.request, Priority.FEED, job.limits, asked=time)
+        self._submit(again)
 
     def not_before(self, job: Job, now: float) -> float:
         """The time at which a request may go out, or be preceded by a proof; 0 for at once."""

@@ -159,6 +159,7 @@ class KeeperShare(Sharing):
     @property
     def _needed(self) -> bool:
         stops = self._server is not None and self._server.stops_wait
+        stops = stops or self._inside.dispatcher.proof.repeats_wait
         return self._here or stops or self._keeping.cares()
 
     async def _until(self, holds: Callable[[], bool]) -> None:
