@@ -25,7 +25,8 @@ from tui.bus.gateway.pdu import (
     written_pdu,
 )
 from tui.bus.gateway.room import ServedConnection, makes_room
-from tui.bus.gateway.server import HEADER, MOST_AT_ONCE, TcpGateway, TcpRequest, peer_text
+from tui.bus.gateway.server import HEADER, TcpGateway, TcpRequest
+from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 
 
 def test_what_each_function_asks() -> None:
@@ -331,25 +332,39 @@ async def test_no_number_of_connections_from_elsewhere_keeps_a_client_out(
     await gateway.close()
 
 
-async def test_a_client_is_turned_away_only_where_all_wait_for_writes(
+async def test_connections_that_all_wait_for_writes_keep_no_client_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """64 connections of one host did, and the next one came to stop a motor."""
     monkeypatch.setattr(server, "MOST_CLIENTS", 2)
+    monkeypatch.setattr(server, "MOST_LEAVING", 2)
+    done: list[int] = []
+    go_on = asyncio.Event()
 
     async def answer(request: TcpRequest) -> bytes:
-        await asyncio.Event().wait()
+        if request.pdu[-1] < 9:
+            await go_on.wait()
+        done.append(request.pdu[-1])
         return request.pdu
 
     gateway = TcpGateway(answer)
     place = await gateway.listen("127.0.0.1", 0)
-    writers = [(await asyncio.open_connection(*place))[1] for _ in range(2)]
-    for writer in writers:
-        await _asked(writer, 1, 1, bytes([6, 0, 0, 0, 1]))
-    await asyncio.sleep(0.2)
-    late, late_writer = await asyncio.open_connection(*place)
-    assert await late.read() == b""
-    for writer in (*writers, late_writer):
-        writer.close()
+    clients = []
+    for number in range(4):
+        clients.append(await asyncio.open_connection(*place, local_addr=("127.0.0.2", 0)))
+        await _asked(clients[-1][1], 1, 1, bytes([6, 0, 0, 0, number]))
+        await asyncio.sleep(0.05)
+    assert [await reader.read() for reader, _ in clients[:2]] == [b"", b""]
+    reader, writer = await asyncio.open_connection(*place, local_addr=("127.0.0.3", 0))
+    await _asked(writer, 7, 1, bytes([6, 0, 0, 0, 9]))
+    assert (await _answer(reader))[0] == 7
+    go_on.set()
+    assert (await _answer(clients[3][0]))[0] == 1
+    await asyncio.sleep(0.1)
+    # what they had sent is carried out, but for the oldest: each could send more and more
+    assert sorted(done) == [1, 2, 3, 9]
+    for _, one in (*clients, (reader, writer)):
+        one.close()
     await gateway.close()
 
 
@@ -394,4 +409,4 @@ def test_the_address_with_the_most_connections_makes_room() -> None:
     assert makes_room("a", here) == 2
     del here[1]
     assert makes_room("b", here) == 3, "each would have two: it was idle for longest"
-    assert makes_room("c", {4: here[4]}) is None
+    assert makes_room("c", {4: here[4]}) == 4, "one that writes goes last"

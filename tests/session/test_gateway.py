@@ -14,7 +14,8 @@ import pytest
 import pytest_asyncio
 
 from tests.programs import wait_until
-from tui.bus.gateway.server import TcpClient, TcpRequest
+from tui.bus.gateway.server import TcpRequest
+from tui.bus.gateway.talk import TcpClient
 from tui.bus.line import Line
 from tui.bus.program import Program
 from tui.drive.profile import library

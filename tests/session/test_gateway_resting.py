@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from tui.bus.gateway.server import TcpClient
+from tui.bus.gateway.talk import TcpClient
 from tui.simulator import DriveSpec
 
 from .test_gateway import CMD, LFR, Bench, Make, bench, start_motor

@@ -13,7 +13,8 @@ import pytest_asyncio
 from benchmarks.wire import Recording
 from tests.programs import wait_until
 from tui.bus.api import Priority
-from tui.bus.gateway.server import TcpClient, TcpRequest
+from tui.bus.gateway.server import TcpRequest
+from tui.bus.gateway.talk import TcpClient
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink
 from tui.drive.profile import library
@@ -132,3 +133,37 @@ async def test_chart_is_read_now_and_then_only(wire: Wire) -> None:
         await wire.read(ETA)
     span = asyncio.get_running_loop().time() - begun
     assert wire.requests().count(chart) - count <= 1 + span / CHART_READ_EACH
+
+
+async def test_stops_of_one_host_do_not_hold_up_that_of_another(wire: Wire) -> None:
+    await wire.known()
+    wire.client.host = "10.0.0.9"
+    other = TcpClient(2, "10.0.0.8:5000", "10.0.0.8")
+    words = [struct.pack(">BHHHHBH", 23, ETA, count, CMD, 1, 2, 0x0007) for count in range(1, 50)]
+    flood = [asyncio.create_task(wire.ask(one)) for one in words]
+    await asyncio.sleep(0)
+    before = len(wire.requests())
+    answer = await wire.gateway.answer(TcpRequest(other, 1, STOP))
+    assert answer == STOP
+    assert STOP in wire.requests()[before : before + 4]
+    await asyncio.gather(*flood)
+
+
+async def test_like_stops_that_wait_are_sent_once(wire: Wire) -> None:
+    await wire.known()
+    before = len(wire.requests())
+    answers = await asyncio.gather(*(wire.ask(STOP) for _ in range(50)))
+    assert answers == [STOP] * 50
+    assert wire.requests()[before:].count(STOP) <= 3
+
+
+async def test_reads_of_one_host_do_not_hold_up_those_of_another(wire: Wire) -> None:
+    await wire.known()
+    wire.client.host = "10.0.0.9"
+    other = TcpClient(2, "10.0.0.8:5000", "10.0.0.8")
+    flood = [asyncio.create_task(wire.read(ETA)) for _ in range(100)]
+    await asyncio.sleep(0)
+    read, before = struct.pack(">BHH", 3, ACC, 1), len(wire.requests())
+    assert (await wire.gateway.answer(TcpRequest(other, 1, read)))[0] == 3
+    assert read in wire.requests()[before : before + 12]
+    await asyncio.gather(*flood)

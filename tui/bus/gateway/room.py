@@ -1,8 +1,8 @@
 """Makes room for a further connection to a server that keeps a limited number.
 
 Each address that clients come from has a share: the one with the most connections gives one of
-its own. So no number of connections that are idle, or read, keeps a client out that must stop a
-motor. One that waits for the answer to a write is never closed: it may be a stop.
+its own. So no number of connections keeps a client out that must stop a motor. One that waits for
+the answer to a write goes last: it may be a stop. That is carried out, but not answered.
 """
 
 from __future__ import annotations
@@ -22,23 +22,21 @@ class ServedConnection:
     address: str
     """The host that it comes from."""
     idle: float
-    """Seconds since its last request, or since it came; 0 while it waits for an answer."""
+    """Seconds since its last request, or since it came; 0 while a read waits for its answer."""
     writes: bool = False
-    """True while a write of it is not answered yet: it never makes room."""
+    """True while a write of it is not answered yet."""
 
 
-def makes_room(address: str, here: Mapping[K, ServedConnection]) -> K | None:
-    """The connection that goes for a further one from an address; None if none can.
+def makes_room(address: str, here: Mapping[K, ServedConnection]) -> K:
+    """The connection that goes for a further one from an address.
 
     Of the address that would have the most connections it is the one that was idle for longest.
     """
     counts = Counter(one.address for one in here.values())
     counts[address] += 1
-    most = max(counts.values())
-    idle = {
-        key: one.idle for key, one in here.items() if counts[one.address] == most and not one.writes
-    }
-    return max(idle, key=idle.__getitem__, default=None)
+    most = max(counts[one.address] for one in here.values())
+    busiest = {key: one for key, one in here.items() if counts[one.address] == most}
+    return max(busiest, key=lambda key: (not busiest[key].writes, busiest[key].idle))
 
 
 def host_of(peer: object) -> str:

@@ -18,7 +18,8 @@ from typing import Any, SupportsIndex
 
 from .awake import Awake
 from .pdu import BUSY, DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
-from .room import ServedConnection, host_of, makes_room
+from .room import host_of, makes_room
+from .talk import ClientTalk, TcpClient, peer_text
 
 log = logging.getLogger(__name__)
 
@@ -26,21 +27,10 @@ HEADER = struct.Struct(">HHHB")
 LONGEST_PDU = 253
 MOST_CLIENTS = 64
 """Connections at a time; for one more another one makes room, see `makes_room`."""
-MOST_AT_ONCE = 128
-"""Requests of one connection that may be under way; a further read is told to come again."""
+MOST_LEAVING = 64
+"""Connections that made room whose writes are still under way."""
 IDLE_CLIENT_ENDS_AFTER = 600.0
 """Seconds after which a connection that asks nothing, or takes no answer, is closed."""
-
-
-@dataclass(slots=True, eq=False)
-class TcpClient:
-    """One connection, for as long as it lasts."""
-
-    number: int
-    peer: str
-    """Host and port that it comes from."""
-    left: bool = False
-    """Whether it sends nothing any more: it may be gone."""
 
 
 class _Incoming(asyncio.StreamReader):
@@ -104,7 +94,7 @@ class TcpGateway:
         self._answer = answer
         self._gone = gone
         self._server: asyncio.Server | None = None
-        self._talks: dict[asyncio.Task[None], _Talk] = {}
+        self._talks: dict[asyncio.Task[None], ClientTalk] = {}
         self._count = 0
         self._awake = awake or Awake()
 
@@ -136,13 +126,11 @@ class TcpGateway:
     async def _serve(self, reader: _Incoming, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
-        if not self._has_room(host_of(writer.get_extra_info("peername"))):
-            log.warning("a further Modbus TCP client was turned away: %d are here", MOST_CLIENTS)
-            writer.close()
-            return
+        peer = writer.get_extra_info("peername")
+        self._make_room(host_of(peer))
         self._count += 1
-        client = TcpClient(self._count, peer_text(writer.get_extra_info("peername")))
-        talk = self._talks[task] = _Talk(client, writer)
+        client = TcpClient(self._count, peer_text(peer), host_of(peer))
+        talk = self._talks[task] = ClientTalk(client, writer)
         try:
             await self._converse(talk, reader)
         except (OSError, EOFError, TimeoutError) as error:
@@ -156,21 +144,21 @@ class TcpGateway:
             with suppress(OSError, RuntimeError):
                 writer.close()
 
-    def _has_room(self, host: str) -> bool:
-        """Whether one more client may stay; another one may have to go for it."""
+    def _make_room(self, host: str) -> None:
+        """Have another client go if there are too many with the one from this host."""
         here = {task: talk.place for task, talk in self._talks.items() if not talk.goes}
         if len(here) < MOST_CLIENTS:
-            return True
+            return
+        leaving = [task for task, talk in self._talks.items() if talk.goes]
+        for task in leaving[: max(0, len(leaving) - MOST_LEAVING + 1)]:
+            task.cancel()
         task = makes_room(host, here)
-        if task is None:
-            return False
         talk = self._talks[task]
         log.warning("Modbus TCP client %s makes room for one from %s", talk.client.peer, host)
-        talk.goes = True
+        talk.make_room()
         task.cancel()
-        return True
 
-    async def _converse(self, talk: _Talk, reader: _Incoming) -> None:
+    async def _converse(self, talk: ClientTalk, reader: _Incoming) -> None:
         client = talk.client
         try:
             while True:
@@ -192,7 +180,7 @@ class TcpGateway:
             # what a client sent before it went is carried out: a stop may be among it
             await talk.ended()
 
-    async def _begin(self, talk: _Talk, transaction: int, request: TcpRequest) -> None:
+    async def _begin(self, talk: ClientTalk, transaction: int, request: TcpRequest) -> None:
         """Have one request answered, beside those before it; no read keeps what is behind it."""
         function = request.pdu[0]
         writes = function in WRITE_FUNCTIONS
@@ -205,7 +193,7 @@ class TcpGateway:
         task.add_done_callback(lambda _: answer.close())
 
     async def _one(
-        self, talk: _Talk, transaction: int, request: TcpRequest, answer: Awaitable[bytes]
+        self, talk: ClientTalk, transaction: int, request: TcpRequest, answer: Awaitable[bytes]
     ) -> None:
         """Answer one request; reads of a connection take turns."""
         if request.pdu[0] in WRITE_FUNCTIONS:
@@ -215,7 +203,7 @@ class TcpGateway:
                 reply = await self._replied(request, answer)
         await self._send(talk, transaction, request.unit, reply)
 
-    async def _send(self, talk: _Talk, transaction: int, unit: int, reply: bytes) -> None:
+    async def _send(self, talk: ClientTalk, transaction: int, unit: int, reply: bytes) -> None:
         if talk.writer.is_closing():
             return  # it has gone meanwhile: nobody takes it, and asyncio would complain of each
         try:
@@ -233,69 +221,3 @@ class TcpGateway:
             # one request that nobody foresaw ends no connection
             log.exception("a request of %s: %s", request.client.peer, request.pdu.hex())
             return exception_pdu(request.pdu[0], DEVICE_FAILURE)
-
-
-class _Talk:
-    """What is under way on one connection."""
-
-    def __init__(self, client: TcpClient, writer: asyncio.StreamWriter) -> None:
-        self.client = client
-        self.writer = writer
-        self.reads = asyncio.Lock()
-        self.asked = asyncio.get_running_loop().time()
-        """When a request came last, on the loop's clock."""
-        self.goes = False
-        """Whether it is about to end for another one."""
-        self._under_way: set[asyncio.Task[None]] = set()
-        self._writes: set[asyncio.Task[None]] = set()
-
-    @property
-    def full(self) -> bool:
-        """Whether no further read is taken."""
-        return len(self._under_way) >= MOST_AT_ONCE
-
-    @property
-    def place(self) -> ServedConnection:
-        """As it counts when one more client comes."""
-        idle = 0.0 if self._under_way else asyncio.get_running_loop().time() - self.asked
-        host = host_of(self.writer.get_extra_info("peername"))
-        return ServedConnection(host, idle, writes=bool(self._writes))
-
-    def turn(self) -> Callable[[], Awaitable[None]]:
-        """The turn of a write that comes now."""
-        before = tuple(self._writes)
-
-        async def turn() -> None:
-            if before:
-                await asyncio.wait(before)
-
-        return turn
-
-    async def room_for_writes(self) -> None:
-        """Return once not too many writes are under way; further ones stay in the socket."""
-        while len(self._writes) >= MOST_AT_ONCE:
-            await asyncio.wait(tuple(self._writes), return_when=asyncio.FIRST_COMPLETED)
-
-    def begin(self, work: Coroutine[Any, Any, None], *, writes: bool) -> asyncio.Task[None]:
-        task = asyncio.create_task(work)
-        for tasks in (self._under_way, self._writes) if writes else (self._under_way,):
-            tasks.add(task)
-            task.add_done_callback(tasks.discard)
-        return task
-
-    def cancel(self) -> None:
-        """Answer nothing any more."""
-        for task in self._under_way:
-            task.cancel()
-
-    async def ended(self) -> None:
-        """Return once all is answered; cancelled, it cancels that."""
-        await asyncio.gather(*self._under_way, return_exceptions=True)
-
-
-def peer_text(peer: object) -> str:
-    """Where a connection comes from, as a person writes it."""
-    if not isinstance(peer, tuple) or len(peer) < 2:
-        return "somewhere"
-    host, port = str(peer[0]), peer[1]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

@@ -59,9 +59,9 @@ class MetricsServer:
             here = {
                 one: ServedConnection(its, now - since) for one, (its, since) in self._tasks.items()
             }
-            if (oldest := makes_room(host, here)) is not None:
-                del self._tasks[oldest]
-                oldest.cancel()
+            oldest = makes_room(host, here)
+            del self._tasks[oldest]
+            oldest.cancel()
         self._tasks[task] = host, now
         try:
             async with asyncio.timeout(ANSWERED_WITHIN):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import inf
 
@@ -35,6 +35,8 @@ READ_THROUGH = Limits(
 WHO_AGAIN_AFTER = 30.0
 """Seconds after which a drive that did not say who it is is asked again."""
 
+CHART_AGE = 2.0
+"""Seconds up to which that word is taken from a read before; a write makes it unknown."""
 CHART_READ_EACH = 1.5
 """Seconds after which the word that decides between charts is read again for a client."""
 
@@ -110,8 +112,20 @@ class GatewayDrives:
         self._doubtful |= {device}
         self._asked.pop(device, None)
 
-    async def read_raw(
-        self, session: DriveSession, code: str, *, priority: Priority, max_age: float
+    async def read_deciding(self, session: DriveSession, codes: Sequence[str]) -> Mapping[str, int]:
+        """Raw values of words, read before all else; without those that cannot be read."""
+        chart, raws = chart_codes(session.profile), {}
+        for code in codes:
+            # a state may be another one already; which chart holds changes with a write only
+            age = CHART_AGE if code in chart else 0.0
+            try:
+                raws[code] = await self._read_raw(session, code, Priority.STOP, age)
+            except LineError as error:
+                log.info("%s, which decides about a stop, was not read: %s", code, error)
+        return raws
+
+    async def _read_raw(
+        self, session: DriveSession, code: str, priority: Priority, max_age: float
     ) -> int:
         """One word, also from a read by any program up to `max_age` seconds ago. Raises errors."""
         one = session.profile.find(code)
@@ -139,7 +153,7 @@ class GatewayDrives:
     async def _read_chart(self, session: DriveSession, codes: list[str]) -> None:
         with suppress(LineError):
             for code in codes:
-                await self.read_raw(session, code, priority=Priority.POLL, max_age=CHART_READ_EACH)
+                await self._read_raw(session, code, Priority.POLL, CHART_READ_EACH)
 
     def _state(self, state: LineState) -> None:
         """Called in the line's thread."""

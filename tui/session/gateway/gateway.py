@@ -35,7 +35,8 @@ from tui.bus.gateway.pdu import (
     identified_pdu,
     words_pdu,
 )
-from tui.bus.gateway.server import TcpClient, TcpRequest
+from tui.bus.gateway.server import TcpRequest
+from tui.bus.gateway.talk import TcpClient
 from tui.drive.errors import DriveError
 
 from ..command.stop_report import StopSummary
@@ -92,7 +93,17 @@ class Gateway:
         if isinstance(asked, WriteAsked):
             write = line.pending.came(request.client, device, asked.words)
             return self._write(line, request, asked, write)
-        return self._told(line, device, request, partial(self._answer, line, device, asked))
+        answer = partial(self._answer, line, device, asked)
+        return self._told(line, device, request, partial(self._in_turn, line, request, answer))
+
+    async def _in_turn(
+        self,
+        line: GatewayLine,
+        request: TcpRequest,
+        answer: Callable[[], Coroutine[Any, Any, bytes]],
+    ) -> bytes:
+        async with line.turns.reading(request.client.host):
+            return await answer()
 
     async def _told(
         self,

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from tui.bus.api import ModbusLine
-from tui.bus.gateway.server import TcpClient
+from tui.bus.gateway.talk import TcpClient
 from tui.bus.stop_counts import next_count
 
 

@@ -14,6 +14,7 @@ from ..journal import Journal
 from ..read.reader import Reader
 from .commanding import GatewayCommanding
 from .drives import GatewayDrives, Note
+from .host_turns import HostTurns
 from .in_turn import PendingWrites
 from .resting import RestingDrives
 from .started import StartedMotors
@@ -35,6 +36,7 @@ class GatewayLine:
         self.line = line
         self.journal = journal
         self.drives = GatewayDrives(line, note, profiles)
+        self.turns = HostTurns()
         self.pending = PendingWrites(line)
         self.started = StartedMotors(line, journal)
         self.resting = RestingDrives(line)

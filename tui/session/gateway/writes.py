@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from functools import partial
 from typing import NoReturn
 
 from tui.bus.api import Priority
@@ -67,7 +68,7 @@ class GatewayWrite:
         self._line = line
         self._session = session
         self._asked = asked
-        self._client = request.client.peer
+        self._client, self._host = request.client.peer, request.client.host
         self._request = request
         self._rules = rules
         self._write = write
@@ -112,22 +113,12 @@ class GatewayWrite:
         found = foreign_words(profile, words, {})
         if not any(one.kind is WordKind.COMMAND for one in found):
             return found
-        codes = stop_deciding_codes(profile, words)
-        return foreign_words(profile, words, await self._read_deciding(codes)) if codes else found
-
-    async def _read_deciding(self, codes: list[str]) -> Mapping[str, int]:
-        """Raw values of words, read before all else; without those that cannot be read."""
-        chart, raws = chart_codes(self._session.profile), {}
-        for code in codes:
-            # a state may be another one already; which chart holds changes with a write only
-            age = JUST_READ if code in chart else 0.0
-            try:
-                raws[code] = await self._line.drives.read_raw(
-                    self._session, code, priority=Priority.STOP, max_age=age
-                )
-            except LineError as error:
-                log.info("%s, which decides about a stop, was not read: %s", code, error)
-        return raws
+        codes = tuple(stop_deciding_codes(profile, words))
+        if not codes:
+            return found
+        read = partial(self._line.drives.read_deciding, self._session, codes)
+        raws = await self._line.turns.urgent(self._host, (self._session.device, codes), read)
+        return foreign_words(profile, words, raws)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
         """Words that surely are as they are told now."""
@@ -210,11 +201,12 @@ class GatewayWrite:
 
     async def _send_alone(self, one: ForeignWord) -> None:
         self._stop()
-        answer = ENDED_BEFORE_ANSWER
+        answer, device = ENDED_BEFORE_ANSWER, self._session.device
+        send = partial(
+            self._session.line.write, device, one.address, [one.word], priority=Priority.STOP
+        )
         try:
-            await self._session.line.write(
-                self._session.device, one.address, [one.word], priority=Priority.STOP
-            )
+            await self._line.turns.urgent(self._host, (device, one.address, one.word), send)
             answer = "ok"
         except LineError as error:
             answer = str(error)
@@ -230,8 +222,13 @@ class GatewayWrite:
         parameters = _each(foreign_words(self._session.profile, self._asked.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
         answer = ENDED_BEFORE_ANSWER
+        exchange = partial(self._exchange, priority, parameters)
         try:
-            pdu = await self._exchange(priority, parameters)
+            if stops:
+                word = self._session.device, self._asked
+                pdu = await self._line.turns.urgent(self._host, word, exchange)
+            else:
+                pdu = await exchange()
             answer = "ok"
             return pdu
         except LineError as error:

@@ -1,0 +1,97 @@
+"""One connection to the Modbus TCP server, and what is under way on it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any
+
+from .room import ServedConnection, host_of
+
+MOST_AT_ONCE = 128
+"""Requests of one connection that may be under way; a further read is told to come again."""
+
+
+@dataclass(slots=True, eq=False)
+class TcpClient:
+    """One connection, for as long as it lasts."""
+
+    number: int
+    peer: str
+    """Host and port that it comes from."""
+    host: str = ""
+    left: bool = False
+    """Whether it sends nothing any more: it may be gone."""
+
+
+class ClientTalk:
+    """What is under way on one connection."""
+
+    def __init__(self, client: TcpClient, writer: asyncio.StreamWriter) -> None:
+        self.client = client
+        self.writer = writer
+        self.reads = asyncio.Lock()
+        self.asked = asyncio.get_running_loop().time()
+        """When a request came last, on the loop's clock."""
+        self.goes = False
+        """Whether it is about to end for another one."""
+        self._under_way: set[asyncio.Task[None]] = set()
+        self._writes: set[asyncio.Task[None]] = set()
+
+    @property
+    def full(self) -> bool:
+        """Whether no further read is taken."""
+        return len(self._under_way) >= MOST_AT_ONCE
+
+    @property
+    def place(self) -> ServedConnection:
+        """As it counts when one more client comes."""
+        waits = bool(self._under_way) and not self._writes
+        idle = 0.0 if waits else asyncio.get_running_loop().time() - self.asked
+        host = host_of(self.writer.get_extra_info("peername"))
+        return ServedConnection(host, idle, writes=bool(self._writes))
+
+    def turn(self) -> Callable[[], Awaitable[None]]:
+        """The turn of a write that comes now."""
+        before = tuple(self._writes)
+
+        async def turn() -> None:
+            if before:
+                await asyncio.wait(before)
+
+        return turn
+
+    async def room_for_writes(self) -> None:
+        """Return once not too many writes are under way; further ones stay in the socket."""
+        while len(self._writes) >= MOST_AT_ONCE:
+            await asyncio.wait(tuple(self._writes), return_when=asyncio.FIRST_COMPLETED)
+
+    def begin(self, work: Coroutine[Any, Any, None], *, writes: bool) -> asyncio.Task[None]:
+        task = asyncio.create_task(work)
+        for tasks in (self._under_way, self._writes) if writes else (self._under_way,):
+            tasks.add(task)
+            task.add_done_callback(tasks.discard)
+        return task
+
+    def make_room(self) -> None:
+        """End the connection for another one, but carry out the writes that came before."""
+        self.goes = True
+        self.writer.transport.abort()
+
+    def cancel(self) -> None:
+        """Answer nothing any more."""
+        for task in self._under_way - self._writes if self.goes else self._under_way:
+            task.cancel()
+
+    async def ended(self) -> None:
+        """Return once all is answered; cancelled, it cancels that."""
+        await asyncio.gather(*self._under_way, return_exceptions=True)
+
+
+def peer_text(peer: object) -> str:
+    """Where a connection comes from, as a person writes it."""
+    if not isinstance(peer, tuple) or len(peer) < 2:
+        return "somewhere"
+    host, port = str(peer[0]), peer[1]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
