@@ -11,7 +11,6 @@ import pytest
 import pytest_asyncio
 
 from benchmarks.wire import Recording
-from tests.programs import wait_until
 from tui.bus.api import Priority
 from tui.bus.gateway.server import TcpRequest
 from tui.bus.gateway.talk import TcpClient
@@ -55,19 +54,10 @@ class Wire:
 
     async def known(self) -> None:
         """A client has asked for the drive, and it was found out which it is."""
-        await self.read(ETA)
         chart = struct.pack(">BHH", 3, CHCF, 1)
-        for _ in range(2):
+        while chart not in self.requests():
             await self.read(ETA)
-            await asyncio.to_thread(wait_until, lambda: b"\x2b" in map(_function, self.requests()),
-                                    "it is asked who it is")  # fmt: skip
-            await asyncio.sleep(0.2)
-        await self.read(ETA)
-        await asyncio.to_thread(wait_until, lambda: chart in self.requests(), "the chart is read")
-
-
-def _function(request: bytes) -> bytes:
-    return request[:1]
+            await asyncio.sleep(0.01)
 
 
 @pytest.fixture

@@ -75,6 +75,11 @@ def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) ->
     return ForeignWord(address, word, WordKind.UNKNOWN, found)
 
 
+def parameters_at(words: Collection[ForeignWord]) -> list[Parameter]:
+    """The parameters of several words, each once."""
+    return list({p.code: p for one in words for p in one.parameters}.values())
+
+
 def starts_by(profile: Profile, words: Collection[ForeignWord]) -> StartDirection | None:
     """Whether words may start the motor, and which way by what is known; None where none may.
 

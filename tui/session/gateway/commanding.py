@@ -108,6 +108,11 @@ class GatewayCommanding:
         self._release(device)
         self._started.stopped(device)
 
+    def stopped_too(self, device: int, client: str) -> None:
+        """A client has sent a stop, for which that of another client may have been sent."""
+        with self._lock:
+            self._barred.pop((device, client), None)
+
     def gone(self, client: str) -> None:
         """A client has closed its connection."""
         with self._lock:

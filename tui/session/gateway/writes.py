@@ -25,6 +25,7 @@ from tui.drive.foreign_write import (
     StartDirection,
     WordKind,
     foreign_words,
+    parameters_at,
     setting_refusal,
     starts_by,
     stop_deciding_codes,
@@ -155,7 +156,7 @@ class GatewayWrite:
 
     async def _check_values(self, settings: list[ForeignWord]) -> None:
         profile = self._session.profile
-        parameters = _each(settings)
+        parameters = parameters_at(settings)
         for one in parameters:
             if why := value_refusal(profile, one, self._asked.words):
                 self._refuse(ILLEGAL_VALUE, why)
@@ -200,13 +201,19 @@ class GatewayWrite:
             self._line.resting.keep(self._session)
 
     async def _send_alone(self, one: ForeignWord) -> None:
+        """Send one word that stops."""
+        device = self._session.device
+        word, send = (device, one.address, one.word), partial(self._send_alone_now, one)
+        await self._line.turns.urgent(self._host, word, send)
+        self._line.commanding.stopped_too(device, self._client)
+
+    async def _send_alone_now(self, one: ForeignWord) -> None:
         self._stop()
-        answer, device = ENDED_BEFORE_ANSWER, self._session.device
-        send = partial(
-            self._session.line.write, device, one.address, [one.word], priority=Priority.STOP
-        )
+        answer = ENDED_BEFORE_ANSWER
         try:
-            await self._line.turns.urgent(self._host, (device, one.address, one.word), send)
+            await self._session.line.write(
+                self._session.device, one.address, [one.word], priority=Priority.STOP
+            )
             answer = "ok"
         except LineError as error:
             answer = str(error)
@@ -215,20 +222,25 @@ class GatewayWrite:
             self._keep(list(one.parameters), {}, answer, "stop")
 
     async def _send(self, priority: Priority) -> bytes:
-        """The request as it came; its answer. Each parameter of it goes to the journal."""
+        """The request as it came; its answer. A stop like it that waits may do for it."""
+        send = partial(self._send_now, priority)
+        if priority is not Priority.STOP:
+            return await send()
+        device = self._session.device
+        pdu = await self._line.turns.urgent(self._host, (device, self._asked), send)
+        self._line.commanding.stopped_too(device, self._client)
+        return pdu
+
+    async def _send_now(self, priority: Priority) -> bytes:
+        """Send it. Each parameter of it goes to the journal."""
         stops = priority is Priority.STOP
         if stops:
             self._stop()
-        parameters = _each(foreign_words(self._session.profile, self._asked.words, {}))
+        parameters = parameters_at(foreign_words(self._session.profile, self._asked.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
         answer = ENDED_BEFORE_ANSWER
-        exchange = partial(self._exchange, priority, parameters)
         try:
-            if stops:
-                word = self._session.device, self._asked
-                pdu = await self._line.turns.urgent(self._host, word, exchange)
-            else:
-                pdu = await exchange()
+            pdu = await self._exchange(priority, parameters)
             answer = "ok"
             return pdu
         except LineError as error:
@@ -296,8 +308,3 @@ class GatewayWrite:
             self._line.journal.add(
                 parameter_entry(session, one, old=old, new=new, answer=answer, why=why)
             )
-
-
-def _each(words: list[ForeignWord]) -> list[Parameter]:
-    """The parameters of several words, each once."""
-    return list({p.code: p for one in words for p in one.parameters}.values())
