@@ -10,6 +10,9 @@ one run, ten words are read again and again:
 - by clients that wait for nothing but the answer: through to the drive, and from fresh values.
 
 The limit is what the line allows: the characters, the drive's turnaround and the silence.
+
+Then the keeper polls five drives for metrics, which fills the line. One client reads as before,
+back to back and with pauses, and stops a motor now and then, beside the same without polls.
 """
 
 from __future__ import annotations
@@ -27,14 +30,15 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from statistics import median
+from random import Random
+from statistics import fmean, median
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.masters import MBPOLL_PERIOD_MS
-from benchmarks.wire import ROOT, Record, WireLine
+from benchmarks.wire import ROOT, Record, WireLine, share
 from tui.simulator import LineTiming
 
 DEVICE, ADDRESS, WORDS = 1, 3201, 10
@@ -47,6 +51,9 @@ POLLED = "mbpoll, through the gateway"
 THROUGH = "one client, through to the drive"
 SEVERAL = f"{CLIENTS} clients, through to the drive"
 STORED = f"one client, values fresh for {FRESH:g} s"
+POLLED_DRIVES, EVERY = 5, 0.5
+PAUSES = {"back to back": 0.0, "11 ms after each answer": 0.011, "0 to 100 ms after it": 0.1}
+STOP_WORD = struct.pack(">HHHBBHH", 2, 0, 6, DEVICE, 6, 8501, 0x0007)
 STORED_SEVERAL = f"{CLIENTS} clients, values fresh for {FRESH:g} s"
 
 
@@ -84,13 +91,79 @@ async def _one_client(port: int, end: float) -> int:
     return count
 
 
+async def read_times(port: int, longest: float, seconds: float) -> list[float]:
+    """Seconds from each request to its answer; a pause follows, the longest one or by chance."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    times, end, chance = [], time.monotonic() + seconds, Random(1)
+    while time.monotonic() < end:
+        begun = time.monotonic()
+        writer.write(REQUEST)
+        await reader.readexactly(ANSWER)
+        times.append(time.monotonic() - begun)
+        if longest:
+            await asyncio.sleep(longest if longest < EVERY / 10 else chance.uniform(0.0, longest))
+    writer.close()
+    return times
+
+
+async def stop_times(port: int, count: int) -> list[tuple[float, float]]:
+    """When stop words were sent and answered, each some time after a read of the client."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    times, chance = [], Random(2)
+    for _ in range(count):
+        writer.write(REQUEST)
+        await reader.readexactly(ANSWER)
+        await asyncio.sleep(chance.uniform(0.3, 0.6))
+        begun = time.monotonic()
+        writer.write(STOP_WORD)
+        await reader.readexactly(12)
+        times.append((begun, time.monotonic()))
+    writer.close()
+    return times
+
+
+def beside_polls(wire: WireLine, seconds: float) -> dict[str, dict[str, float]]:
+    """Times of one client without polls, and beside polls that fill the line."""
+    found: dict[str, dict[str, float]] = {}
+    wire.set_up(dict.fromkeys(range(1, 1 + POLLED_DRIVES), "atv71"), LineTiming(19200, "8E1", True))
+    plant = ("--metrics", ":0", "--every", f"{EVERY:g}")
+    for polls, line in ((False, wire.text), (True, f"{wire.text}@1-{POLLED_DRIVES}")):
+        with gateway(line, 0.0, *(plant if polls else ())) as port:
+            asyncio.run(read_times(port, 0.0, 1.0))
+            time.sleep(3.0)  # by then all drives are polled
+            beside = "beside polls" if polls else "alone"
+            for name, pause in PAUSES.items():
+                times = asyncio.run(read_times(port, pause, seconds))
+                found[f"read {name}, {beside}"] = _of_times(times)
+            wire.take()
+            stops = asyncio.run(stop_times(port, max(2, int(2 * seconds))))
+            record = wire.take()
+            found[f"stop, {beside}"] = _of_times([end - begun for begun, end in stops]) | {
+                "most_exchanges": max(
+                    sum(one.ended > begun and one.began < end for one in record)
+                    for begun, end in stops
+                )
+            }
+    for name, one in found.items():
+        base = found[name.replace("beside polls", "alone")]
+        one["median_to_alone"] = one["median"] / base["median"]
+        one["mean_to_alone"] = one["mean"] / base["median"]
+    return found
+
+
+def _of_times(times: list[float]) -> dict[str, float]:
+    return {
+        "median": median(times), "mean": fmean(times), "p95": share(times, 0.95) or 0.0
+    }  # fmt: skip
+
+
 @contextmanager
-def gateway(line: str, fresh: float) -> Iterator[int]:
+def gateway(line: str, fresh: float, *options: str) -> Iterator[int]:
     """`serve` on the line; the port of its Modbus TCP."""
     with tempfile.TemporaryDirectory() as state:
         command = [sys.executable, "-m", "tui", "serve", line, "--tcp", ":0", "--json"]
         process = subprocess.Popen(
-            [*command, "--fresh", f"{fresh:g}"],
+            [*command, "--fresh", f"{fresh:g}", *options],
             cwd=ROOT,
             env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT), "DRIVEPANEL_STATE": state},
             stdout=subprocess.PIPE,
@@ -153,6 +226,7 @@ def main() -> None:
         rounds = [
             measured(wire, given.seconds, with_mbpoll=with_mbpoll) for _ in range(given.rounds)
         ]
+        polled = beside_polls(wire, given.seconds)
     finally:
         wire.close()
     figures = {}
@@ -177,7 +251,18 @@ def main() -> None:
             f"{one['broken_silences']:.0f}",
         )  # fmt: skip
     console.print(table)
-    print(json.dumps({"benchmark": "gateway", "limit_a_second": limit, "figures": figures}))
+    table = Table(title=f"One client beside polls of {POLLED_DRIVES} drives each {EVERY:g} s, ms")
+    for title in ("what", "median", "mean", "95 %", "median / alone", "mean / alone", "exchanges"):
+        table.add_column(title)
+    for name, one in polled.items():
+        table.add_row(
+            name, *(f"{1000 * one[key]:.1f}" for key in ("median", "mean", "p95")),
+            f"{one['median_to_alone']:.2f}", f"{one['mean_to_alone']:.2f}",
+            f"{one['most_exchanges']:.0f}" if "most_exchanges" in one else "",
+        )  # fmt: skip
+    console.print(table)
+    all_found = {"limit_a_second": limit, "figures": figures, "beside_polls": polled}
+    print(json.dumps({"benchmark": "gateway", **all_found}))
 
 
 if __name__ == "__main__":

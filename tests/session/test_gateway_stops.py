@@ -16,6 +16,7 @@ from tui.bus.gateway.server import TcpRequest
 from tui.bus.gateway.talk import TcpClient
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink
+from tui.bus.schedule import back_to_back
 from tui.drive.profile import library
 from tui.session.gateway.drives import CHART_READ_EACH
 from tui.session.gateway.gateway import Gateway
@@ -91,12 +92,41 @@ async def test_stop_passes_waiting_reads(wire: Wire) -> None:
     await wire.known()
     polls = [
         asyncio.create_task(wire.line.read(1, 3000 + number, priority=Priority.OPERATOR_READ))
-        for number in range(20)
+        for number in range(50)
     ]
+    await asyncio.sleep(0)
     before = len(wire.requests())
     assert await wire.ask(STOP) == STOP
     assert STOP in wire.requests()[before : before + 2]
     await asyncio.gather(*polls, return_exceptions=True)
+
+
+async def test_read_of_client_passes_waiting_polls(wire: Wire) -> None:
+    await wire.known()
+    polls = [asyncio.create_task(wire.line.read(1, 3000 + number)) for number in range(50)]
+    await asyncio.sleep(0)
+    read, before = struct.pack(">BHH", 3, ACC, 1), len(wire.requests())
+    assert (await wire.ask(read))[0] == 3
+    assert read in wire.requests()[before : before + 2]
+    await asyncio.gather(*polls, return_exceptions=True)
+
+
+async def test_polls_wait_for_next_read_of_client(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However long a busy machine takes for its way."""
+    monkeypatch.setattr(back_to_back, "LONGEST_PAUSE", 60.0)
+    monkeypatch.setattr(back_to_back, "MARGIN", 1000.0)
+    await wire.known()
+    polls = [asyncio.create_task(wire.line.read(1, 3000 + number)) for number in range(50)]
+    before = len(wire.requests())
+    for _ in range(30):
+        await asyncio.sleep(0.02)  # more than the silence between two frames
+        await wire.read(ACC)
+    polled = [one for one in wire.requests()[before:] if one[1] == 3000 >> 8]
+    assert len(polled) < 20
+    for one in polls:
+        one.cancel()
 
 
 async def test_stop_after_write_is_preceded_by_one_read(wire: Wire) -> None:

@@ -13,6 +13,7 @@ from ..requests import Diagnose
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
+from .back_to_back import BackToBack
 from .echo import resolve_echo
 from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
@@ -42,6 +43,7 @@ class Dispatcher:
         self._devices = devices
         self._clock = clock
         self._queue = JobQueue(timing.queue_length, tally.use)
+        self._back_to_back = BackToBack()
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
         self.proof = StepProof(devices, self._outcomes, clock, self.submit)
@@ -139,6 +141,8 @@ class Dispatcher:
             return now + HELD_LOOK
         if (trusted := self.proof.not_before(job, now)) > now:
             return trusted
+        if (free := self._back_to_back.not_before(job)) > now:
+            return free
         if self._devices.backed_off(job.request.device, job.priority, now, job.within) is not None:
             # taken out at once, to be told
             return 0.0
@@ -231,6 +235,7 @@ class Dispatcher:
         self._conclude(job, result, begun)
 
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
+        self._back_to_back.count(job, begun, self._clock())
         self.proof.sent(job, begun)
         if self._outcomes.waited_for_us(job, result) or self._outcomes.conclude(job, result):
             self.put_back(job)

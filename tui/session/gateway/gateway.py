@@ -215,12 +215,13 @@ CHANGING_SUBFUNCTIONS = frozenset({1, 3, 4, 10})
 def _patience(line: ModbusLine, device: int) -> Priority:
     """A device that never answered is not waited for as long: its client does not either.
 
-    Asked as a poll it is left alone between two tries: a client that goes on asking for a drive
-    that is not there would take the line from all others.
+    One that is silent is asked as a poll, which leaves it alone between two tries: a client that
+    goes on asking for it would take the line from all others.
     """
     state = line.device_state(device)
-    known = state.heard is not None or state.next_try is not None
-    return Priority.POLL if known else Priority.BACKGROUND
+    if state.next_try is not None:
+        return Priority.POLL
+    return Priority.OPERATOR_READ if state.heard is not None else Priority.BACKGROUND
 
 
 def _unsent(line: ModbusLine, device: int) -> int:

@@ -22,7 +22,7 @@ from ..read.reader import Reader
 log = logging.getLogger(__name__)
 
 LONGEST_RAMP = 300.0
-"""Seconds after a stop in which the motor must come to rest; then the drive is left to itself."""
+"""Seconds after a stop in which the motor must stop turning; then the drive is not kept alive."""
 JUST_SEEN = 2.0
 """Seconds up to which a state counts as seen just now."""
 

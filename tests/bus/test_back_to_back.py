@@ -1,0 +1,110 @@
+"""A program that asks again as soon as it has its answer finds the line free."""
+
+from __future__ import annotations
+
+from tui.bus.limits import CAUTIOUS
+from tui.bus.model import Priority
+from tui.bus.requests import Read
+from tui.bus.schedule.back_to_back import LONGEST_PAUSE, POLLS_SHARE, BackToBack
+from tui.bus.schedule.queue import Job, JobQueue
+
+EXCHANGE = 0.026
+
+
+class Bench:
+    """A queue and a line on which each exchange takes as long."""
+
+    def __init__(self, *, polls: bool = False) -> None:
+        self.polls = polls
+        self.queue = JobQueue(100)
+        self.line = BackToBack()
+        self.now = 0.0
+        self.sent: list[tuple[str, float]] = []
+        if polls:
+            self.come("panel", Priority.POLL)
+
+    def come(self, program: str, priority: Priority, at: float = 0.0) -> None:
+        self.queue.put(Job(Read(1, 1, 1), priority, CAUTIOUS, program=program, asked=at))
+
+    def work(self) -> float | None:
+        """Send what may be sent; returns when the next may, if nothing was."""
+        job, ready = self.queue.take(self.line.not_before, self.now)
+        if job is None:
+            return ready
+        begun, self.now = self.now, self.now + EXCHANGE
+        self.line.count(job, begun, self.now)
+        self.sent.append((job.program, begun))
+        if self.polls and job.program == "panel":
+            self.come("panel", Priority.POLL)
+        return None
+
+    def client(self, times: int, pause: float) -> None:
+        """A client asks as often, each time so long after its answer."""
+        for _ in range(times):
+            at = self.now + pause
+            self.wait(pause)
+            self.come("serve", Priority.OPERATOR_READ, at)
+            count = self.served
+            while self.served == count:
+                assert self.work() is None
+
+    def wait(self, pause: float) -> None:
+        """Let time go by, in which a poll may go out."""
+        end = self.now + pause
+        while self.now < end:
+            waiting = len(self.sent)
+            ready = self.work()
+            if len(self.sent) == waiting:
+                self.now = end if ready is None else min(end, max(ready, self.now + 0.0001))
+
+    @property
+    def served(self) -> int:
+        return sum(program == "serve" for program, _ in self.sent)
+
+
+def test_client_that_asks_back_to_back_keeps_polls_to_their_share() -> None:
+    for pause in (0.002, 0.012):
+        bench = Bench(polls=True)
+        bench.client(500, pause)
+        polls = len(bench.sent) - bench.served
+        share = polls / len(bench.sent)
+        assert POLLS_SHARE * 0.9 < share < POLLS_SHARE * 1.2
+        assert bench.now / 500 < 1.3 * EXCHANGE + pause
+
+
+def test_polls_go_out_while_client_pauses() -> None:
+    bench = Bench(polls=True)
+    bench.client(50, 0.1)
+    assert len(bench.sent) - bench.served > 2 * bench.served
+
+
+def test_poll_waits_for_a_moment_only_when_client_has_left() -> None:
+    bench = Bench()
+    bench.come("panel", Priority.POLL)
+    bench.work()
+    bench.client(5, 0.002)
+    bench.come("panel", Priority.POLL)
+    left = bench.now
+    while (ready := bench.work()) is not None:
+        bench.now = ready
+    assert 0.0 < bench.sent[-1][1] - left < 0.01
+
+
+def test_commands_and_reads_of_others_are_not_held_back() -> None:
+    for priority in (Priority.FEED, Priority.OPERATOR_WRITE, Priority.OPERATOR_READ):
+        bench = Bench()
+        bench.client(5, 0.002)
+        bench.come("panel", priority)
+        assert bench.work() is None
+
+
+def test_nothing_is_sent_between_what_is_read_for_a_stop_and_its_word() -> None:
+    bench = Bench()
+    bench.come("serve", Priority.STOP)
+    for priority in (Priority.OPERATOR_WRITE, Priority.OPERATOR_READ, Priority.POLL):
+        bench.come("panel", priority)
+    assert bench.work() is None
+    assert bench.work() == bench.now + LONGEST_PAUSE
+    bench.come("serve", Priority.STOP)
+    assert bench.work() is None
+    assert [program for program, _ in bench.sent] == ["serve", "serve"]

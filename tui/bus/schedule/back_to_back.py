@@ -1,0 +1,61 @@
+"""Keeps the line free for a moment for a program that asks again as soon as it has its answer."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from ..model import Priority
+from .queue import Job
+
+LONGEST_PAUSE = 0.02
+"""Seconds from an answer to the next request up to which a program asks back to back."""
+PAUSES = 4
+"""Pauses of a program that count."""
+MARGIN, TRIP = 1.25, 0.003
+"""Share of the longest pause, and seconds for its way to here, for which the line is kept free."""
+POLLS_SHARE = 0.15
+"""Share of the time that polls have beside it."""
+
+
+class BackToBack:
+    """Holds polls back until the next read of a program is there, if that is a moment only.
+
+    A poll that is begun just before that read would make it wait for a whole exchange. So would
+    any request that is begun between what is read for a stop and its word. In the line's loop.
+    """
+
+    def __init__(self) -> None:
+        self._program = ""
+        self._ended = 0.0
+        """When the last read of that program was over."""
+        self._free_until = self._stop_until = 0.0
+        self._pauses = deque[float](maxlen=PAUSES)
+        self._polled = self._read = 0.0
+        """Seconds that the last poll took, and all reads since."""
+
+    def count(self, job: Job, begun: float, now: float) -> None:
+        """A request has had the line from then until now."""
+        if job.priority is Priority.STOP and not job.request.changes:
+            # the stop word that it decides about is on its way to here
+            self._stop_until = now + LONGEST_PAUSE
+        if job.priority >= Priority.POLL:
+            self._polled, self._read = now - begun, 0.0
+        if job.priority is not Priority.OPERATOR_READ:
+            return
+        self._read += now - begun
+        pause = job.asked - self._ended
+        if job.program != self._program or pause > LONGEST_PAUSE:
+            self._pauses.clear()
+        else:
+            self._pauses.append(max(0.0, pause))
+        self._program, self._ended = job.program, now
+        hold = MARGIN * max(self._pauses) + TRIP if self._pauses else 0.0
+        self._free_until = now + hold
+
+    def not_before(self, job: Job) -> float:
+        """When a request may go out at the earliest."""
+        if job.priority <= Priority.FEED:
+            return 0.0
+        owed = self._read * POLLS_SHARE > self._polled * (1 - POLLS_SHARE)
+        free_until = 0.0 if job.priority < Priority.POLL or owed else self._free_until
+        return max(free_until, self._stop_until)
