@@ -28,7 +28,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from random import Random
 from statistics import fmean, median
@@ -38,7 +38,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.masters import MBPOLL_PERIOD_MS
-from benchmarks.wire import ROOT, Record, WireLine, share
+from benchmarks.wire import ROOT, Exchange, Record, WireLine, share
 from tui.simulator import LineTiming
 
 DEVICE, ADDRESS, WORDS = 1, 3201, 10
@@ -139,16 +139,20 @@ def beside_polls(wire: WireLine, seconds: float) -> dict[str, dict[str, float]]:
             stops = asyncio.run(stop_times(port, max(2, int(2 * seconds))))
             record = wire.take()
             found[f"stop, {beside}"] = _of_times([end - begun for begun, end in stops]) | {
-                "most_exchanges": max(
-                    sum(one.ended > begun and one.began < end for one in record)
-                    for begun, end in stops
-                )
+                "most_exchanges": max(_up_to_stop(record, *one) for one in stops)
             }
     for name, one in found.items():
         base = found[name.replace("beside polls", "alone")]
         one["median_to_alone"] = one["median"] / base["median"]
         one["mean_to_alone"] = one["mean"] / base["median"]
     return found
+
+
+def _up_to_stop(record: Sequence[Exchange], sent: float, answered: float) -> int:
+    """Exchanges from the sending of a stop word to its reply: that in flight, and its own, too."""
+    there = [one for one in record if one.ended > sent and one.began < answered]
+    word = next(at for at, one in enumerate(there) if one.request[1:6] == STOP_WORD[7:12])
+    return word + 1
 
 
 def _of_times(times: list[float]) -> dict[str, float]:
