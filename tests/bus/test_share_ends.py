@@ -34,6 +34,7 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.share.place import Owner, OwnerLock, Peer, short_path
+from tui.bus.share.sharing import DISK_WITHIN
 
 from .conftest import NO_ECHO, Share
 from .peer import PtyPeer, Step, eventually, honest, reply
@@ -461,3 +462,32 @@ async def test_closing_while_waiting_for_a_frozen_owner_takes_no_time(share: Sha
             other.open()
             await asyncio.sleep(0.05)
             await asyncio.wait_for(asyncio.to_thread(other.close), 5)
+
+
+async def test_a_disk_that_takes_nothing_does_not_keep_a_line_closed(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = threading.Event()
+    take = OwnerLock.take
+
+    def hangs(lock: OwnerLock) -> bool:
+        answers.wait(30.0)
+        return take(lock)
+
+    monkeypatch.setattr(OwnerLock, "take", hangs)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        try:
+            line = lines.open("panel")
+            assert (await line.read(1, 100)).words == (100,)
+        finally:
+            answers.set()
+        # the lock that came too late is given back
+        monkeypatch.setattr(OwnerLock, "take", take)
+        other = OwnerLock(place_in(lines.folder))
+        await asyncio.to_thread(eventually, other.take)
+        other.give_back()
+
+
+def test_a_disk_has_less_time_than_a_person_has_patience() -> None:
+    assert DISK_WITHIN <= 2.0

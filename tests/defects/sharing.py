@@ -595,4 +595,24 @@ DEFECTS = (
         "The repeated stop undoes a start that came after it.",
         ("tests/bus/test_step_proof.py",),
     ),
+    Defect(
+        "lock-waits-for-a-disk-that-hangs",
+        "tui/bus/share/sharing.py",
+        "path, self._find_holder, self._drop_lock, DISK_WITHIN",
+        "path, self._find_holder, self._drop_lock",
+        "The keeper dies while the disk takes nothing: for 10 s no program reads or stops.",
+        (
+            "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
+        ),
+    ),
+    Defect(
+        "late-lock-kept",
+        "tui/bus/share/sharing.py",
+        "        self._lock.hand_over()\n\n    def _give_to_keeper",
+        "\n    def _give_to_keeper",
+        "After the disk is back nobody can attach: a program keeps a lock and serves nobody.",
+        (
+            "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
+        ),
+    ),
 )

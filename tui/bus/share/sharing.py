@@ -6,11 +6,12 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from ..errors import NotShared
+from ..errors import LineLost, NotShared
 from ..link import label
 from ..model import LineStatus
 from ..program import KEEPER, Program, pid_namespace
 from ..schedule.inside import LineInside, Say, SharedLine
+from ..transport.opening import opened_beside
 from .client import OwnerAway, ShareClient
 from .keeping import KeeperOrder
 from .messages import VERSION
@@ -41,6 +42,9 @@ UNKEPT = (
     "This program holds the line itself, as its keeper {why}. If this program is killed, nothing"
     " stops the motors that it has started."
 )
+DISK_WITHIN = 2.0
+"""Seconds that the system has to lock a file: after them the line is used without a lock."""
+NO_DISK = "the disk does not answer"
 DIED_OFTEN = f"has died {MOST_DEATHS} times within a minute"
 HOLDER_AWAY = "The process that held the line has ended; the next one starts."
 KEEPER_STARTS = 20.0
@@ -87,17 +91,22 @@ class Sharing:
         inside = self._inside
         away_since: float | None = None
         shown = False
+        path = str(self._place.lock_path)
         while True:
             try:
-                taken = self._lock.take()
-            except OSError as error:
+                owner, why = await opened_beside(
+                    path, self._find_holder, self._drop_lock, DISK_WITHIN
+                )
+            except (OSError, LineLost) as error:
                 # without a lock nobody else can attach; a serial port stays locked by itself
                 log.error("the line cannot be shared: %s", error)
                 self._off = True
-                self._hold_unkept(f"has no folder that can be used ({error.strerror or error})")
+                why = NO_DISK if isinstance(error, LineLost) else error.strerror or str(error)
+                self._hold_unkept(f"has no folder that can be used ({why})")
                 return
-            owner = owner_of(self._place)
-            if taken and not self._give_to_keeper():
+            if why:
+                self._hold_unkept(why)
+            if self._lock.held:
                 break
             try:
                 if owner is None:
@@ -121,15 +130,26 @@ class Sharing:
         await self._listen()
         self._doubt_replies()
 
-    def _give_to_keeper(self) -> bool:
-        """Start the line's keeper, which has the lock from then on; False where it cannot be."""
+    def _find_holder(self) -> tuple[Owner | None, str]:
+        """Take the lock or see who has it, in a thread: the disk may take nothing.
+
+        The line's keeper is started with the lock; if it cannot be, this program keeps the lock,
+        and the text is why. Raises OSError.
+        """
+        taken = self._lock.take()
+        owner = owner_of(self._place)
+        return owner, self._give_to_keeper() if taken and self._keeper else ""
+
+    def _drop_lock(self, _: object) -> None:
+        """The lock came when nothing waited for it any more."""
+        self._lock.hand_over()
+
+    def _give_to_keeper(self) -> str:
+        """Start the line's keeper, which has the lock from then on; returns why it cannot be."""
         now = self._inside.clock()
         self._keeper_lives = bool
-        if not self._keeper:
-            return False
         if len(self._lock.deaths) >= MOST_DEATHS:
-            self._hold_unkept(DIED_OFTEN)
-            return False
+            return DIED_OFTEN
         facts, place = self._inside.facts, self._place
         self._learn_of_before()
         before = (*facts.departed, *facts.programs)
@@ -144,11 +164,10 @@ class Sharing:
             self._keeper_lives = start_keeper(order, self._lock.descriptor, started)
         except OSError as error:
             log.error("the keeper of the line could not be started: %s", error)
-            self._hold_unkept(f"could not be started ({error.strerror or error})")
-            return False
+            return f"could not be started ({error.strerror or error})"
         self._starts_until = now + KEEPER_STARTS
         self._lock.hand_over()
-        return True
+        return ""
 
     def _hold_unkept(self, why: str) -> None:
         """This program holds a line that a keeper was to hold; a person is to know."""

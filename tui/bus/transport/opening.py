@@ -23,8 +23,13 @@ _ABANDONED: set[str] = set()
 """Paths of ports that are still being opened or closed, though nothing waits for them."""
 
 
-async def opened_beside(path: str, open_port: Callable[[], T], drop: Callable[[T], object]) -> T:
-    """Open a port while the loop goes on; `drop` closes one that nothing waits for any more.
+async def opened_beside(
+    path: str,
+    open_port: Callable[[], T],
+    drop: Callable[[T], object],
+    within: float = OPENS_WITHIN,
+) -> T:
+    """Open a port or file while the loop goes on; `drop` closes one that nothing waits for.
 
     Raises LineLost if the system does not open it in time, and what `open_port` raises.
     """
@@ -36,7 +41,7 @@ async def opened_beside(path: str, open_port: Callable[[], T], drop: Callable[[T
     threading.Thread(target=_open, args=(opening, open_port), name="open", daemon=True).start()
     taken = False
     try:
-        async with asyncio.timeout(OPENS_WITHIN):
+        async with asyncio.timeout(within):
             port = await asyncio.wrap_future(opening)
         taken = True
     except TimeoutError:

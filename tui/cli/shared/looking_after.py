@@ -62,4 +62,5 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
 
 
 def _tell(where: str, device: int, text: str) -> None:
-    say(f"drivepanel: {where}drive {device}: {text}", err=True)
+    drive = f"drive {device}: " if device else ""
+    say(f"drivepanel: {where}{drive}{text}", err=True)
