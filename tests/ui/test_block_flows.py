@@ -283,6 +283,8 @@ async def test_p_names_the_keys_that_write_the_proposal_in_this_state(
     async with bench("atv71") as made:
         await made.running()
         await to_blocks(made)
+        # the keys that are named depend on the state that the panel has seen
+        await until(made.pilot, lambda: "FORWARD" in shown(made.app, "strip"))
         await made.pilot.press("p")
         await message(
             made, "Proposed: Monitor's cycle", "motor stopped only", "Press u to drop it."
