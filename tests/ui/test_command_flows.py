@@ -227,7 +227,7 @@ async def test_a_motor_that_stands_after_a_quick_stop_is_not_told_as_stopping() 
         await until(made.pilot, lambda: "□ stopped" in picture(made.app))
 
 
-@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "powerdrive"))
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "powerdrive"))
 async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()

@@ -158,6 +158,7 @@ async def test_the_stop_key_at_the_bottom_is_the_one_that_stops(
             await until(pilot, lambda: bottom(app).startswith(" Space STOP 2  "))
 
 
+@pytest.mark.sweep  # every key on every question
 async def test_nothing_but_its_own_keys_moves_a_dialog(monkeypatch: pytest.MonkeyPatch) -> None:
     app = fakes.app_of(kind=fakes.Easel)
     async with app.run_test(size=(80, 24)) as pilot:

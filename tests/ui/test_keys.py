@@ -147,6 +147,7 @@ def strange_on(screen: str) -> dict[str, Action]:
     return strange
 
 
+@pytest.mark.sweep  # every key on every screen
 async def test_a_key_without_a_meaning_says_where_it_has_one_and_does_nothing() -> None:
     async with bench("atv71") as made:
         await made.armed()
@@ -256,7 +257,7 @@ async def stage(made: Bench) -> None:
     await until(made.pilot, lambda: "proposed otherwise" in shown(made.app, "detail"))
 
 
-SWEPT = {"faults", "frames", "line", "messages", "scanner", "wiring"}
+SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}
 """Screens with fewer letters that write than those that are kept: looked at by the sweeps."""
 
 

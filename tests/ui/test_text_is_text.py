@@ -213,7 +213,7 @@ ASKED = {
 }
 
 
-@pytest.mark.parametrize("name", kept(WAYS, *list(WAYS)[:3]))
+@pytest.mark.parametrize("name", kept(WAYS, "rating", "inputs"))
 async def test_markup_in_every_field_is_text(name: str) -> None:
     family, way = WAYS[name]
     async with bench(family) as made:
