@@ -13,6 +13,7 @@ import pytest
 
 from tui.bus.bounds import MOST_PROGRAMS
 from tui.bus.line import Line
+from tui.bus.model import LineCounters
 from tui.bus.program import KEEPER, Program
 from tui.bus.program_use import USE_WINDOW, ProgramUse, use_by_program
 from tui.bus.share.line_clients import LineClient, line_clients, look_answer
@@ -55,6 +56,15 @@ def test_use_is_bounded_to_the_programs_of_a_message() -> None:
         use.count(f"program {number}", 1.0 + number)
     assert len(use.shares) <= MOST_PROGRAMS
     assert f"program {3 * MOST_PROGRAMS - 1}" in use.shares
+
+
+def test_a_request_of_no_program_leaves_the_counters_a_message() -> None:
+    use = ProgramUse(Clock())
+    use.count("", 5.0)
+    use.count("a", 5.0)
+    counters = LineCounters(programs=use.shares)
+    again = msgspec.msgpack.decode(msgspec.msgpack.encode(counters), type=LineCounters)
+    assert list(again.programs) == ["a"]
 
 
 def test_answer_to_a_look_names_programs_and_not_the_keeper() -> None:

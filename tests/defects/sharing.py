@@ -615,4 +615,15 @@ DEFECTS = (
             "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
         ),
     ),
+    Defect(
+        "use-of-no-program-told",
+        "tui/bus/program_use.py",
+        "        if not program:\n            return",
+        "        if program is None:\n            return",
+        "After a stop that was repeated no client understands the keeper, and none stays attached.",
+        (
+            "tests/bus/test_program_use.py::test_a_request_of_no_program_leaves_the_counters"
+            "_a_message",
+        ),
+    ),
 )

@@ -24,7 +24,9 @@ class ProgramUse:
         self._when = clock()
 
     def count(self, program: str, seconds: float) -> None:
-        """A request of a program has taken so many seconds of the line."""
+        """A request of a program has taken so many seconds of the line; of none without a name."""
+        if not program:
+            return  # a stop that is repeated for a program that may be gone
         faded = dict(self.shares)
         faded[program] = faded.get(program, 0.0) + seconds / USE_WINDOW
         most = sorted(faded, key=faded.__getitem__, reverse=True)[:MOST_PROGRAMS]
