@@ -489,5 +489,33 @@ async def test_a_disk_that_takes_nothing_does_not_keep_a_line_closed(
         other.give_back()
 
 
+async def test_a_line_that_closes_leaves_the_lock_to_the_thread_that_uses_it(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken, goes_on = threading.Event(), threading.Event()
+    take = OwnerLock.take
+
+    def slow(lock: OwnerLock) -> bool:
+        got = take(lock)
+        taken.set()
+        goes_on.wait(30.0)
+        return got
+
+    monkeypatch.setattr(OwnerLock, "take", slow)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        line = lines.open("panel", wait=None)
+        try:
+            assert await asyncio.to_thread(taken.wait, 30.0)
+            await asyncio.to_thread(line.close)
+            monkeypatch.setattr(OwnerLock, "take", take)
+            other = OwnerLock(place_in(lines.folder))
+            assert not other.take()
+        finally:
+            goes_on.set()
+        await asyncio.to_thread(eventually, other.take)
+        other.give_back()
+
+
 def test_a_disk_has_less_time_than_a_person_has_patience() -> None:
     assert DISK_WITHIN <= 2.0

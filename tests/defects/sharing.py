@@ -626,4 +626,15 @@ DEFECTS = (
             "_a_message",
         ),
     ),
+    Defect(
+        "lock-given-back-while-a-thread-uses-it",
+        "tui/bus/share/sharing.py",
+        "        if not self._finding:\n            self._lock",
+        "        if True:\n            self._lock",
+        "A keeper is started with a lock that is closed already, and the line's thread ends.",
+        (
+            "tests/bus/test_share_ends.py::test_a_line_that_closes_leaves_the_lock_to_the_thread_that"
+            "_uses_it",
+        ),
+    ),
 )

@@ -67,6 +67,8 @@ class Sharing:
         self._server: ShareServer | None = None
         self._client: ShareClient | None = None
         self._off = False
+        self._finding = False
+        """True while a thread uses the lock; if nothing waits for it, it gives the lock back."""
         self._starts_until = 0.0
         self._quiet_until = 0.0
 
@@ -94,10 +96,13 @@ class Sharing:
         path = str(self._place.lock_path)
         while True:
             try:
+                self._finding = True
                 owner, why = await opened_beside(
                     path, self._find_holder, self._drop_lock, DISK_WITHIN
                 )
+                self._finding = False
             except (OSError, LineLost) as error:
+                self._finding = isinstance(error, LineLost)
                 # without a lock nobody else can attach; a serial port stays locked by itself
                 log.error("the line cannot be shared: %s", error)
                 self._off = True
@@ -141,7 +146,7 @@ class Sharing:
         return owner, self._give_to_keeper() if taken and self._keeper else ""
 
     def _drop_lock(self, _: object) -> None:
-        """The lock came when nothing waited for it any more."""
+        """The lock came when nothing waited for it any more; in the thread that has used it."""
         self._lock.hand_over()
 
     def _give_to_keeper(self) -> str:
@@ -259,4 +264,5 @@ class Sharing:
         # whoever comes next may not have been attached
         me, stopped = self._inside.facts.me, self._inside.facts.stops.late_times
         last = Owner(VERSION, me, "", now + quiet if quiet > 0 else 0.0, stopped)
-        self._lock.give_back(last if quiet > 0 or stopped else None)
+        if not self._finding:
+            self._lock.give_back(last if quiet > 0 or stopped else None)
