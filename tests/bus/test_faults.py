@@ -347,14 +347,47 @@ async def test_operator_read_is_repeated_after_silence(open_line: OpenLine) -> N
     def second_lost(request: bytes, count: int) -> Sequence[Step]:
         return [] if count == 1 else [reply(request)]
 
-    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=0.4)
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=60.0)
     with PtyPeer(second_lost) as peer:
         line = open_line(peer.path, timing)
         assert (await line.read(1, 5, priority=OPERATOR)).words == (5,)
-        assert (await line.read(1, 6, priority=OPERATOR)).words == (6,)
+        # at once: the lost reply would be as good, if it came yet
+        got = await line.read(1, 6, priority=OPERATOR)
+        assert got.words == (6,)
         assert len(peer.requests) == 3
-        # the same read goes out again only when the lost reply cannot come any more
-        assert sent(line)[2] - sent(line)[1] >= 0.4
+        assert got.time <= sent(line)[1] + 0.1
+
+
+async def test_poll_of_a_known_drive_survives_two_lost_replies(open_line: OpenLine) -> None:
+    def loses_two(request: bytes, count: int) -> Sequence[Step]:
+        return [] if count in (1, 2) else [reply(request)]
+
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=60.0, back_off_first=60.0)
+    with PtyPeer(loses_two) as peer:
+        line = open_line(peer.path, timing)
+        assert (await line.read(1, 5)).words == (5,)
+        assert (await line.read(1, 6)).words == (6,)
+        assert len(peer.requests) == 4
+        peer.script = silent
+        with pytest.raises(NoAnswer):
+            await line.read(1, 10, 2)
+        with pytest.raises(NoAnswer, match="It is asked again in"):
+            await line.read(1, 10, 2)
+        assert len(peer.requests) == 7
+
+
+async def test_late_reply_to_the_first_try_is_no_newer_than_that(open_line: OpenLine) -> None:
+    def late(request: bytes, count: int) -> Sequence[Step]:
+        return [LATE, reply(request)] if count == 1 else [] if count == 2 else [reply(request)]
+
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=60.0)
+    with PtyPeer(late) as peer:
+        line = open_line(peer.path, timing)
+        assert (await line.read(1, 5)).words == (5,)
+        got = await line.read(1, 6)
+        first = sent(line)[1]
+        assert got.words == (6,)
+        assert got.time <= first + LATE / 2
 
 
 async def test_plain_client_sends_a_write_four_times() -> None:

@@ -128,6 +128,56 @@ def test_time_out_grows_with_failures(devices: Devices) -> None:
     assert outs == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.0])
 
 
+def test_known_drive_is_polled_again_at_once_until_three_replies_are_missed(
+    devices: Devices,
+) -> None:
+    devices.silent(2, EXPECTED, 10.0, 10.1)
+    assert devices.backed_off(2, Priority.POLL, 10.1) == pytest.approx(1.0)
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    for missed in (1, 2):
+        devices.silent(1, EXPECTED, 10.0, 10.1)
+        assert devices.state(1).failures == missed
+        assert devices.backed_off(1, Priority.POLL, 10.1) is None
+    devices.silent(1, EXPECTED, 10.0, 10.1)
+    assert devices.backed_off(1, Priority.POLL, 10.1) == pytest.approx(1.0)
+    devices.answered(1, EXPECTED, 0.01, 12.0)
+    devices.silent(1, EXPECTED, 12.0, 12.1)
+    assert devices.backed_off(1, Priority.POLL, 12.1) is None
+
+
+def test_dead_drive_takes_no_more_of_the_line_than_with_a_pause_after_each_miss() -> None:
+    """A minute of polls, as often as they are let through."""
+    timing = Timing()
+    devices = Devices(timing, mistakable=True)
+    devices.answered(1, EXPECTED, 0.01, 0.0)
+    now = spent = before = waited = 0.0
+    failures = 0
+    while now < 60.0:
+        out = devices.time_out(1, 3, Priority.POLL)
+        devices.silent(1, EXPECTED, now, now + out)
+        spent, now = spent + out, now + out
+        now += devices.backed_off(1, Priority.POLL, now) or 0.0
+    while waited < 60.0:
+        out = min(timing.first_timeout, timing.min_timeout * 2**failures)
+        failures += 1
+        before += out
+        waited += out + pause(failures, timing.back_off_first, timing.back_off_longest)
+    assert spent <= before + 1e-9
+
+
+def test_repeat_waits_for_no_earlier_try_of_its_own(devices: Devices) -> None:
+    pdu = READ.pdu()
+    devices.silent(1, EXPECTED, 9.0, 10.0, pdu)
+    ask = (1, EXPECTED, Priority.POLL, 10.0)
+    assert devices.not_before(*ask, (pdu, 9.0)) == 0.0
+    assert devices.doubts(1, EXPECTED, 10.0, (pdu, 9.0)) == (True, 0)
+    # a request of its own may follow a write: an older reply is not as good
+    assert devices.not_before(*ask, (pdu, None)) == 11.0
+    assert devices.not_before(*ask, (pdu, 9.5)) == 11.0
+    assert devices.not_before(*ask, (Read(1, 6, 1).pdu(), 9.0)) == 11.0
+    assert devices.doubts(1, EXPECTED, 10.0, (pdu, 9.5)) == (False, 1)
+
+
 def test_scan_waits_shortly_for_unknown_devices_only(devices: Devices) -> None:
     background = Priority.BACKGROUND
     assert devices.time_out(1, 3, background) == 0.3

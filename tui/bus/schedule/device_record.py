@@ -27,6 +27,12 @@ class Outstanding:
     expires: float
     copy: bool = False
     """Whether it came once already, at `sent`, and may come again."""
+    pdu: bytes = b""
+    """The request, if it may be repeated while its reply is outstanding."""
+
+    def is_reply_to(self, pdu: bytes, since: float | None) -> bool:
+        """True if it would be as good a reply to a repeat of a request first sent at `since`."""
+        return since is not None and bool(pdu) and self.pdu == pdu and self.sent >= since
 
 
 @dataclass(slots=True)

@@ -146,7 +146,9 @@ class Dispatcher:
         if self._devices.backed_off(job.request.device, job.priority, now, job.within) is not None:
             # taken out at once, to be told
             return 0.0
-        return self._devices.not_before(job.request.device, job.expectation, job.priority, now)
+        return self._devices.not_before(
+            job.request.device, job.expectation, job.priority, now, job.tries
+        )
 
     def _left_alone(self, job: Job) -> bool:
         """Fail a poll of a silent device that is not asked again yet."""
@@ -259,7 +261,8 @@ class Dispatcher:
 
         if job.expectation is None:
             return Sending(request.device, job.pdu, None, 0.0, look=look)
-        sure, skip = self._devices.doubts(request.device, job.expectation, self._clock())
+        now = self._clock()
+        sure, skip = self._devices.doubts(request.device, job.expectation, now, job.tries)
         return Sending(
             request.device,
             job.pdu,

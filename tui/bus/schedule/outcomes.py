@@ -19,7 +19,7 @@ from ..requests import BROADCAST
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
-from .patience import Devices
+from .patience import MISSES, Devices
 from .queue import Job
 from .shared_values import SharedValues
 
@@ -27,7 +27,9 @@ GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
 STILL = 1.0
 """Seconds past the time-out after which an answer cannot have come just now."""
-REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL))
+REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL + 1))
+POLL_REPEATS = MISSES - 1
+"""Repeats of a poll whose reply was lost or damaged: a value is needed in each cycle."""
 
 
 class Outcomes:
@@ -86,7 +88,7 @@ class Outcomes:
         match result.kind:
             case ResultKind.REPLY:
                 self._share(job, result)
-                job.finish(result.pdu, result.end)
+                job.finish(result.pdu, self._time_of(job, result))
             case ResultKind.EXCEPTION:
                 self._tally.count_exception(request.device, result.exception)
                 job.fail(self._exception(job, result.exception))
@@ -105,31 +107,41 @@ class Outcomes:
         Another program, or another client of this one: a gateway takes what was read before.
         """
         if len(self._facts.programs) > 1 or job.max_age:
-            self.values.note(job.request, job.request.words(result.pdu), result.end)
+            time = self._time_of(job, result)
+            self.values.note(job.request, job.request.words(result.pdu), time)
+
+    @staticmethod
+    def _time_of(job: Job, result: ExchangeResult) -> float:
+        """The time of a reply. That to a repeat may be the late one to the first try: it is right
+        for the request, but no newer than the first try."""
+        return result.end if job.first_sent is None else min(job.first_sent, result.end)
 
     def _failed(self, job: Job, result: ExchangeResult, now: float) -> bool:
         request, expectation = job.request, job.expectation
         assert expectation is not None
         place = (request.device, request.function, request.register)
+        again = b"" if request.changes else job.pdu
         error: LineError
         match result.kind:
             case ResultKind.DAMAGED:
                 self._tally.count_checksum(request.device)
                 if not result.recognised:
-                    self._devices.may_come(request.device, expectation, result.sent, now)
+                    self._devices.may_come(request.device, expectation, result.sent, now, again)
                 error = ChecksumFault(*place, received=result.received)
             case ResultKind.WRONG:
                 self._tally.count_wrong(request.device)
-                self._devices.may_come(request.device, expectation, result.sent, now)
+                self._devices.may_come(request.device, expectation, result.sent, now, again)
                 error = WrongReply(*place, result.detail, result.received)
             case _:
                 # who says how long is waited looks whether anybody answers that at all
                 known = job.within is None and self._devices[request.device].ever_answered
                 self._tally.count_silence(request.device, job.priority, known=known)
-                self._devices.silent(request.device, expectation, result.sent, now)
+                self._devices.silent(request.device, expectation, result.sent, now, again)
                 error = NoAnswer(*place, self._no_answer(job, result.detail))
         if self._is_repeated(job, result.kind):
             job.repeats += 1
+            if job.first_sent is None:
+                job.first_sent = result.sent
             self._tally.count_repeat(request.device)
             return True
         job.fail(error)
@@ -137,12 +149,17 @@ class Outcomes:
 
     def _is_repeated(self, job: Job, kind: ResultKind) -> bool:
         """Whether a request is sent again: never one that changes anything."""
-        if job.request.changes or job.repeats >= self._timing.retries:
+        polled = job.priority is Priority.POLL
+        retries = POLL_REPEATS if polled and self._timing.retries else self._timing.retries
+        if job.request.changes or job.repeats >= retries:
             return False
         if kind is ResultKind.DAMAGED:
             return job.priority < Priority.BACKGROUND
-        known = self._devices[job.request.device].ever_answered
-        return kind is ResultKind.NOTHING and known and job.priority in REPEATED_WHEN_SILENT
+        if kind is ResultKind.WRONG:
+            return polled
+        record = self._devices[job.request.device]
+        rests = polled and record.next_try is not None
+        return record.ever_answered and not rests and job.priority in REPEATED_WHEN_SILENT
 
     def note_strays(self, strays: Iterable[Piece], time: float) -> set[int]:
         """Pass on frames that came beside the reply; returns the devices of unexplained ones."""

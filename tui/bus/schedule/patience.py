@@ -25,6 +25,8 @@ SHORT_WAIT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
 """Seconds without a repeated reply after which a short wait is over, and a longer one is short."""
+MISSES = 3
+"""Replies in a row that a known device misses before polls of it pause."""
 KNOWN = 4
 """Turnarounds that must be known before one can be called unusual."""
 UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 2.0, 0.002
@@ -125,24 +127,39 @@ class Devices:
         return record.next_try - now
 
     def not_before(
-        self, device: int, expectation: Expectation | None, priority: Priority, now: float
+        self,
+        device: int,
+        expectation: Expectation | None,
+        priority: Priority,
+        now: float,
+        repeated: tuple[bytes, float | None] = (b"", None),
     ) -> float:
         """When a request may go out at the earliest.
 
         Held back while an earlier request's reply could be taken for its own, and while the
         line is left quiet for a late reply. A stop is never held back, nor is a read that keeps
-        a drive from tripping: replies that may come first are skipped instead.
+        a drive from tripping: replies that may come first are skipped instead. A repeat is not
+        held back for its own earlier tries: `repeated` is the request and the time of its first.
         """
         if priority <= Priority.FEED:
             return 0.0
         there = self._still_outstanding(device, now)
-        expires = [late.expires for late in there if late.expectation == expectation]
+        same = (late for late in there if late.expectation == expectation)
+        expires = [late.expires for late in same if not late.is_reply_to(*repeated)]
         return max([self.quiet_until, *expires])
 
-    def doubts(self, device: int, expectation: Expectation, now: float) -> tuple[bool, int]:
+    def doubts(
+        self,
+        device: int,
+        expectation: Expectation,
+        now: float,
+        repeated: tuple[bytes, float | None] = (b"", None),
+    ) -> tuple[bool, int]:
         """Whether a refusal would be surely that of the next request, and how many replies
-        that fit it may come first."""
-        late = self._still_outstanding(device, now)
+        that fit it may come first. One to an earlier try of a repeat is as good as its own."""
+        late = [
+            each for each in self._still_outstanding(device, now) if not each.is_reply_to(*repeated)
+        ]
         sure = all(each.expectation.function != expectation.function for each in late)
         # a reply that repeats all of its request is as good from the same request before;
         # that of function 16 says nothing of the values
@@ -208,25 +225,39 @@ class Devices:
             self._settle = 0.0
         return max(record.settle, self._settle)
 
-    def silent(self, device: int, expectation: Expectation, sent: float, now: float) -> None:
-        """Nothing came in time: leave the device alone for a while, and await a late reply."""
+    def silent(
+        self, device: int, expectation: Expectation, sent: float, now: float, pdu: bytes = b""
+    ) -> None:
+        """Nothing came in time: await a late reply, and pause polling, of a known device after
+        several misses in a row."""
         record = self[device]
         record.answers = False
         record.failures += 1
         if record.silent_since is None:
             record.silent_since = now
-        self.may_come(device, expectation, sent, now)
-        rest = pause(record.failures, self._timing.back_off_first, self._timing.back_off_longest)
+        self.may_come(device, expectation, sent, now, pdu)
+        failures = record.failures
+        if record.ever_answered and failures < MISSES:
+            return
+        pauses = self._timing.back_off_first, self._timing.back_off_longest
+        rest = pause(failures, *pauses)
+        if record.ever_answered and failures == MISSES:
+            rest = pause(1, *pauses)
+        elif record.ever_answered and failures == MISSES + 1:
+            # a drive that is away now costs no more than with a pause after each miss
+            rest = sum(pause(each, *pauses) for each in range(2, failures + 1))
         record.next_try = now + rest
 
-    def may_come(self, device: int, expectation: Expectation, sent: float, now: float) -> None:
+    def may_come(
+        self, device: int, expectation: Expectation, sent: float, now: float, pdu: bytes = b""
+    ) -> None:
         """The reply to a request sent at `sent` has not come, but may yet."""
         if not self._mistakable:
             return
         record = self[device]
         wait = min(LATE_MARGIN * record.lateness, LONGEST_WAIT)
         expires = max(sent + self._timing.late_reply, now + self._timing.first_timeout, now + wait)
-        record.outstanding.append(Outstanding(expectation, sent, now, expires))
+        record.outstanding.append(Outstanding(expectation, sent, now, expires, pdu=pdu))
         if record.lateness:
             quiet = QUIET_SHARE * self._timing.first_timeout
             self.quiet_until = now + min(LATE_MARGIN * record.lateness, quiet)

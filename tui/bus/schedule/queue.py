@@ -26,6 +26,8 @@ class Job:
     answer: Future[Reply] = field(default_factory=Future)
     repeats: int = 0
     """How often it has been sent again."""
+    first_sent: float | None = None
+    """When it was first sent, if it is sent again: a reply to it may be of that time."""
     pdu: bytes = b""
     begun: bool = False
     """Whether it was taken from the queue once, so that it cannot be withdrawn any more."""
@@ -53,6 +55,11 @@ class Job:
         self.pdu = self.request.pdu()
         if self.request.device != BROADCAST:
             self.expectation = self.request.expectation()
+
+    @property
+    def tries(self) -> tuple[bytes, float | None]:
+        """The request, and when it was first sent, if it is sent again."""
+        return self.pdu, self.first_sent
 
     @property
     def commands(self) -> bool:
