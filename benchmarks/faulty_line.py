@@ -55,6 +55,15 @@ class Faults:
         return {kind: share for kind, share in told.items() if not kind.startswith("late_")}
 
 
+RIGHT = ("good", "late", "duplicated", "noise")
+"""Kinds of reply that bring the right bytes, whole."""
+
+
+def answered_right(counts: Mapping[str, int]) -> int:
+    """Replies that the line made correctly, whenever they came and whatever stood around them."""
+    return sum(counts.get(kind, 0) for kind in RIGHT)
+
+
 MIXED = Faults()
 LATE = Faults(0.15, 0, 0, 0, 0, 0, 0, 0, 0)
 

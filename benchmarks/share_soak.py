@@ -31,7 +31,15 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.faulty_line import DEVICES, ROOT, Faults, FaultyLine, Setting, value_of
+from benchmarks.faulty_line import (
+    DEVICES,
+    ROOT,
+    Faults,
+    FaultyLine,
+    Setting,
+    answered_right,
+    value_of,
+)
 from benchmarks.truth import FAST, SCRATCH, WIDE, asked, right
 from tui.bus.api import Priority
 from tui.bus.errors import LineError
@@ -246,9 +254,11 @@ def soak(minutes: float, seed: int, faults: Faults = FAULTS) -> dict[str, object
             guests.end(process, "ended")
         left = [path.name for path in Path(folder).rglob("*.s*")]
     on_line = faulty.close()
+    correct = answered_right(on_line)
     sums = sum((Counter(told) for told in guests.told.values()), Counter[str]())
     return {
         **{name: sums[name] for name in ("good", "wrong", "errors", "writes", "stops")},
+        "good, % of correct replies": round(100 * sums["good"] / max(1, correct), 1),
         **{name: on_line[kind] for name, kind in HIT.items() if kind in on_line},
         "written twice": on_line.pop("written again", 0),
         "sockets left": len(left),

@@ -28,11 +28,22 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import median
+from typing import cast
 
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.faulty_line import DEVICES, LATE, MIXED, ROOT, Faults, FaultyLine, Setting, value_of
+from benchmarks.faulty_line import (
+    DEVICES,
+    LATE,
+    MIXED,
+    ROOT,
+    Faults,
+    FaultyLine,
+    Setting,
+    answered_right,
+    value_of,
+)
 from benchmarks.wire import share
 from tui.bus.errors import LineError, NoAnswer
 from tui.bus.limits import Limits
@@ -318,8 +329,10 @@ def joined(name: str, parts: Sequence[dict[str, object]]) -> dict[str, object]:
     recoveries = [float(r) for p in whole for r in p["recoveries"]]  # type: ignore[attr-defined]
     seconds = max(float(str(part["seconds"])) for part in whole)
     good = int(str(figures["good"])) / len(whole)
+    correct = sum(answered_right(cast("dict[str, int]", part["faults"])) for part in whole)
     return figures | {
         "name": name,
+        "through": int(str(figures["good"])) / max(1, correct),
         "good_per_second_of_one_line": good / seconds,
         "time_out": whole[0]["time_out"],
         "recovery_median": median(recoveries) if recoveries else None,
@@ -331,7 +344,15 @@ def joined(name: str, parts: Sequence[dict[str, object]]) -> dict[str, object]:
 def table_of(rows: Sequence[dict[str, object]]) -> Table:
     """The figures as a table; recovery as a multiple of the time-out in force."""
     table = Table(title="Wrong values on a faulty line")
-    for name in ("contestant", "exchanges", "wrong", "wrong/answered", "errors told", "good/s"):
+    for name in (
+        "contestant",
+        "exchanges",
+        "wrong",
+        "wrong/answered",
+        "through",
+        "errors",
+        "good/s",
+    ):
         table.add_column(name, justify="left" if name == "contestant" else "right")
     for name in ("recovery median", "99 %", "worst"):
         table.add_column(name, justify="right")
@@ -347,6 +368,7 @@ def table_of(rows: Sequence[dict[str, object]]) -> Table:
             str(row["exchanges"]),
             str(wrong),
             f"{wrong / max(1, wrong + good):.2%}",
+            f"{float(str(row['through'])):.1%}",
             str(row["errors"]),
             f"{float(str(row['good_per_second_of_one_line'])):.0f}",
             *("-" if t is None else f"{float(str(t)) / out:.2f}" for t in times),
