@@ -65,7 +65,7 @@ def test_run_for_no_finite_time_is_status_2(seconds: str) -> None:
 
 @pytest.mark.parametrize("rate", ["nan", "inf", "2", "-0.1", "x"])
 def test_simulate_refuses_a_share_that_is_none(rate: str) -> None:
-    assert "KIND=RATE" in refused(
+    assert "KIND=VALUE" in refused(
         2, "simulate", "atv71", "--tcp", "127.0.0.1:0", "--line-fault", f"late={rate}"
     )
 

@@ -34,7 +34,7 @@ from tui.bus.errors import LineLost
 from tui.cli.main import main
 from tui.drive.profile import library
 from tui.simulator import DriveSpec, Simulation
-from tui.simulator.spec import FaultRates
+from tui.simulator.troubles import FaultRates
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 ALTIVARS = ["atv21", "atv31", "atv312", "atv71"]

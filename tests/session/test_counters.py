@@ -30,7 +30,8 @@ from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.journal_reading import entries_of
 from tui.simulator.simulation import Simulation
-from tui.simulator.spec import DriveSpec, FaultRates
+from tui.simulator.spec import DriveSpec
+from tui.simulator.troubles import FaultRates
 
 QUICK = Timing(first_timeout=0.4, min_timeout=0.4, late_reply=0.5, retries=0)
 

@@ -11,7 +11,7 @@ from tui.session.command.first_stop import FIRST_WHY, FirstStop, stop_first
 from tui.session.connect.limits import limits_of
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
-from tui.simulator.spec import FaultRates
+from tui.simulator.troubles import FaultRates
 
 from .test_stop import FAMILIES, WORDS, Start, journal, start, wait_for, writes
 

@@ -16,7 +16,7 @@ from tui.simulator.server.conversation import RtuConversation
 from tui.simulator.server.faults import FaultPlan
 from tui.simulator.server.frames import seal
 from tui.simulator.server.line import SimulatedLine
-from tui.simulator.spec import FaultRates
+from tui.simulator.troubles import FaultRates
 
 from .exchange import Exchange
 from .small import PROFILES

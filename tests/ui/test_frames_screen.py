@@ -10,7 +10,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen
-from tui.simulator.spec import FaultRates
+from tui.simulator.troubles import FaultRates
 
 from .test_frame import Panel, panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too

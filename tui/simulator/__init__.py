@@ -5,15 +5,18 @@ from .errors import SimulatorError
 from .input_lines import check_inputs, set_inputs
 from .plc import PlcOnLine, plc_cycle
 from .server.client_settings import ClientSettings
-from .server.endpoints import ByteStream
+from .server.stream import ByteStream
 from .simulation import Simulation
-from .spec import DriveSpec, FaultRates, LineTiming, parse_drives
+from .spec import DriveSpec, LineTiming, parse_drives
+from .troubles import TROUBLES, FaultRates, Habits, troubles_of
 
 __all__ = [
+    "TROUBLES",
     "ByteStream",
     "ClientSettings",
     "DriveSpec",
     "FaultRates",
+    "Habits",
     "LineTiming",
     "PlcOnLine",
     "SimulatedDrive",
@@ -23,4 +26,5 @@ __all__ = [
     "parse_drives",
     "plc_cycle",
     "set_inputs",
+    "troubles_of",
 ]

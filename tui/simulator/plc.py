@@ -15,7 +15,7 @@ from .server.conversation import RtuConversation
 from .server.faults import FaultPlan
 from .server.frames import seal
 from .simulation import Simulation
-from .spec import FaultRates
+from .troubles import FaultRates
 
 _PAUSE = 0.02
 """Seconds between an answer and the next request."""

@@ -14,10 +14,12 @@ from .drive import SimulatedDrive
 from .errors import SimulatorError
 from .server.client_settings import ClientSettings
 from .server.conversation import Conversation, RtuConversation, TcpConversation
-from .server.endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
+from .server.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
 from .server.faults import FaultPlan
 from .server.line import SimulatedLine
-from .spec import DriveSpec, FaultRates, LineTiming
+from .server.stream import ByteStream, StreamEndpoint
+from .spec import DriveSpec, LineTiming
+from .troubles import FaultRates, Habits
 
 TICK = 0.05
 """Time in s between two steps of the drives while nobody asks them anything."""
@@ -39,6 +41,7 @@ class Simulation:
         *,
         timing: LineTiming | None = None,
         faults: FaultRates | None = None,
+        habits: Habits | None = None,
         seed: int = 0,
         profiles: Mapping[str, Profile] | None = None,
         clock: Callable[[], float] = time.monotonic,
@@ -64,7 +67,7 @@ class Simulation:
             self.timing,
             clock,
         )
-        self.faults = FaultPlan(faults or FaultRates(), seed)
+        self.faults = FaultPlan(faults or FaultRates(), seed, habits or Habits())
         self._endpoints: list[Endpoint] = []
         self._ticker: threading.Thread | None = None
         self._stopping = threading.Event()
@@ -121,7 +124,12 @@ class Simulation:
 
         Raises SimulatorError where the port cannot be had.
         """
-        endpoint = TcpEndpoint(lambda: TcpConversation(self.line, self.faults), host, port)
+        endpoint = TcpEndpoint(
+            lambda: TcpConversation(self.line, self.faults),
+            host,
+            port,
+            self.faults.habits.idle_close,
+        )
         self._add(endpoint)
         return endpoint.address
 
@@ -130,7 +138,7 @@ class Simulation:
 
         Raises SimulatorError where the port cannot be had.
         """
-        endpoint = TcpEndpoint(self._rtu_unseen, host, port)
+        endpoint = TcpEndpoint(self._rtu_unseen, host, port, self.faults.habits.idle_close)
         self._add(endpoint)
         return endpoint.address
 

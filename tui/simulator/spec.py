@@ -1,10 +1,10 @@
-"""What a simulated line is made of: drives, line timing and the rates of provoked line faults."""
+"""What a simulated line is made of: its drives and its timing."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 from .errors import SimulatorError
 
@@ -71,36 +71,6 @@ class LineTiming:
         Worked out here and not by tui.wire, whose witness the simulator is.
         """
         return 0.00175 if self.baud > 19200 else 3.5 * self.character
-
-
-@dataclass(frozen=True)
-class FaultRates:
-    """Probability of each line fault per reply, 0..1; at most one fault hits a reply.
-
-    `late_by` is the range of the extra delay of a late reply, in s.
-    """
-
-    late: float = 0.0
-    lost: float = 0.0
-    duplicated: float = 0.0
-    truncated: float = 0.0
-    corrupted: float = 0.0
-    noise: float = 0.0
-    foreign: float = 0.0
-    late_by: tuple[float, float] = (0.3, 1.5)
-
-    def __post_init__(self) -> None:
-        """Refuse rates that are no probabilities or add up to more than 1."""
-        rates = self.by_kind()
-        wrong = [kind for kind, rate in rates.items() if not 0 <= rate <= 1]
-        if wrong:
-            raise SimulatorError(f"The rate of {wrong[0]} replies must be between 0 and 1.")
-        if sum(rates.values()) > 1 + 1e-9:
-            raise SimulatorError("The rates of line faults add up to more than 1.")
-
-    def by_kind(self) -> dict[str, float]:
-        """The rates by kind of fault, in a fixed order."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "late_by"}
 
 
 def parse_drives(text: str) -> list[DriveSpec]:

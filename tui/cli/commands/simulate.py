@@ -20,11 +20,10 @@ from ..shared.signals import handled, never_suspended
 from ..shared.standard_input import typed_lines
 
 if TYPE_CHECKING:
-    from tui.simulator import DriveSpec, FaultRates, Simulation
+    from tui.simulator import DriveSpec, Simulation
 
 USUAL = (19200, "8E1")
 """Baud and format of a LINE that names none."""
-FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", "foreign")
 
 
 @click.command()
@@ -72,8 +71,8 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     "--line-fault",
     "faults",
     multiple=True,
-    metavar="KIND=RATE",
-    help=f"Share of replies with a line fault: {', '.join(FAULT_KINDS)}.",
+    metavar="KIND=VALUE",
+    help="Add a trouble to the line, such as lost=0.1 (docs/cli.md).",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the line faults.")
 @click.option(
@@ -142,17 +141,22 @@ def simulation_of(
 ) -> Simulation:
     """The simulated drives that these options describe, served nowhere as yet."""
     from tui.drive.profile.library import load
-    from tui.simulator import LineTiming, Simulation, parse_drives
+    from tui.simulator import LineTiming, Simulation, SimulatorError, parse_drives, troubles_of
 
     specs = [
         replace(spec, run_hz=run_hz, wander=bool(run_hz))
         for spec in _configured(parse_drives(",".join(drives)), sets, protects)
     ]
     own = load(specs[0].profile).data.link
+    try:
+        rates, habits = troubles_of(_typed_troubles(faults))
+    except SimulatorError as error:
+        raise click.UsageError(str(error)) from None
     return Simulation(
         specs,
         timing=LineTiming(baud or own.baud, (form or own.format).upper(), real_time),
-        faults=_rates(faults),
+        faults=rates,
+        habits=habits,
         seed=seed,
         any_settings=any_settings,
     )
@@ -255,16 +259,17 @@ def _raw(text: str, whole: str) -> int:
     return raw
 
 
-def _rates(faults: tuple[str, ...]) -> FaultRates:
-    from tui.simulator import FaultRates
+def _typed_troubles(faults: tuple[str, ...]) -> dict[str, float]:
+    """Values by kind. Raises UsageError."""
+    from tui.simulator import TROUBLES
 
-    rates: dict[str, float] = {}
+    values: dict[str, float] = {}
     for text in faults:
-        kind, _, rate = text.partition("=")
-        if kind not in FAULT_KINDS:
-            raise click.UsageError(f"{text!r}: a line fault is one of {', '.join(FAULT_KINDS)}.")
+        kind, _, value = text.partition("=")
+        if kind not in TROUBLES:
+            raise click.UsageError(f"{text!r}: a line fault is one of {', '.join(TROUBLES)}.")
         try:
-            rates[kind] = FiniteRange(0, 1).convert(rate, None, None)
+            values[kind] = FiniteRange().convert(value, None, None)
         except click.BadParameter:
-            raise click.UsageError(f"{text!r}: write KIND=RATE, for example late=0.15.") from None
-    return replace(FaultRates(), **rates)  # type: ignore[arg-type]
+            raise click.UsageError(f"{text!r}: write KIND=VALUE, for example late=0.15.") from None
+    return values

@@ -15,6 +15,7 @@ from .client_settings import ClientSettings
 from .faults import FaultPlan
 from .frames import is_sealed, request_length
 from .line import SimulatedLine
+from .master import PollingMaster
 
 SILENCE_ENDS_FRAME = 0.05
 """Silence in s that ends a frame of unknown length where the line does not keep real time."""
@@ -105,6 +106,7 @@ class RtuConversation:
         self._received = 0.0
         """When the last character was, or will have been, on the wire."""
         self._outbox = _Outbox()
+        self._master = PollingMaster(line, faults.habits.master)
 
     def feed(self, data: bytes, now: float) -> None:
         """Take bytes that have just come in."""
@@ -133,27 +135,32 @@ class RtuConversation:
         """The bytes that are due to be written by now."""
         if self._buffer and now >= self._end:
             self._finish()
+        for delay, data in self._master.talk(now):
+            self._outbox.put(now + delay, data, self._pace)
         return self._outbox.take(now)
+
+    @property
+    def _pace(self) -> float:
+        """Time of each character that is sent here; none on a medium that spends it itself."""
+        return self._timing.character if self._timing.real_time and not self._paced else 0.0
 
     @property
     def due(self) -> float | None:
         """When `poll` has to be called next."""
         times = [self._end] if self._buffer else []
-        if self._outbox.due is not None:
-            times.append(self._outbox.due)
+        times += [due for due in (self._outbox.due, self._master.due) if due is not None]
         return min(times, default=None)
 
     def _finish(self) -> None:
         frame, self._buffer = self._buffer, b""
-        reply = self._line.receive(frame, self._client)
+        reply = self._line.receive(frame, self._client) if self._faults.reaches() else None
         if reply is None:
             return
-        start, character = self._received, 0.0
+        start = self._received
         if self._timing.real_time:
             start += max(reply.turnaround, self._timing.silence)
-            character = 0.0 if self._paced else self._timing.character
         for delay, data in self._faults.carry(reply.data):
-            self._outbox.put(start + delay, data, character)
+            self._outbox.put(start + delay, data, self._pace)
 
 
 class TcpConversation:
@@ -182,7 +189,11 @@ class TcpConversation:
 
     def _answer(self, message: bytes, now: float) -> None:
         unit = message[6]
-        reply = self._line.ask(unit, message[MBAP:])
+        first = self._line.drives[0].address if self._line.drives else unit
+        served = self._faults.served(unit, first)
+        if served is None or not self._faults.reaches():
+            return
+        reply = self._line.ask(served, message[MBAP:])
         if reply is None:
             return
         wait = reply.turnaround if self._line.timing.real_time else 0.0

@@ -1,4 +1,4 @@
-"""Ways to reach a simulated line: pseudo-terminal, TCP, an opened port.
+"""Ways to reach a simulated line: pseudo-terminal, TCP; what all of them have.
 
 Each endpoint has a thread that waits for bytes and for the moment when its conversation has
 something to do, with the resolution of `select`, not of an event loop's timers.
@@ -7,6 +7,7 @@ something to do, with the resolution of `select`, not of an event loop's timers.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import select
 import socket
@@ -16,7 +17,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 from ..errors import SimulatorError
 from ..spec import LineTiming
@@ -24,21 +24,6 @@ from .client_settings import ClientSettings, set_up_terminal, settings_of_termin
 from .conversation import Conversation
 
 CHUNK = 4096
-STREAM_PAUSE = 0.005
-"""Longest pause between two looks at an opened port that has nothing to read, in s."""
-
-
-class ByteStream(Protocol):
-    """An opened port that the caller gives: reads with a short time-out, writes, closes."""
-
-    def read(self, size: int, /) -> bytes:
-        """Up to `size` bytes; b"" when the time-out passes."""
-
-    def write(self, data: bytes, /) -> int | None:
-        """Write all bytes."""
-
-    def close(self) -> None:
-        """Close the port."""
 
 
 class Endpoint(ABC):
@@ -181,15 +166,26 @@ class PtyEndpoint(Endpoint):
 
 
 class TcpEndpoint(Endpoint):
-    """A TCP port; each connection has a conversation of its own."""
+    """A TCP port; each connection has a conversation of its own.
 
-    def __init__(self, converse: Callable[[], Conversation], host: str, port: int) -> None:
+    One without bytes from its client for `idle_close` seconds is closed.
+    """
+
+    def __init__(
+        self,
+        converse: Callable[[], Conversation],
+        host: str,
+        port: int,
+        idle_close: float = math.inf,
+    ) -> None:
         super().__init__("simulated line, TCP", converse)
+        self._idle_close = idle_close
         self._host = host
         self._port = port
         self._listener: socket.socket | None = None
         self._bell: tuple[socket.socket, socket.socket] | None = None
         self._talks: dict[socket.socket, Conversation] = {}
+        self._heard: dict[socket.socket, float] = {}
 
     @property
     def address(self) -> tuple[str, int]:
@@ -212,6 +208,9 @@ class TcpEndpoint(Endpoint):
         assert self._bell is not None
         while not self._stopping.is_set():
             waits = [w for t in self._talks.values() if (w := wait_time(t, None)) is not None]
+            closes = min(self._heard.values(), default=math.inf) + self._idle_close
+            if closes < math.inf:
+                waits.append(max(0.0, closes - time.monotonic()))
             watched = [self._listener, self._bell[0], *self._talks]
             ready = select.select(watched, [], [], min(waits, default=None))[0]
             if self._listener in ready:
@@ -220,6 +219,9 @@ class TcpEndpoint(Endpoint):
                 self._read(connection)
             for connection in list(self._talks):
                 self._write(connection)
+            limit = time.monotonic() - self._idle_close
+            for connection in [c for c, heard in self._heard.items() if heard <= limit]:
+                self._drop(connection)
 
     def _accept(self, listener: socket.socket) -> None:
         try:
@@ -229,6 +231,7 @@ class TcpEndpoint(Endpoint):
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.settimeout(1.0)
         self._talks[connection] = self._converse()
+        self._heard[connection] = time.monotonic()
 
     def _read(self, connection: socket.socket) -> None:
         conversation = self._talks[connection]
@@ -237,7 +240,8 @@ class TcpEndpoint(Endpoint):
         except OSError:
             data = b""
         if data:
-            conversation.feed(data, time.monotonic())
+            self._heard[connection] = time.monotonic()
+            conversation.feed(data, self._heard[connection])
         if not data or getattr(conversation, "broken", False):
             self._drop(connection)
 
@@ -249,7 +253,7 @@ class TcpEndpoint(Endpoint):
                 self._drop(connection)
 
     def _drop(self, connection: socket.socket) -> None:
-        del self._talks[connection]
+        del self._talks[connection], self._heard[connection]
         connection.close()
 
     def _wake(self) -> None:
@@ -263,35 +267,3 @@ class TcpEndpoint(Endpoint):
             if item is not None:
                 item.close()
         self._listener = self._bell = None
-
-
-class StreamEndpoint(Endpoint):
-    """A port that the caller opened; it is closed at the end, and cannot be plugged in again."""
-
-    def __init__(self, converse: Callable[[], Conversation], stream: ByteStream) -> None:
-        super().__init__("simulated line, port", converse)
-        self._stream = stream
-        self.error: OSError | None = None
-        """What ended the port, if something did."""
-
-    def _open(self) -> None:
-        return
-
-    def _work(self) -> None:
-        conversation = self._converse()
-        try:
-            while not self._stopping.is_set():
-                if data := self._stream.read(CHUNK):
-                    conversation.feed(data, time.monotonic())
-                else:
-                    time.sleep(wait_time(conversation, STREAM_PAUSE) or 0.0)
-                if out := conversation.poll(time.monotonic()):
-                    self._stream.write(out)
-        except OSError as error:
-            self.error = error
-
-    def _wake(self) -> None:
-        return
-
-    def _shut(self) -> None:
-        self._stream.close()

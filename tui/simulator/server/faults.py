@@ -2,27 +2,58 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from random import Random
 
-from ..spec import FaultRates
+from ..troubles import FaultRates, Habits
 from .frames import seal
 
 Sendings = list[tuple[float, bytes]]
 """What is put on the wire instead of a reply: delays in s, and bytes."""
 
 DUPLICATE_AFTER = 0.02
-MESSAGE_KINDS = frozenset({"late", "lost", "duplicated", "foreign"})
+TWIN_AFTER = 0.004
+"""Seconds from one reply to that of a second drive at its address."""
+WORD_READS = (3, 4, 23)
+REPLIED_EXCEPTION = 0x80
+MESSAGE_KINDS = frozenset(
+    {"late", "lost", "duplicated", "foreign", "twin", "swapped", "exception-0a", "exception-0b"}
+)
 """Faults that can hit a message of Modbus TCP too, which has no broken bytes."""
+NO_HABITS = Habits()
 
 
 class FaultPlan:
     """Decides, reply by reply, which fault hits it."""
 
-    def __init__(self, rates: FaultRates, seed: int) -> None:
+    def __init__(self, rates: FaultRates, seed: int, habits: Habits = NO_HABITS) -> None:
         self.rates = rates
+        self.habits = habits
         self._random = Random(seed)
         self.hits: dict[str, int] = dict.fromkeys(rates.by_kind(), 0)
+        self._requests = 0
+        self._held: deque[bytes] = deque()
+        """Replies that wait for a later request, on a line that is behind."""
+        self._twins = 0
+
+    def reaches(self) -> bool:
+        """Whether the next request reaches the drives."""
+        self._requests += 1
+        return not self.habits.lost_every or self._requests % self.habits.lost_every != 0
+
+    def served(self, unit: int, only: int) -> int | None:
+        """The address that a gateway asks for a unit; None where it does not answer it."""
+        if self.habits.only_unit is None:
+            return unit
+        return only if unit == self.habits.only_unit else None
+
+    def _turn(self, reply: bytes) -> bytes | None:
+        """The reply that a line sends in place of this one; None where it sends nothing."""
+        if not self.habits.behind:
+            return reply
+        self._held.append(reply)
+        return self._held.popleft() if len(self._held) > self.habits.behind else None
 
     def choose(self) -> str:
         """The kind of fault for the next reply; empty for none."""
@@ -35,14 +66,19 @@ class FaultPlan:
 
     def carry(self, frame: bytes) -> Sendings:
         """What becomes of an RTU reply frame."""
+        if (turned := self._turn(frame)) is None:
+            return []
         kind = self.choose()
         if not kind:
-            return [(0.0, frame)]
+            return [(0.0, turned)]
         self.hits[kind] += 1
-        return _CARRIERS[kind](self, frame)
+        return _CARRIERS[kind](self, turned)
 
     def carry_message(self, unit: int, pdu: bytes) -> list[tuple[float, int, bytes]]:
         """What becomes of a Modbus TCP reply: delays, units and messages."""
+        if (turned := self._turn(pdu)) is None:
+            return []
+        pdu = turned
         kind = self.choose()
         if kind in MESSAGE_KINDS:
             self.hits[kind] += 1
@@ -54,6 +90,11 @@ class FaultPlan:
             return [(0.0, unit, pdu), (DUPLICATE_AFTER, unit, pdu)]
         if kind == "foreign":
             return [(0.0, self._other_unit(unit), pdu)]
+        if kind == "twin":
+            # a gateway passes on the first of two replies, and none that is broken
+            return [(0.0, unit, _refusal(pdu, 0x0B) if self._overlaps() else pdu)]
+        if kind in _CHANGES:
+            return [(0.0, unit, _CHANGES[kind](pdu))]
         return [(0.0, unit, pdu)]
 
     def lateness(self) -> float:
@@ -88,7 +129,52 @@ class FaultPlan:
         body = bytes([self._other_unit(frame[0])]) + frame[1:-2]
         return [(0.0, seal(body))]
 
+    def _overlaps(self) -> bool:
+        """Whether two drives at one address talk at once: every other time."""
+        self._twins += 1
+        return bool(self._twins % 2)
 
+    def _twin(self, frame: bytes) -> Sendings:
+        other = bytearray(frame[:-2])
+        if frame[1] in WORD_READS:
+            other[-1] ^= 1  # its values are not the same
+        second = seal(bytes(other))
+        if not self._overlaps():
+            return [(0.0, frame), (TWIN_AFTER, second)]
+        # the pair of wires carries both: a zero of either wins
+        shifted = frame[:1] + bytes(a & b for a, b in zip(frame[1:], second, strict=False))
+        return [(0.0, shifted + second[-1:])]
+
+    def _changed(self, kind: str, frame: bytes) -> Sendings:
+        return [(0.0, seal(frame[:1] + _CHANGES[kind](frame[1:-2])))]
+
+    def _swapped(self, frame: bytes) -> Sendings:
+        return self._changed("swapped", frame)
+
+    def _no_path(self, frame: bytes) -> Sendings:
+        return self._changed("exception-0a", frame)
+
+    def _no_target(self, frame: bytes) -> Sendings:
+        return self._changed("exception-0b", frame)
+
+
+def _refusal(pdu: bytes, code: int) -> bytes:
+    return bytes([pdu[0] | REPLIED_EXCEPTION, code])
+
+
+def _swap(pdu: bytes) -> bytes:
+    if pdu[0] not in WORD_READS:
+        return pdu
+    words = bytearray(pdu[2:])
+    words[0::2], words[1::2] = words[1::2], words[0::2]
+    return pdu[:2] + bytes(words)
+
+
+_CHANGES: Mapping[str, Callable[[bytes], bytes]] = {
+    "swapped": _swap,
+    "exception-0a": lambda pdu: _refusal(pdu, 0x0A),
+    "exception-0b": lambda pdu: _refusal(pdu, 0x0B),
+}
 _CARRIERS: Mapping[str, Callable[[FaultPlan, bytes], Sendings]] = {
     "late": FaultPlan._late,
     "lost": FaultPlan._lost,
@@ -97,4 +183,8 @@ _CARRIERS: Mapping[str, Callable[[FaultPlan, bytes], Sendings]] = {
     "corrupted": FaultPlan._corrupted,
     "noise": FaultPlan._noise,
     "foreign": FaultPlan._foreign,
+    "twin": FaultPlan._twin,
+    "swapped": FaultPlan._swapped,
+    "exception-0a": FaultPlan._no_path,
+    "exception-0b": FaultPlan._no_target,
 }

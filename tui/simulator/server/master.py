@@ -1,0 +1,38 @@
+"""Another master on a simulated line: what it asks, and what the drives reply to it."""
+
+from __future__ import annotations
+
+from .frames import seal
+from .line import SimulatedLine
+
+PAUSE = 0.01
+"""Least time in s from a request of the master to the reply."""
+READ = 3
+
+
+class PollingMaster:
+    """Polls one drive after another; `period` in s passes between two requests, 0 for never."""
+
+    def __init__(self, line: SimulatedLine, period: float) -> None:
+        self._line = line
+        self._period = period
+        self._asked = 0
+        self.due: float | None = 0.0 if period and line.drives else None
+        """When it asks next, on a monotonic clock."""
+
+    def talk(self, now: float) -> list[tuple[float, bytes]]:
+        """Its request that is due and the reply to it: delays in s, and bytes."""
+        if self.due is None or now < self.due:
+            return []
+        self.due = now + self._period
+        drive = self._line.drives[self._asked % len(self._line.drives)]
+        self._asked += 1
+        status = drive.profile.quantity("status_word")
+        place = status.address if status is not None else 0
+        request = seal(bytes([drive.address, READ, *place.to_bytes(2, "big"), 0, 1]))
+        reply = self._line.receive(request)
+        sent = [(0.0, request)]
+        if reply is not None:
+            time = len(request) * self._line.timing.character
+            sent.append((max(PAUSE, time + reply.turnaround), reply.data))
+        return sent
