@@ -34,6 +34,16 @@ def test_the_same_note_is_kept_once() -> None:
     assert len(bench.notes.all) == 1
 
 
+def test_a_note_that_is_left_again_after_its_time_is_gone() -> None:
+    bench = Bench()
+    bench.notes.keep(LineNote(1, "a", b"old"))
+    bench.now += NOTES_KEPT + 1
+    bench.notes.keep(LineNote(1, "a", b"old"))
+    assert bench.notes.all == ()
+    bench.notes.keep(LineNote(1, "a", b"old"))
+    assert len(bench.notes.all) == 1
+
+
 def test_the_oldest_notes_make_room_for_new_ones() -> None:
     bench = Bench()
     for number in range(2 * MOST_NOTES // MOST_NOTE):

@@ -7,6 +7,7 @@ import os
 import random
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -15,7 +16,14 @@ from tui.bus.line import Line
 from tui.bus.program import Program
 from tui.bus.share.messages import LONGEST_MESSAGE, NoMessage
 from tui.bus.share.place import Peer
-from tui.bus.share.plain_stop import GIVEN, LONGEST_PLAIN_STOP, STOP_HEAD, plain_stop, stop_devices
+from tui.bus.share.plain_stop import (
+    GIVEN,
+    LONGEST_PLAIN_STOP,
+    STOP_HEAD,
+    plain_stop,
+    send_plain_stop,
+    stop_devices,
+)
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest
@@ -218,3 +226,16 @@ async def test_the_holder_of_a_line_has_nobody_else_to_stop_directly(share: Shar
         assert owner.facts.voice is not None
         owner.facts.voice.stop_directly((1,))
         assert owner.facts.stops.plain == {}
+
+
+async def test_a_stop_that_nobody_takes_is_no_stop(tmp_path: Path) -> None:
+    """The connection ends without the answer: the keeper has died, or does not know the program."""
+
+    async def turns_away(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readline()
+        writer.close()
+
+    address = tmp_path / "socket"
+    async with await asyncio.start_unix_server(turns_away, str(address)):
+        with pytest.raises(OSError, match=r"take a stop|reset|Broken pipe"):
+            await asyncio.to_thread(send_plain_stop, address, (1,))

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -34,7 +35,7 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.share.place import Owner, OwnerLock, Peer, short_path
-from tui.bus.share.sharing import DISK_WITHIN
+from tui.bus.share.sharing import DISK_WITHIN, Sharing
 
 from .conftest import NO_ECHO, Share
 from .peer import PtyPeer, Step, eventually, honest, reply
@@ -513,6 +514,49 @@ async def test_a_line_that_closes_leaves_the_lock_to_the_thread_that_uses_it(
             assert not other.take()
         finally:
             goes_on.set()
+        await asyncio.to_thread(eventually, other.take)
+        other.give_back()
+
+
+async def test_no_keeper_is_started_once_its_program_holds_the_line(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers, ended = threading.Event(), threading.Event()
+    take, refused = OwnerLock.take, list[str]()
+
+    def hangs(lock: OwnerLock) -> bool:
+        answers.wait(30.0)
+        return take(lock)
+
+    def start_keeper(
+        _order: object, _lock: int, started: Callable[[int], None]
+    ) -> Callable[[], bool]:
+        try:
+            started(os.getpid())
+        except OSError as error:
+            refused.append(str(error))
+            raise
+        finally:
+            ended.set()
+        return bool
+
+    monkeypatch.setattr(OwnerLock, "take", hangs)
+    monkeypatch.setattr("tui.bus.share.sharing.start_keeper", start_keeper)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        place = place_in(lines.folder)
+        line = Line(lines.link, timing=QUICK, place=place, share=partial(Sharing, keeper=True))
+        lines.opened.append(line)
+        try:
+            line.open(wait=30.0)
+            assert (await line.read(1, 100)).words == (100,)
+            assert "its keeper has no folder" in line.facts.unkept
+        finally:
+            answers.set()
+        assert await asyncio.to_thread(ended.wait, 30.0)
+        assert refused
+        monkeypatch.setattr(OwnerLock, "take", take)
+        other = OwnerLock(place)
         await asyncio.to_thread(eventually, other.take)
         other.give_back()
 

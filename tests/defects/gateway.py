@@ -106,18 +106,10 @@ DEFECTS = (
     ),
     Defect(
         "stopped-drive-trips",
-        "tui/session/gateway/writes.py",
-        "            self._line.resting.keep(self._session)\n",
+        "tui/session/gateway/line.py",
+        "            self.resting.keep(session)\n",
         "            pass\n",
         "A controller stops its motor and leaves, and the drive trips on its timeout.",
-        ("tests/session/test_gateway_resting.py",),
-    ),
-    Defect(
-        "motor-kept-running-by-reads",
-        "tui/session/gateway/resting.py",
-        "return  # started by another source",
-        "pass",
-        "Reads keep a motor running that nobody watches over.",
         ("tests/session/test_gateway_resting.py",),
     ),
     Defect(
@@ -355,5 +347,13 @@ DEFECTS = (
         "if len(data) < 2 * count:",
         "A damaged request is half understood and written.",
         ("tests/bus/test_gateway.py",),
+    ),
+    Defect(
+        "motor-kept-alive-after-a-lost-stop",
+        "tui/session/gateway/resting.py",
+        "not (rests or clock.monotonic() - begun < timeout)",
+        "False",
+        "A motor did not obey its stop, and reads keep its drive from acting by itself.",
+        ("tests/session/test_gateway_resting.py",),
     ),
 )

@@ -547,8 +547,8 @@ DEFECTS = (
     Defect(
         "notes-kept-for-good",
         "tui/bus/notes.py",
-        "while self._size > MOST_NOTES or now",
-        "while now",
+        "while self._size > MOST_NOTES or (",
+        "while (",
         "A keeper grows with what programs leave, until the computer has no memory left.",
         ("tests/bus/test_notes.py::test_the_oldest_notes_make_room_for_new_ones",),
     ),
@@ -564,8 +564,8 @@ DEFECTS = (
     Defect(
         "stop-waits-for-a-hung-loop",
         "tui/session/command/under_way.py",
-        "            if not given and now > hangs_at:",
-        "            if given and now > hangs_at:",
+        "            if now > direct_at:",
+        "            if given and now > direct_at:",
         "The line's loop hangs in the panel, and its stop key acts after 2 s.",
         (
             "tests/session/test_hung_loop.py::test_the_keeper_stops_drives_whose_stop_does_not_begin",
@@ -636,5 +636,41 @@ DEFECTS = (
             "tests/bus/test_share_ends.py::test_a_line_that_closes_leaves_the_lock_to_the_thread_that"
             "_uses_it",
         ),
+    ),
+    Defect(
+        "record-of-a-dead-container-hides-motors",
+        "tui/session/starts/starts.py",
+        "{one.device for one in living if not one.is_foreign}",
+        "{one.device for one in living}",
+        "A container was killed; the motor of the next program that is killed runs on for good.",
+        (
+            "tests/session/test_starts.py::test_a_record_of_an_earlier_container_hides_no_later_start",
+        ),
+    ),
+    Defect(
+        "keeper-beside-its-program",
+        "tui/bus/share/sharing.py",
+        "            if self._off:\n                raise",
+        "            if False:\n                raise",
+        "The disk was slow: a keeper holds the line beside its program, and stops its motor.",
+        (
+            "tests/bus/test_share_ends.py::test_no_keeper_is_started_once_its_program_holds_the_line",
+        ),
+    ),
+    Defect(
+        "direct-stop-tried-once",
+        "tui/session/command/under_way.py",
+        "                direct_at = now + AGAIN_AFTER\n",
+        "                direct_at = now + 1e9\n",
+        "The keeper was busy for half a second: a motor runs on while the panel hangs.",
+        ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_asked_again",),
+    ),
+    Defect(
+        "stop-that-nobody-took-counts",
+        "tui/bus/share/plain_stop.py",
+        "        if connection.recv(len(GIVEN)) != GIVEN:",
+        "        if connection.recv(len(GIVEN)) is None:",
+        "A stop that the keeper did not take counts as given, and is not tried again.",
+        ("tests/bus/test_plain_stop.py::test_a_stop_that_nobody_takes_is_no_stop",),
     ),
 )

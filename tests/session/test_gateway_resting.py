@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 from tui.bus.gateway.talk import TcpClient
+from tui.session.gateway.resting import RestingDrives
 from tui.simulator import DriveSpec
 
 from .test_gateway import CMD, LFR, Bench, Make, bench, start_motor
@@ -67,3 +68,27 @@ async def test_motor_that_another_source_starts_is_not_kept_alive(bench: Make) -
     await left_for(made, TIMEOUT)
     made.simulation.drive(1).run(30.0)
     await wait_for(lambda: fault(made) is not None)
+
+
+async def test_motor_that_does_not_obey_its_stop_is_not_kept_alive(bench: Make) -> None:
+    """The stop was answered, and another source runs the motor: the drive's timeout acts."""
+    made = bench(ALTIVAR_71, commands=True)
+    drive = made.simulation.drive(1)
+    assert await made.write(CMD, 0x0007) == 0
+    drive.run(30.0)
+    await left_for(made, 0)
+    await wait_for(lambda: fault(made) is not None)
+
+
+async def test_drive_that_has_not_answered_its_stop_is_not_kept_alive(
+    bench: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = bench(ALTIVAR_71, commands=True)
+    assert await made.read(CMD) != ()
+    kept: list[int] = []
+    monkeypatch.setattr(RestingDrives, "keep", lambda _, session: kept.append(session.device))
+    assert await made.write(CMD, 0x0007) == 0
+    assert kept == [1]
+    made.simulation.unplug()
+    assert await made.write(CMD, 0x0007) != 0
+    assert kept == [1]

@@ -60,6 +60,30 @@ async def test_the_keeper_stops_drives_whose_stop_does_not_begin() -> None:
     assert await direct_stop(voice) == ("directly", DRIVES)
 
 
+async def test_a_keeper_that_does_not_answer_is_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(under_way, "AGAIN_AFTER", 0.05)
+    tries: list[tuple[int, ...]] = []
+
+    class Silent(Told):
+        def stop_directly(self, devices: tuple[int, ...]) -> None:
+            tries.append(devices)
+            if len(tries) < 3:
+                raise OSError("it does not answer")
+
+    line = HungLine({one: {} for one in DRIVES})
+    line.facts.voice = Silent()
+    stopper = Stopper(line, Journal())
+    stopper.stop([DriveSession(line, one, library.load("atv71")) for one in DRIVES])
+    for _ in range(500):
+        if len(tries) >= 3:
+            break
+        await asyncio.sleep(0.01)
+    await asyncio.sleep(0.5)
+    assert tries == [DRIVES] * 3
+
+
 async def test_a_loop_that_works_needs_no_other_way(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(under_way, "HANGS_AFTER", 3.0)
     voice = stopped(FakeLine({one: {} for one in DRIVES}))

@@ -684,3 +684,16 @@ def test_record_of_another_pid_namespace_is_kept_until_its_program_ends(tmp_path
     assert starts.found(LINE, there.device) is None
     assert starts.found(LINE, there.device, {there.process}) == there
     assert starts.found(LINE, there.device, {("pid:[2]", ENDED)}) is None
+
+
+def test_a_record_of_an_earlier_container_hides_no_later_start(tmp_path: Path) -> None:
+    """Whether a program of another PID namespace lives is not known: the last start counts."""
+    starts = Starts(tmp_path, processes=MadeUp())
+    there = replace(start(pid=ENDED), space="pid:[1]", wall="2026-11-01T10:00:00.000+00:00")
+    here = start(pid=ENDED, started="101", wall="2026-11-02T10:00:00.000+00:00")
+    starts.begin(there)
+    starts.begin(here)
+    assert starts.found(LINE, there.device, {here.process}) == here
+    later = replace(there, started="102", wall="2026-11-03T10:00:00.000+00:00")
+    starts.begin(later)
+    assert starts.found(LINE, there.device, {here.process}) is None

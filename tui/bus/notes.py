@@ -87,7 +87,9 @@ class Notes:
             if note not in self._kept:
                 self._kept[note] = now
                 self._size += _size(note)
-            while self._size > MOST_NOTES or now - next(iter(self._kept.values())) > NOTES_KEPT:
+            while self._size > MOST_NOTES or (
+                self._kept and now - next(iter(self._kept.values())) > NOTES_KEPT
+            ):
                 old = next(iter(self._kept))
                 del self._kept[old]
                 self._size -= _size(old)

@@ -68,7 +68,7 @@ class Keeper:
     def _note_text(self, device: int, text: str) -> None:
         """Leave a text for the next program if none on the line keeps it."""
         if not self._line.facts.others:
-            self._events.add("told", text, device)
+            self._events.add("told", text, device or None)
 
     def end(self) -> None:
         """End soon: the computer may be shut down, and programs that are attached end as well."""

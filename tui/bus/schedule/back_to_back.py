@@ -35,9 +35,9 @@ class BackToBack:
 
     def count(self, job: Job, begun: float, now: float) -> None:
         """A request has had the line from then until now."""
-        if job.priority is Priority.STOP and not job.request.changes:
-            # the stop word that it decides about is on its way to here
-            self._stop_until = now + LONGEST_PAUSE
+        if job.priority is Priority.STOP:
+            # the stop word that a read decides about is on its way to here
+            self._stop_until = 0.0 if job.request.changes else now + LONGEST_PAUSE
         if job.priority >= Priority.POLL:
             self._polled, self._read = now - begun, 0.0
         if job.priority is not Priority.OPERATOR_READ:

@@ -55,7 +55,8 @@ def send_plain_stop(address: Path, devices: Iterable[int]) -> None:
         with short_path(address) as short:
             connection.connect(short)
         connection.sendall(b"%s %s\n" % (STOP_HEAD, " ".join(map(str, devices)).encode()))
-        connection.recv(len(GIVEN))
+        if connection.recv(len(GIVEN)) != GIVEN:
+            raise OSError(f"{address} does not take a stop")
 
 
 def stop_devices(line: bytes, known: Collection[int]) -> tuple[int, ...]:

@@ -44,7 +44,7 @@ UNKEPT = (
 )
 DISK_WITHIN = 2.0
 """Seconds that the system has to lock a file: after them the line is used without a lock."""
-NO_DISK = "the disk does not answer"
+NO_DISK = "the system does not answer"
 DIED_OFTEN = f"has died {MOST_DEATHS} times within a minute"
 HOLDER_AWAY = "The process that held the line has ended; the next one starts."
 KEEPER_STARTS = 20.0
@@ -104,9 +104,9 @@ class Sharing:
             except (OSError, LineLost) as error:
                 self._finding = isinstance(error, LineLost)
                 # without a lock nobody else can attach; a serial port stays locked by itself
-                log.error("the line cannot be shared: %s", error)
                 self._off = True
                 why = NO_DISK if isinstance(error, LineLost) else error.strerror or str(error)
+                log.error("the line cannot be shared: %s", why)
                 self._hold_unkept(f"has no folder that can be used ({why})")
                 return
             if why:
@@ -161,6 +161,8 @@ class Sharing:
         order = KeeperOrder.of(place, label(self._inside.link), before)
 
         def started(pid: int) -> None:
+            if self._off:
+                raise OSError("it comes too late: this program holds the line")
             keeper = Program(STARTING, KEEPER, pid, space=pid_namespace())
             stopped = facts.stops.late_times
             self._lock.tell(Owner(VERSION, keeper, "", self._quiet_until, stopped))

@@ -59,18 +59,20 @@ def closed_beside(path: str, close: Callable[[], object]) -> None:
     The loop of the line waits for it, so that the port is usually closed afterwards.
     """
 
+    guard, closed = threading.Lock(), threading.Event()
+
     def work() -> None:
         with suppress(OSError):
             close()
-        _ABANDONED.discard(path)
-
-    closing = threading.Thread(target=work, name="close", daemon=True)
-    closing.start()
-    closing.join(CLOSES_WITHIN)
-    if closing.is_alive():
-        _ABANDONED.add(path)
-        if not closing.is_alive():
+        with guard:
+            closed.set()
             _ABANDONED.discard(path)
+
+    threading.Thread(target=work, name="close", daemon=True).start()
+    closed.wait(CLOSES_WITHIN)
+    with guard:
+        if not closed.is_set():
+            _ABANDONED.add(path)
 
 
 def _open(opening: Future[T], open_port: Callable[[], T]) -> None:

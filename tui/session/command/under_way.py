@@ -16,6 +16,8 @@ from ..carry_on import carried_on
 from ..drive import DriveSession
 from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
 
+AGAIN_AFTER = 1.0
+"""Seconds between two tries to stop drives around a loop that hangs."""
 HANGS_AFTER = 0.25
 """Seconds in which a stop begins, unless the line's loop in this program hangs."""
 FIRST_FRAME_EACH = 0.3
@@ -67,13 +69,15 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
 
     def watch() -> None:
         left = list(begun)
-        given = False
+        given: list[UnderWay] = []
+        direct_at = hangs_at
         while left:
             time.sleep(STANDSTILL_POLL_INTERVAL)
             now = time.monotonic()
-            if not given and now > hangs_at:
-                given = True
-                carried_on(partial(_stop_directly, [one for one in left if not one.stop.begun]))
+            if now > direct_at:
+                direct_at = now + AGAIN_AFTER
+                hanging = [one for one in left if not one.stop.begun or now > begin_by]
+                carried_on(partial(_stop_directly, [o for o in hanging if o not in given], given))
             for one in [each for each in left if each.is_lost(now > begin_by, now > send_by)]:
                 error = TimeoutError("its frame was not sent in time")
                 send_last(one.stop.session, one.stop.ordered, error)
@@ -83,9 +87,10 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
     threading.Thread(target=watch, name="stops sent", daemon=True).start()
 
 
-def _stop_directly(hanging: Sequence[UnderWay]) -> None:
-    """Have the keeper of the line stop drives whose stops did not even begin here."""
+def _stop_directly(hanging: Sequence[UnderWay], given: list[UnderWay]) -> None:
+    """Have the keeper of the line stop drives whose stops get on no further here."""
     if hanging:
         line = hanging[0].stop.session.line
         if (voice := line.facts.voice) is not None:
             voice.stop_directly(tuple(one.stop.session.device for one in hanging))
+            given += hanging

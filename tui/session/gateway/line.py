@@ -10,6 +10,7 @@ from tui.bus.errors import LineError
 from tui.drive.chart import read_chart
 
 from ..command.stop_report import StopSummary
+from ..drive import DriveSession
 from ..journal import Journal
 from ..read.reader import Reader
 from .commanding import GatewayCommanding
@@ -49,6 +50,11 @@ class GatewayLine:
         self.commanding.close()
         self.drives.close()
         return summary
+
+    def keep_resting(self, session: DriveSession) -> None:
+        """A drive has answered a client's stop: it must not trip while its motor rests."""
+        if self.drives.known(session.device) is session:
+            self.resting.keep(session)
 
     def sign(self, device: int) -> float | None:
         """When the client that started a motor was last heard (monotonic); None for no such motor.

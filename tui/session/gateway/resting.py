@@ -21,8 +21,6 @@ from ..read.reader import Reader
 
 log = logging.getLogger(__name__)
 
-LONGEST_RAMP = 300.0
-"""Seconds after a stop in which the motor must stop turning; then the drive is not kept alive."""
 JUST_SEEN = 2.0
 """Seconds up to which a state counts as seen just now."""
 
@@ -38,7 +36,7 @@ class RestingDrives:
         self._tasks: dict[int, asyncio.Task[None]] = {}
 
     def keep(self, session: DriveSession) -> None:
-        """Keep a drive whose stop is being sent."""
+        """Keep a drive that has answered its stop."""
         device = session.device
         before = self._tasks.get(device)
         if before is None or before.done():
@@ -58,22 +56,21 @@ class RestingDrives:
 
     async def _work(self, session: DriveSession) -> None:
         clock = session.clock
-        ends: float | None = clock.monotonic() + LONGEST_RAMP
+        begun, rests = clock.monotonic(), False
         learned: float | None = None
         reader = Reader(session)
-        while ends is None or clock.monotonic() < ends:
+        while True:
             timeout = _timeout(session) if learned is not None else UNKNOWN_TIMEOUT
-            if timeout is None:
+            # a motor that turns then has not obeyed, or was started by another source: its drive
+            # is to act by itself
+            if timeout is None or not (rests or clock.monotonic() - begun < timeout):
                 return
             rest = timeout / ASKED_PER_TIMEOUT - self._silence(session)
             if rest > 0:
                 await clock.sleep(rest)
                 continue
             try:
-                if await self._is_at_rest(reader):
-                    ends = None
-                elif ends is None:
-                    return  # started by another source
+                rests = await self._is_at_rest(reader)
                 if learned is None or clock.monotonic() - learned > LEARN_AGAIN:
                     session.timeout = await read_timeout(reader, Priority.POLL)
                     learned = clock.monotonic()

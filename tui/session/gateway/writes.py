@@ -173,10 +173,8 @@ class GatewayWrite:
                 self._refuse(BUSY, f"written with the motor stopped only; the drive is {motion}")
 
     def _refuse(self, code: int, why: str) -> NoReturn:
-        log.warning(
-            "device %s, Modbus TCP client %s: not written: %s",
-            self._session.device, self._client, why,
-        )  # fmt: skip
+        who = f"device {self._session.device}, Modbus TCP client {self._client}"
+        log.warning("%s: not written: %s", who, why)
         raise Unanswerable(code, why)
 
     async def _start(self, order: StartDirection) -> bytes:
@@ -197,8 +195,6 @@ class GatewayWrite:
         """Void what was meant for the drive before this request."""
         self._line.commanding.stop(self._session.device, self._client)
         self._line.pending.stops_by(self._write)
-        if self._line.drives.known(self._session.device) is self._session:
-            self._line.resting.keep(self._session)
 
     async def _send_alone(self, one: ForeignWord) -> None:
         """Send one word that stops."""
@@ -215,6 +211,7 @@ class GatewayWrite:
                 self._session.device, one.address, [one.word], priority=Priority.STOP
             )
             answer = "ok"
+            self._line.keep_resting(self._session)
         except LineError as error:
             answer = str(error)
             raise
@@ -242,6 +239,8 @@ class GatewayWrite:
         try:
             pdu = await self._exchange(priority, parameters)
             answer = "ok"
+            if stops:
+                self._line.keep_resting(self._session)
             return pdu
         except LineError as error:
             answer = str(error)

@@ -134,6 +134,7 @@ class Monitor:
         if self._worker is not None:
             self._worker.cancel()
             self._worker = None
+        self._notes.end()
 
     async def _keep_watching(self, rates: Rates) -> None:
         """Watch for good: an error that nobody foresaw is told, and watching begins anew."""

@@ -31,13 +31,22 @@ class TrendNotes:
         self._points: list[TrendPoint] = []
         self._others: list[TrendPoint] = []
         """Points of other programs that are not in the trend yet."""
+        self._requested = False
         self._end: Callable[[], None] | None = None
 
     def ask(self) -> None:
         """Ask for the trend of other programs; once is enough."""
         if self._end is None:
             self._end = self._notes.on_note(self._hear)
+        if not self._requested:
+            self._requested = True
             self._notes.ask(self._device, self._kind)
+
+    def end(self) -> None:
+        """Hear nothing more, until it is asked again."""
+        if self._end is not None:
+            self._end()
+            self._end = None
 
     def add(self, point: TrendPoint) -> None:
         """Leave a point, together with those around it."""

@@ -53,6 +53,11 @@ class StartRecord:
         return self.space or pid_namespace(), self.pid
 
     @property
+    def is_foreign(self) -> bool:
+        """True if its program ran in another PID namespace, where nothing is known of it."""
+        return self.process[0] != pid_namespace()
+
+    @property
     def begun(self) -> datetime | None:
         """When the start was ordered, in the zone of here; None if the text is no time."""
         try:

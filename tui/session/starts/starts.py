@@ -187,9 +187,12 @@ class Starts:
         key = line_key(line)
         going = self._going(key)
         here = self._of(line)
-        alive = {one.device for one in here if one.process not in absent and self.is_alive(one)}
-        newest = {one.device: one for one in here if one.device not in alive | going}
-        return [newest[device] for device in sorted(newest)]
+        here = [one for one in here if one.device not in going]
+        living = [one for one in here if one.process not in absent and self.is_alive(one)]
+        alive = {one.device for one in living if not one.is_foreign}
+        newest = {one.device: one for one in here if one.device not in alive}
+        # of another container it is not known whether its program lives: a later start counts
+        return [newest[device] for device in sorted(newest) if newest[device] not in living]
 
     def is_on_record(self, line: str, device: int, process: ProcessKey) -> bool:
         """Whether a program has a start of a drive on record. Reads files."""
@@ -301,6 +304,6 @@ class Starts:
 
     def is_alive(self, record: StartRecord) -> bool:
         """Whether the program of a start lives; in doubt it does, as in another container."""
-        if record.process[0] != pid_namespace():
+        if record.is_foreign:
             return self.processes.is_same_boot(record.boot_id)
         return self.processes.lives(record.boot_id, record.pid, record.started)
