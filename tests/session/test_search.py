@@ -294,6 +294,7 @@ async def test_a_search_finds_every_drive_and_no_other() -> None:
         opened.close()
 
 
+@pytest.mark.sweep
 async def test_a_second_search_finds_drives_without_function_43_and_those_behind_them() -> None:
     opened = open_line("sim:powerdrive@1,varmeca@2,atv71@3")
     try:

@@ -260,6 +260,7 @@ async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None
     monitor.stop()
 
 
+@pytest.mark.sweep
 async def test_on_a_slow_line_every_place_is_proved_while_values_move(start: Start) -> None:
     _, opened = start(
         DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0), LineTiming(19200, "8N1", True)

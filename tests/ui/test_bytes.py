@@ -258,6 +258,7 @@ async def test_showing_the_same_again_sends_nothing_and_a_digit_few_bytes() -> N
         assert 0 < app.sent < 60
 
 
+@pytest.mark.sweep
 def test_monitor_sends_a_small_part_of_what_stock_widgets_send() -> None:
     """Both watch the same running drive; the measure itself is `tests.ui.bytes_per_second`."""
     ours, plain = compare(4.0)

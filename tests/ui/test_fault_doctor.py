@@ -114,6 +114,7 @@ async def test_a_live_value_follows_the_drive() -> None:
         await made.until(lambda: "12.3 s" in made.shown("doctor"), 60.0)
 
 
+@pytest.mark.sweep
 async def test_the_line_of_keys_stays_at_the_foot() -> None:
     async with panel() as made:
         await made.on("5")

@@ -74,6 +74,7 @@ def test_a_number_is_a_drive_and_bytes_are_found_by_their_letters() -> None:
 
 
 @given(typed=st.text(max_size=20), data=st.lists(st.binary(max_size=12), max_size=6))
+@pytest.mark.sweep
 def test_whatever_is_typed_chooses_frames_that_are_there(typed: str, data: list[bytes]) -> None:
     log = [Frame(0.0, "out" if at % 2 else "in", one) for at, one in enumerate(data)]
     found = chosen(log, choice_of(typed), told, tcp=False)

@@ -6,6 +6,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import pytest
+
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.frames.screen import FramesScreen
@@ -58,6 +60,7 @@ async def test_a_filter_narrows_the_list_while_it_is_typed_and_esc_ends_it() -> 
         await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
 
 
+@pytest.mark.sweep
 async def test_errors_alone_are_shown_with_what_was_asked() -> None:
     async with on_frames() as made:
         assert made.app.opened is not None
@@ -88,6 +91,7 @@ async def test_find_holds_the_list_and_goes_on_to_older_frames() -> None:
         await made.until(lambda: "(held)" not in made.shown("frames"))
 
 
+@pytest.mark.sweep
 async def test_scrolling_holds_and_goes_no_further_than_the_ends() -> None:
     async with on_frames() as made:
         await made.until(lambda: len(listed(made)) > 15)

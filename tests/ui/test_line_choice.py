@@ -123,6 +123,7 @@ async def test_another_line_is_opened_beside_one_with_drives() -> None:
         assert app.screen is app.connection
 
 
+@pytest.mark.sweep
 async def test_enter_in_a_field_looks_again_by_what_was_typed() -> None:
     async with line() as made:
         app, pilot = made.app, made.pilot
@@ -136,6 +137,7 @@ async def test_enter_in_a_field_looks_again_by_what_was_typed() -> None:
         assert made.kept
 
 
+@pytest.mark.sweep
 async def test_who_types_into_a_field_is_not_led_away() -> None:
     async with line() as made:
         app, pilot = made.app, made.pilot

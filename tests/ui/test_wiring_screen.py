@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from textual.widgets import OptionList
 
 from tui.screens.connection.screen import ConnectionScreen
@@ -32,6 +33,7 @@ async def test_the_page_of_the_open_drive_with_its_model() -> None:
         await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
 
 
+@pytest.mark.sweep
 async def test_sections_and_lines_are_scrolled_and_the_end_is_the_end() -> None:
     async with panel() as made:
         screen = await wiring(made)
