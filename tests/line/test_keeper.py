@@ -230,8 +230,6 @@ def test_a_program_without_a_keeper_says_so(
         assert "holds the line itself, as its keeper has no folder" in done.stderr
         panel = terminal_with([*DRIVEPANEL, line, "-d", "1"])
         panel.wait_for("NO KEEPER")
-        panel.press("m")
-        panel.wait_for("holds the line itself, as its keeper")
         assert keepers() == []
 
 
