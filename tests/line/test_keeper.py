@@ -228,7 +228,7 @@ def test_a_program_without_a_keeper_says_so(
         done = read(line)
         assert done.returncode == 0
         assert "holds the line itself, as its keeper has no folder" in done.stderr
-        panel = terminal_with([*DRIVEPANEL, line, "-d", "1"])
+        panel = terminal_with([*DRIVEPANEL, line])
         panel.wait_for("NO KEEPER")
         assert keepers() == []
 
