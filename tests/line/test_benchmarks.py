@@ -22,7 +22,7 @@ SMALL = {
     "block": "--bauds 19200 --seconds 0.5",
     "chaos": "--rounds 6 --after 9 --slack 20",
     "doctor": "--only 0A",
-    "fleet": "--drives 3 --seconds 1",
+    "fleet": "--drives 3 --seconds 4",
     "gateway": "--seconds 0.3 --rounds 1",
     "hands": "--bursts 2 --keys 8 --ends 1 --resizes 24",
     "hostile": "--cases 20",
