@@ -376,6 +376,22 @@ async def test_poll_of_a_known_drive_survives_two_lost_replies(open_line: OpenLi
         assert len(peer.requests) == 7
 
 
+async def test_repeated_poll_lets_polls_of_other_drives_pass(open_line: OpenLine) -> None:
+    def second_dies(request: bytes, count: int) -> Sequence[Step]:
+        return [] if request[0] == 2 and count else [reply(request)]
+
+    timing = Timing(first_timeout=0.5, min_timeout=0.5, late_reply=60.0)
+    with PtyPeer(second_dies) as peer:
+        line = open_line(peer.path, timing)
+        await line.read(2, 5)
+        dead = asyncio.ensure_future(line.read(2, 5))
+        await asyncio.to_thread(eventually, lambda: len(peer.requests) == 2)
+        await asyncio.gather(line.read(1, 5), line.read(3, 5))
+        with pytest.raises(NoAnswer):
+            await dead
+        assert [request[0] for request in peer.requests] == [2, 2, 1, 3, 2, 2]
+
+
 async def test_late_reply_to_the_first_try_is_no_newer_than_that(open_line: OpenLine) -> None:
     def late(request: bytes, count: int) -> Sequence[Step]:
         return [LATE, reply(request)] if count == 1 else [] if count == 2 else [reply(request)]

@@ -73,6 +73,14 @@ DEFECTS = (
         (QUEUE, "tests/bus/test_faults.py::test_poll_of_a_known_drive_survives_two_lost_replies"),
     ),
     Defect(
+        "dead-drive-holds-up-the-others",
+        "tui/bus/schedule",
+        "self._queue.put_back(job, behind=missed)",
+        "self._queue.put_back(job)",
+        "All drives of a line pause for several time-outs when one goes away.",
+        ("tests/bus/test_faults.py::test_repeated_poll_lets_polls_of_other_drives_pass",),
+    ),
+    Defect(
         "late-reply-as-new-as-the-repeat",
         "tui/bus/schedule",
         "return result.end if job.first_sent is None else min(job.first_sent, result.end)",

@@ -239,8 +239,13 @@ class Dispatcher:
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
         self._back_to_back.count(job, begun, self._clock())
         self.proof.sent(job, begun)
-        if self._outcomes.waited_for_us(job, result) or self._outcomes.conclude(job, result):
+        if self._outcomes.waited_for_us(job, result):
             self.put_back(job)
+        elif self._outcomes.conclude(job, result):
+            # one drive that went away must not keep the others waiting for several time-outs
+            missed = job.priority is Priority.POLL and result.kind is ResultKind.NOTHING
+            self._queue.put_back(job, behind=missed)
+            self._wake.set()
 
     def _not_sent(self, job: Job, why: str) -> None:
         self.in_flight = False

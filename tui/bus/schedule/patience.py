@@ -80,20 +80,19 @@ class Devices:
         """Take over what the program that owns the line has seen of a device."""
         record = self[device]
         record.answers, record.failures = state.answers, state.failures
-        record.refused = state.refused
         record.silent_since, record.next_try = state.silent_since, state.next_try
         record.turnaround, record.told_usual = state.turnaround, state.usual_turnaround
         record.heard, record.repeated = state.heard, state.heard or 0.0
-        record.lateness, record.settle = state.lateness, state.copies_within
+        record.refused, record.lateness = state.refused, state.lateness
+        record.settle = state.copies_within
         if 0.0 < state.copies_within < SHORT_WAIT:
             self._settle = max(self._settle, state.copies_within)
             self._repeated = max(self._repeated, record.repeated)
 
     def last_reply_by(self, now: float) -> float:
         """When the last reply that is due may have come, of those who ever answered; else now."""
-        there = (record for record in self._devices.values() if record.ever_answered)
-        due = (one.expires for record in there for one in record.outstanding)
-        return max((now, *due))
+        there = (record.outstanding for record in self._devices.values() if record.ever_answered)
+        return max((now, *(one.expires for due in there for one in due)))
 
     def time_out(
         self, device: int, function: int, priority: Priority, within: float | None = None
@@ -112,7 +111,9 @@ class Devices:
         if not recent:
             return timing.first_timeout
         known = max(timing.min_timeout, MARGIN * max(recent))
-        return min(timing.first_timeout, known * float(2 ** min(record.failures, 8)))
+        # not while a poll is repeated at once: others wait for the line
+        doubled = min(max(0, record.failures - MISSES + 1), 8)
+        return min(timing.first_timeout, known * 2.0**doubled)
 
     def backed_off(
         self, device: int, priority: Priority, now: float, within: float | None = None

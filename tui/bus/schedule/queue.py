@@ -136,8 +136,10 @@ class JobQueue:
         same = (older.priority, type(older.request), older.request.register)
         return older if same == (job.priority, type(request), request.register) else None
 
-    def put_back(self, job: Job) -> None:
-        """Queue a job that is sent again, at its old place."""
+    def put_back(self, job: Job, *, behind: bool = False) -> None:
+        """Queue a job that is sent again, at its old place or behind all that wait."""
+        if behind:
+            job.order = next(self._orders)
         self._jobs.append(job)
 
     def take(
