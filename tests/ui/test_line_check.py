@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from textual.pilot import Pilot
 from textual.widgets import Input
 
 from tests.adapters import Adapters, adapters
 from tests.programs import rtu_tcp
 from tui.app import DrivePanelApp
 from tui.bus.link import parse_link
+from tui.drive.profile import library
 from tui.screens.connection.choices import groups, line_in
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
+from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.opening import OpeningScreen, leave_opening
 from tui.session.connect.known_line import KnownLine
 from tui.session.connect.known_lines import (
     DriveMark,
@@ -153,6 +158,80 @@ async def test_an_adapter_that_changed_while_the_line_was_lost_is_asked_about(
         await until(pilot, lambda: bool(app.screen.query("#follows")))
         assert "B7" in str(app.screen.query_one("#follows").render())
         app.opened = None
+
+
+@asynccontextmanager
+async def lost_with_adapter_changed(adapters: Adapters) -> AsyncIterator[Pilot[None]]:
+    """A panel whose line has another adapter now, before it is asked about."""
+    port = adapters.plug("ttyUSB0", "1.1", serial="A5")
+    KnownLine(line_of(port))
+    adapters.unplug("ttyUSB0")
+    adapters.plug("ttyUSB0", "1.1", serial="B7")
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24)) as pilot:
+        line = line_of(port)
+        app.opened = OpenLine(port, line, known=KnownLine(line))
+        assert "B7" in line.held
+        yield pilot
+        app.opened = None
+
+
+def line_of(port: str) -> fakes.StillLine:
+    line = fakes.StillLine()
+    line.link = parse_link(port)
+    return line
+
+
+async def test_nothing_is_asked_above_a_picture_that_monitor_replaces(adapters: Adapters) -> None:
+    async with lost_with_adapter_changed(adapters) as pilot:
+        app = pilot.app
+        assert isinstance(app, DrivePanelApp)
+        app.push_screen(OpeningScreen("the line", 2))
+        app.look_around()
+        assert isinstance(app.screen, OpeningScreen)
+        leave_opening(app)
+        app.look_around()
+        assert isinstance(app.screen, Confirm)
+
+
+async def test_a_question_that_monitor_has_replaced_is_asked_again(adapters: Adapters) -> None:
+    async with lost_with_adapter_changed(adapters) as pilot:
+        app = pilot.app
+        assert isinstance(app, DrivePanelApp)
+        app.look_around()
+        first = app.screen
+        assert isinstance(first, Confirm)
+        app.show_monitor(fakes.console_of(fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)))
+        assert isinstance(app.screen, MonitorScreen)
+        app.look_around()
+        assert isinstance(app.screen, Confirm)
+        assert app.screen is not first
+        assert app.screen.by_itself
+        await until(pilot, lambda: bool(app.screen.query("#follows")))
+        app.screen.action_no()
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        app.look_around()
+        assert isinstance(app.screen, MonitorScreen), "it was answered"
+
+
+async def test_a_question_below_another_screen_is_asked_again_once(adapters: Adapters) -> None:
+    async with lost_with_adapter_changed(adapters) as pilot:
+        app = pilot.app
+        assert isinstance(app, DrivePanelApp)
+        await app.run_action("accept_line")
+        hidden = app.screen
+        assert isinstance(hidden, Confirm)
+        await app.push_screen(MessagesScreen())
+        app.look_around()
+        again = app.screen
+        assert isinstance(again, Confirm)
+        assert again is not hidden
+        assert again.by_itself, "no key has asked for it"
+        await until(pilot, lambda: bool(again.query("#follows")))
+        again.action_no()
+        await until(pilot, lambda: isinstance(app.screen, MessagesScreen))
+        app.pop_screen()
+        await until(pilot, lambda: app.screen is app.connection)
 
 
 async def test_a_port_is_remembered_by_its_adapter(

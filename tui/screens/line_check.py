@@ -10,6 +10,8 @@ from .app_port import Panel
 if TYPE_CHECKING:
     from tui.session.connect.known_line import KnownLine
 
+    from .dialogs.confirm import Confirm
+
 QUESTION = "Is this the line that is meant?"
 FOLLOWS = (
     "Until that is said the line is read-only: values are shown and stops go out, nothing else is"
@@ -25,6 +27,8 @@ class LineCheck(Panel):
         super().__init__()
         self._asked_of: tuple[str, ...] = ()
         """What differs, as it was asked about last."""
+        self._line_question: Confirm | None = None
+        """The last question of that."""
         self._connected_since: float | None = None
 
     def mind_line(self) -> None:
@@ -34,6 +38,7 @@ class LineCheck(Panel):
             self._asked_of, self._connected_since = (), None
             return
         self._look_again(known)
+        self._ask_again_if_hidden()
         if not known.changed:
             self._asked_of = ()
         elif set(known.changed) - {*self._asked_of} and not self._is_busy():
@@ -53,7 +58,21 @@ class LineCheck(Panel):
     def _is_busy(self) -> bool:
         search = self.fleet.search if self.fleet is not None else None
         searching = search is not None and search.goes_on
-        return self.screen.is_modal or (searching and self.chosen is None)
+        return self.screen.is_modal or self._is_opening() or (searching and self.chosen is None)
+
+    def _is_opening(self) -> bool:
+        """True until Monitor replaces the first picture, and all that is above it."""
+        from .opening import OpeningScreen
+
+        return any(isinstance(screen, OpeningScreen) for screen in self.screen_stack)
+
+    def _ask_again_if_hidden(self) -> None:
+        """A screen may have replaced the question, or cover it; nobody has answered it then."""
+        asked = self._line_question
+        if asked is None or asked.is_answered or asked is self.screen or self.screen.is_modal:
+            return
+        asked.void()  # nothing is asked twice by a way back to it
+        self._asked_of, self._line_question = (), None
 
     def _look_again(self, known: KnownLine) -> None:
         """A line that was lost may have come back with another adapter."""
@@ -86,4 +105,5 @@ class LineCheck(Panel):
             loses=True,
             by_itself=by_itself,
         )
+        self._line_question = asked
         self.push_screen(asked, told)

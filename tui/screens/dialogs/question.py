@@ -102,7 +102,7 @@ class Question(Framed, ModalScreen[T]):
     def on_screen_resume(self, event: ScreenResume) -> None:
         """A question that was voided below another screen ends now."""
         if self._voided:
-            self.call_later(self.answer, self.NO)
+            self.call_later(self.void)
 
     def on_resize(self, event: Resize) -> None:
         """More room, or less."""
@@ -148,6 +148,11 @@ class Question(Framed, ModalScreen[T]):
         self._voided = True
         if self.is_active:
             self.answer(self.NO)
+
+    @property
+    def is_answered(self) -> bool:
+        """True from the key that answers on, before the answer has reached the one who asked."""
+        return self._answered
 
     def answer(self, value: T) -> None:
         """Give the answer back, once; a voided question has but one."""
