@@ -53,11 +53,14 @@ class GatewayDrives:
         """Profiles that a person has named, by device."""
         self._note = note
         self._found: dict[int, DriveSession | None] = {}
-        self._doubtful: frozenset[int] = frozenset()
-        """Devices that were silent since: another drive may answer there."""
+        self._losses = 0
+        """How often the line was lost; the only thing that is changed in the line's thread."""
+        self._sure: dict[int, int] = {}
+        """Those losses when a device began to say who it is; none where it was silent since."""
         self._candidates: dict[int, tuple[str, ...]] = {}
         """Families of which a nameless device may be."""
-        self._asked: dict[int, float] = {}
+        self._asked: dict[int, tuple[int, float]] = {}
+        """Those losses, and the time, when a device was last asked who it is."""
         self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
         self._charts: dict[int, float] = {}
         """When the word that decides between charts was last asked for, by device."""
@@ -79,19 +82,26 @@ class GatewayDrives:
 
     def find_out(self, device: int) -> None:
         """Ask a device that answers who it is, beside what else is done; not again and again."""
-        sure = self.known(device) is not None and device not in self._doubtful
+        sure = self.known(device) is not None and self._is_sure(device)
         if not sure and device not in self._tasks:
+            losses, asked = self._asked.get(device, (-1, 0.0))
             now = asyncio.get_running_loop().time()
-            if now - self._asked.get(device, now - WHO_AGAIN_AFTER) >= WHO_AGAIN_AFTER:
+            if losses != self._losses or now - asked >= WHO_AGAIN_AFTER:
                 self._begin(device)
 
     async def found(self, device: int) -> DriveSession | None:
         """The drive, asked now if need be; None where no profile fits. Raises the line's errors."""
         session = self.known(device)
-        if session is not None and device not in self._doubtful:
-            return session
-        task = self._tasks.get(device) or self._begin(device)
-        return await asyncio.shield(task)
+        while session is None or not self._is_sure(device):
+            task = self._tasks.get(device) or self._begin(device)
+            session = await asyncio.shield(task)
+            if session is None:
+                break
+        return session
+
+    def _is_sure(self, device: int) -> bool:
+        """False if another drive may answer there than the one that was found out."""
+        return self._sure.get(device) == self._losses
 
     def stoppable(self, device: int, words: Mapping[int, int]) -> DriveSession | None:
         """A nameless drive by one of its families, for words that only stop each of them."""
@@ -105,11 +115,11 @@ class GatewayDrives:
 
     def unknown_again(self, device: int) -> None:
         """The stop of a nameless drive was sent: it is only read as before."""
-        self._take(device, None)
+        self._take(device, None, self._losses)
 
     def doubt(self, device: int) -> None:
         """It was silent: who it is is asked again before anything but a stop is written to it."""
-        self._doubtful |= {device}
+        self._sure.pop(device, None)
         self._asked.pop(device, None)
 
     async def read_deciding(self, session: DriveSession, codes: Sequence[str]) -> Mapping[str, int]:
@@ -158,12 +168,11 @@ class GatewayDrives:
     def _state(self, state: LineState) -> None:
         """Called in the line's thread."""
         if state.status is not LineStatus.CONNECTED:
-            self._doubtful |= frozenset(self._found)
-            self._asked = {}
+            self._losses += 1
 
     def _begin(self, device: int) -> asyncio.Task[DriveSession | None]:
         loop = asyncio.get_running_loop()
-        self._asked[device] = loop.time()
+        self._asked[device] = self._losses, loop.time()
         task = loop.create_task(self._identify(device), name=f"who is {device}")
         self._tasks[device] = task
         task.add_done_callback(lambda done: self._ended(device, done))
@@ -175,7 +184,7 @@ class GatewayDrives:
             log.info("who device %s is was not found out: %s", device, error)
 
     async def _identify(self, device: int) -> DriveSession | None:
-        named = self._named.get(device)
+        named, losses = self._named.get(device), self._losses
         identity: DriveIdentity | None
         if named is not None:
             identity = await own_words(self.line, device, library.load(named))
@@ -184,20 +193,19 @@ class GatewayDrives:
             named = identity.profile or await asyncio.to_thread(self._remembered, device, identity)
         if not named:
             self._candidates[device] = identity.candidates if identity is not None else ()
-            return self._take(device, None)
+            return self._take(device, None, losses)
         profile = await asyncio.to_thread(library.load, named)
         session = DriveSession(self.line, device, profile, identity)
         if session.contradiction:
             log.warning("%s It is read only.", session.contradiction)
-            return self._take(device, None)
+            return self._take(device, None, losses)
         self._note(device, identity, profile.id)
-        return self._take(device, session)
+        return self._take(device, session, losses)
 
-    def _take(self, device: int, session: DriveSession | None) -> DriveSession | None:
+    def _take(self, device: int, session: DriveSession | None, losses: int) -> DriveSession | None:
         if session is None:
             self.line.describe(device, READ_THROUGH)
-        self._found[device] = session
-        self._doubtful -= {device}
+        self._found[device], self._sure[device] = session, losses
         return session
 
     def _patience(self, device: int) -> Priority:
