@@ -293,3 +293,10 @@ async def test_wish_that_others_tell_in_the_first_cycle_stretches_it(bench: Benc
     seen, _ = (await bench.run(1))[0]
     assert seen.period >= 10 * seen.wished
     assert seen.too_slow
+
+
+async def test_cycle_without_any_reading_is_no_refusal(bench: Bench) -> None:
+    bench.monitor.start([], period=0.01)
+    for snapshot, _ in await bench.run(2):
+        assert not snapshot.readings
+        assert snapshot.contact != "refused"

@@ -261,7 +261,7 @@ class Monitor:
             code: reading.aged(now, stale_after(span, often=code in rates.fast))
             for code, reading in readings.items()
         }
-        refused = not error and all(one.quality is Quality.BAD for one in aged.values())
+        bad = [one.quality is Quality.BAD for one in aged.values()]
         snapshot = Snapshot(
             cycle=cycle,
             time=now,
@@ -274,7 +274,7 @@ class Monitor:
             block=self._using,
             period=span,
             wished=max(self.period, SHORTEST_PERIOD),
-            contact="refused" if refused else contact,
+            contact="refused" if bad and all(bad) and not error else contact,
         )
         if not error and snapshot.state.kind != self._kind:
             self._kind = snapshot.state.kind
