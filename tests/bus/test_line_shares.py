@@ -11,7 +11,7 @@ from tui.bus.api import Priority
 from tui.bus.errors import LineLost
 from tui.bus.line import Timing
 from tui.bus.master import Sending
-from tui.bus.requests import Read
+from tui.bus.requests import Read, WriteOne
 from tui.bus.result import ExchangeResult, ResultKind
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.patience import Devices
@@ -21,6 +21,9 @@ from tui.bus.tally import Tally
 
 from .conftest import WIDE
 
+Asked = tuple[Priority, str, int, int | None]
+"""Priority, program, device and the word that is written, None for a read."""
+COMMAND, STOP_WORD, RUN_WORD = 8501, 7, 15
 EXCHANGE = 0.03
 """Seconds of one exchange on the line of these tests."""
 
@@ -33,27 +36,34 @@ class TimedLine:
         self.now = 100.0
         self.end = 0.0
         self.sent: list[Job] = []
+        self.away: set[int] = set()
+        """Devices that answer nothing."""
         self.round_trip = False
         """Whether programs ask again during the next exchange only."""
-        self._later: list[tuple[Priority, str, int]] = []
-        self._again: list[tuple[Priority, str, int]] = []
+        self._later: list[Asked] = []
+        self._again: list[Asked] = []
         self._waiting: list[Job] = []
         timing = Timing()
         devices = Devices(timing, mistakable=False)
         self.dispatcher = Dispatcher(devices, Tally(), timing, lambda: self.now, gateway=False)
 
-    def ask(self, priority: Priority, program: str = "a", device: int = 1) -> Job:
-        """Hand over a request."""
-        job = Job(Read(device, 0, 1), priority, WIDE, program=program, asked=self.now)
+    def ask(
+        self, priority: Priority, program: str = "a", device: int = 1, word: int | None = None
+    ) -> Job:
+        """Hand over a read, or the write of a word."""
+        request = Read(device, 0, 1) if word is None else WriteOne(device, COMMAND, word)
+        job = Job(request, priority, WIDE, program=program, asked=self.now)
         self._waiting.append(job)
         self.dispatcher.submit(job)
         return job
 
-    def keep_asking(self, priority: Priority, program: str = "a", count: int = 4) -> None:
+    def keep_asking(
+        self, priority: Priority, program: str = "a", count: int = 4, word: int | None = None
+    ) -> None:
         """Have so many requests wait at any time."""
         for device in range(1, count + 1):
-            self._again.append((priority, program, device))
-            self.ask(priority, program, device)
+            self._again.append((priority, program, device, word))
+            self.ask(priority, program, device, word)
 
     async def quiet(self) -> None:
         """End what is served once the time is up."""
@@ -70,12 +80,17 @@ class TimedLine:
         job = next(one for one in self._waiting if one.begun)
         self._waiting.remove(job)
         self.sent.append(job)
-        again = job.priority, job.program, job.request.device
+        request = job.request
+        word = request.value if isinstance(request, WriteOne) else None
+        again = job.priority, job.program, request.device, word
         if again in self._again and self.round_trip:
             self._later.append(again)
         elif again in self._again:
             self.ask(*again)
-        return ExchangeResult(ResultKind.REPLY, bytes([3, 2, 0, 0]), end=self.now, turnaround=0.01)
+        if request.device in self.away:
+            return ExchangeResult(ResultKind.NOTHING, end=self.now)
+        reply = bytes([3, 2, 0, 0]) if word is None else job.pdu
+        return ExchangeResult(ResultKind.REPLY, reply, end=self.now, turnaround=0.01)
 
     def serve(self, seconds: float) -> None:
         """Serve for so long by the clock."""
@@ -127,6 +142,55 @@ def test_stop_goes_before_kinds_that_are_owed_time() -> None:
         before = len(line.sent)
         line.serve(EXCHANGE)
         assert line.sent[before] is stop
+
+
+def test_repeated_stops_take_turns_with_all_that_waits() -> None:
+    line = TimedLine()
+    for program in ("a", "b"):
+        line.keep_asking(Priority.STOP, program, word=STOP_WORD)
+    for priority in SHARED:
+        line.keep_asking(priority)
+    line.keep_asking(Priority.FEED, count=1)
+    line.serve(20.0)
+    shares = line.shares()
+    assert shares[Priority.STOP] == pytest.approx(0.5, rel=0.05)
+    rest = 1 - sum(MINIMUM_SHARES.values())
+    assert shares[Priority.FEED] == pytest.approx(0.5 * rest, rel=0.1)
+    assert all(shares[one] > 0 for one in SHARED)
+
+
+def test_stops_that_a_silent_drive_never_answers_take_turns() -> None:
+    line = TimedLine()
+    line.away = {1}
+    line.keep_asking(Priority.STOP, count=1, word=STOP_WORD)
+    line.keep_asking(Priority.FEED, count=2)
+    line.serve(20.0)
+    assert line.shares()[Priority.FEED] == pytest.approx(0.5, rel=0.1)
+
+
+def test_first_stop_waits_for_nothing_beside_repeated_ones() -> None:
+    line = TimedLine()
+    for priority in (*URGENT, *SHARED):
+        line.keep_asking(priority)
+    line.keep_asking(Priority.STOP, "b", word=STOP_WORD)
+    line.serve(2.0)
+    for device in range(10, 30):
+        line.serve(EXCHANGE)
+        stop, before = line.ask(Priority.STOP, "c", device, STOP_WORD), len(line.sent)
+        line.serve(2 * EXCHANGE)
+        waiting = line.sent[before:]
+        assert stop in waiting
+        assert all(one.priority is Priority.STOP for one in waiting[: waiting.index(stop)])
+
+
+def test_repeated_stop_waits_for_one_exchange_at_most() -> None:
+    line = TimedLine()
+    for priority in (*URGENT, *SHARED):
+        line.keep_asking(priority)
+    for _ in range(10):
+        stop, before = line.ask(Priority.STOP, word=STOP_WORD), len(line.sent)
+        line.serve(2 * EXCHANGE)
+        assert stop in line.sent[before:]
 
 
 def test_line_with_time_to_spare_goes_by_priority() -> None:

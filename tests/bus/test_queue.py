@@ -39,6 +39,29 @@ def test_order() -> None:
     assert queue.take(now, 0.0) == (None, None)
 
 
+@pytest.mark.parametrize(("between", "first"), [(0x000F, True), (None, False)])
+def test_stop_after_another_command_is_a_first_one_again(between: int | None, first: bool) -> None:
+    queue = JobQueue(20)
+
+    def send(one: Job) -> None:
+        queue.put(one)
+        assert queue.take(now, 0.0)[0] is one
+        queue.count(one, 0.0, 0.1, acknowledged=True)
+
+    send(stop_job(1))
+    if between is not None:
+        send(Job(WriteOne(1, 8501, between), Priority.OPERATOR_WRITE, WIDE))
+    send(stop_job(2))
+    stop, feed = stop_job(1), job(Priority.FEED)
+    queue.put(feed)
+    queue.put(stop)
+    assert queue.take(now, 0.2)[0] is (stop if first else feed)
+
+
+def stop_job(device: int) -> Job:
+    return Job(WriteOne(device, 8501, 0x0007), Priority.STOP, WIDE)
+
+
 def test_what_must_wait_is_passed_by() -> None:
     queue = JobQueue(20)
     first, second = job(Priority.STOP, 1), job(Priority.POLL, 2)

@@ -233,7 +233,8 @@ class Dispatcher:
             job.fail(LineFailed(with_fate(job, f"The request failed: {error!r}.")))
             raise
         self.in_flight = False
-        self._queue.count(job, self._clock() - begun)
+        acknowledged = result.kind is ResultKind.REPLY
+        self._queue.count(job, begun, self._clock(), acknowledged=acknowledged)
         self._conclude(job, result, begun)
 
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:

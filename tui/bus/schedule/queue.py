@@ -13,6 +13,7 @@ from ..limits import Limits
 from ..model import Priority, Reply
 from ..program_use import ProgramUse
 from ..requests import BROADCAST, Request
+from .sent_stops import SentStops
 from .shares import LineShares
 
 
@@ -92,6 +93,7 @@ class JobQueue:
         self._length = length
         self._use = use or ProgramUse()
         self._shares = LineShares()
+        self._stops = SentStops()
         self._orders = itertools.count()
         self._jobs: list[Job] = []
 
@@ -148,7 +150,8 @@ class JobQueue:
         """The job that goes out now, or when one may; both None when nothing waits."""
         earliest: float | None = None
         self._jobs = [job for job in self._jobs if not self._withdrawn(job)]
-        for job in sorted(self._jobs, key=self._shares.rank):
+        order = sorted(self._jobs, key=self._shares.rank)
+        for job in sorted(order, key=lambda one: self._stops.yields(one, now)):
             ready = not_before(job)
             if ready <= now:
                 self._jobs.remove(job)
@@ -156,8 +159,10 @@ class JobQueue:
             earliest = ready if earliest is None else min(earliest, ready)
         return None, earliest
 
-    def count(self, job: Job, seconds: float) -> None:
-        """A job that was taken has kept the line for so long."""
+    def count(self, job: Job, begun: float, now: float, *, acknowledged: bool) -> None:
+        """A job that was taken has kept the line since `begun`."""
+        seconds = now - begun
+        self._stops.count(job, now, acknowledged=acknowledged)
         self._shares.count(job, seconds, self._jobs)
         self._use.count(job.program, seconds)
 

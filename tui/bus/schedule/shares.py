@@ -62,7 +62,12 @@ class LineShares:
             self._had[mine] = max(least, self._had.get(mine, 0.0))
 
     def count(self, job: Job, seconds: float, waiting: Iterable[Job]) -> None:
-        """A job has taken so many seconds of the line, while these waited."""
+        """A job has taken so many seconds of the line, while these waited.
+
+        The time of stops is not shared: nothing is made up for after it.
+        """
+        if job.priority is Priority.STOP:
+            return
         seconds = max(seconds, LEAST_COUNTED)
         kinds = {kind_of(one.priority) for one in waiting}
         kind = kind_of(job.priority)
