@@ -43,9 +43,17 @@ DEFECTS = (
     Defect(
         "host-floods-stops",
         "tui/session/gateway/host_turns.py",
-        "async with self._slot(host, 1):",
-        "async with self._slot(host, 1000):",
+        "DECIDING: 1, STOPPING: 1}",
+        "DECIDING: 1000, STOPPING: 1000}",
         "Stops that one host sends again and again hold up the stop of another.",
+        ("tests/session/test_gateway_stops.py",),
+    ),
+    Defect(
+        "stops-wait-for-reads",
+        "tui/session/gateway/host_turns.py",
+        "self._shared(host, DECIDING, codes, read)",
+        "self._shared(host, STOPPING, codes, read)",
+        "A stop waits for the reads before all other stops of its host.",
         ("tests/session/test_gateway_stops.py",),
     ),
     Defect(

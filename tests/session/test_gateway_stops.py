@@ -6,6 +6,7 @@ import asyncio
 import struct
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 import pytest_asyncio
@@ -20,6 +21,7 @@ from tui.bus.schedule import back_to_back
 from tui.drive.profile import library
 from tui.session.gateway.drives import CHART_READ_EACH
 from tui.session.gateway.gateway import Gateway
+from tui.session.gateway.host_turns import HostTurns
 from tui.session.gateway.line import GatewayLine
 from tui.session.gateway.rules import GatewayRules, unit_map
 from tui.session.journal import Journal
@@ -167,6 +169,33 @@ async def test_stops_of_one_host_do_not_hold_up_that_of_another(wire: Wire) -> N
     assert answer == STOP
     assert STOP in wire.requests()[before : before + 4]
     await asyncio.gather(*flood)
+
+
+async def test_stop_waits_for_no_read_before_another_stop() -> None:
+    """Each goes out as soon as its own read has come."""
+    turns = HostTurns()
+    order: list[tuple[str, int]] = []
+    held = asyncio.Event()
+
+    async def read(device: int) -> None:
+        await held.wait()
+        order.append(("read", device))
+
+    async def send(device: int) -> None:
+        order.append(("stop", device))
+
+    async def stop(device: int) -> None:
+        await turns.deciding("10.0.0.9", device, partial(read, device))
+        await turns.stopping("10.0.0.9", device, partial(send, device))
+
+    stops = [asyncio.create_task(stop(device)) for device in range(1, 9)]
+    await asyncio.sleep(0)
+    async with asyncio.timeout(30):
+        await turns.stopping("10.0.0.9", 9, partial(send, 9))
+    held.set()
+    await asyncio.gather(*stops)
+    pairs = [(what, device) for device in range(1, 9) for what in ("read", "stop")]
+    assert order == [("stop", 9), *pairs]
 
 
 async def test_like_stops_that_wait_are_sent_once(wire: Wire) -> None:

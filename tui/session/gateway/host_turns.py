@@ -13,28 +13,33 @@ READS_EACH_HOST = 8
 """Reads of the clients of one host that wait for the line at once."""
 
 
+READING, DECIDING, STOPPING = "read", "read before a stop", "stop"
+SLOTS = {READING: READS_EACH_HOST, DECIDING: 1, STOPPING: 1}
+
+
 class HostTurns:
     """One stop of each host at a time, and few reads; for one line and one loop.
 
-    So a host that floods the line with requests does not hold up a stop of another one.
+    So a host that floods the line with requests does not hold up a stop of another one. A stop
+    waits for no read before another stop: it goes out as soon as its own read has come.
     """
 
     def __init__(self) -> None:
-        self._slots: dict[tuple[str, int], tuple[asyncio.Semaphore, int]] = {}
-        """By host and number of slots, with the count of those that use or want one."""
+        self._slots: dict[tuple[str, str], tuple[asyncio.Semaphore, int]] = {}
+        """By host and kind of request, with the count of those that use or want one."""
         self._waiting: dict[tuple[str, Hashable], asyncio.Future[Any]] = {}
-        """Stops that have not been sent yet."""
+        """Stops, and reads before them, that have not been sent yet."""
 
     @asynccontextmanager
     async def reading(self, host: str) -> AsyncIterator[None]:
         """Wait for the turn of a read."""
-        async with self._slot(host, READS_EACH_HOST):
+        async with self._slot(host, READING):
             yield
 
     @asynccontextmanager
-    async def _slot(self, host: str, most: int) -> AsyncIterator[None]:
-        which = host, most
-        slots, users = self._slots.get(which, (asyncio.Semaphore(most), 0))
+    async def _slot(self, host: str, kind: str) -> AsyncIterator[None]:
+        which = host, kind
+        slots, users = self._slots.get(which, (asyncio.Semaphore(SLOTS[kind]), 0))
         self._slots[which] = slots, users + 1
         try:
             async with slots:
@@ -44,14 +49,22 @@ class HostTurns:
             if users > 1:
                 self._slots[which] = slots, users - 1
 
-    async def urgent(
+    async def deciding(
+        self, host: str, codes: Hashable, read: Callable[[], Coroutine[Any, Any, T]]
+    ) -> T:
+        """Read what decides about a stop in the turn of its host; a like one does for both."""
+        return await self._shared(host, DECIDING, codes, read)
+
+    async def stopping(
         self, host: str, word: Hashable, send: Callable[[], Coroutine[Any, Any, T]]
     ) -> T:
-        """Send a stop in the turn of its host; one like it that waits already does for both.
+        """Send a stop in the turn of its host; one like it that waits already does for both."""
+        return await self._shared(host, STOPPING, word, send)
 
-        So does the read before it.
-        """
-        which = host, word
+    async def _shared(
+        self, host: str, kind: str, what: Hashable, send: Callable[[], Coroutine[Any, Any, T]]
+    ) -> T:
+        which = host, (kind, what)
         while (first := self._waiting.get(which)) is not None:
             try:
                 shared: T = await asyncio.shield(first)
@@ -62,7 +75,7 @@ class HostTurns:
                     raise
         mine = self._waiting[which] = asyncio.get_running_loop().create_future()
         try:
-            async with self._slot(host, 1):
+            async with self._slot(host, kind):
                 del self._waiting[which]  # one that comes from here on is sent, too
                 mine.set_result(await send())
         except Exception as error:

@@ -118,7 +118,7 @@ class GatewayWrite:
         if not codes:
             return found
         read = partial(self._line.drives.read_deciding, self._session, codes)
-        raws = await self._line.turns.urgent(self._host, (self._session.device, codes), read)
+        raws = await self._line.turns.deciding(self._host, (self._session.device, codes), read)
         return foreign_words(profile, words, raws)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
@@ -200,7 +200,7 @@ class GatewayWrite:
         """Send one word that stops."""
         device = self._session.device
         word, send = (device, one.address, one.word), partial(self._send_alone_now, one)
-        await self._line.turns.urgent(self._host, word, send)
+        await self._line.turns.stopping(self._host, word, send)
         self._line.commanding.stopped_too(device, self._client)
 
     async def _send_alone_now(self, one: ForeignWord) -> None:
@@ -224,7 +224,7 @@ class GatewayWrite:
         if priority is not Priority.STOP:
             return await send()
         device = self._session.device
-        pdu = await self._line.turns.urgent(self._host, (device, self._asked), send)
+        pdu = await self._line.turns.stopping(self._host, (device, self._asked), send)
         self._line.commanding.stopped_too(device, self._client)
         return pdu
 
