@@ -598,7 +598,7 @@ DEFECTS = (
     Defect(
         "lock-waits-for-a-disk-that-hangs",
         "tui/bus/share/sharing.py",
-        "path, self._find_holder, self._drop_lock, DISK_WITHIN",
+        "path, self._find_holder, self._drop_lock, within",
         "path, self._find_holder, self._drop_lock",
         "The keeper dies while the disk takes nothing: for 10 s no program reads or stops.",
         (

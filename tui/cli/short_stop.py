@@ -9,9 +9,12 @@ and the settings file for a line's name.
 
 from __future__ import annotations
 
+import _thread
 import os
 import sys
 
+_SENT_WITHIN = 0.25
+"""Seconds for all of it: the disk that has the lock files may take nothing, and give nothing."""
 _ANSWER_WITHIN = 0.1
 """Seconds for the connection, and for the answer."""
 _LONGEST_FILE = 1 << 16
@@ -27,15 +30,32 @@ _HOSTS_FILE = "/etc/hosts"
 
 def stop_at_once(words: list[str]) -> None:
     """Give the stop of a command line to the holder of the line, if there is one."""
+    if sys.platform != "linux":
+        return
+    late: list[bool] = []
+    under_way = _thread.allocate_lock()
+    under_way.acquire()
+
+    def give() -> None:
+        try:
+            if (stop := parse_stop(words)) is not None:
+                line, devices = stop
+                # the command has stopped it since, and it may have been started again
+                if (address := holder_address(line)) and not late:
+                    _send(address, " ".join(map(str, devices)) or "all")
+        except Exception:
+            # the command itself follows
+            pass
+        finally:
+            under_way.release()
+
     try:
-        if sys.platform == "linux" and (stop := parse_stop(words)) is not None:
-            line, devices = stop
-            if address := holder_address(line):
-                _send(address, " ".join(map(str, devices)) or "all")
+        _thread.start_new_thread(give, ())
+        under_way.acquire(timeout=_SENT_WITHIN)
+        late.append(True)
     except KeyboardInterrupt:
         os._exit(130)
     except Exception:
-        # the command itself follows
         pass
 
 

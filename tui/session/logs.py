@@ -66,6 +66,10 @@ class Later(QueueHandler):
 class LogFile(RotatingFileHandler):
     """The file, for its owner alone; a disk that takes nothing is no error of the command."""
 
+    def createLock(self) -> None:
+        """Have none: one thread writes, and the end of the program must not wait for it."""
+        self.lock = None
+
     def _open(self) -> TextIOWrapper:
         def opener(path: str, flags: int) -> int:
             return os.open(path, flags, 0o600)

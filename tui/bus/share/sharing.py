@@ -44,6 +44,8 @@ UNKEPT = (
 )
 DISK_WITHIN = 2.0
 """Seconds that the system has to lock a file: after them the line is used without a lock."""
+STOP_DISK_WITHIN = 1.0
+"""The same for a stop, which starts no keeper: it has waited for the disk before."""
 NO_DISK = "the system does not answer"
 DIED_OFTEN = f"has died {MOST_DEATHS} times within a minute"
 HOLDER_AWAY = "The process that held the line has ended; the next one starts."
@@ -97,9 +99,8 @@ class Sharing:
         while True:
             try:
                 self._finding = True
-                owner, why = await opened_beside(
-                    path, self._find_holder, self._drop_lock, DISK_WITHIN
-                )
+                within = DISK_WITHIN if self._keeper else STOP_DISK_WITHIN
+                owner, why = await opened_beside(path, self._find_holder, self._drop_lock, within)
                 self._finding = False
             except (OSError, LineLost) as error:
                 self._finding = isinstance(error, LineLost)
