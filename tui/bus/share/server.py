@@ -14,6 +14,7 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from .attached import Client
+from .coming_back import ComingBack
 from .commanding import Commanding
 from .greeting import Greeting, LineHolder
 from .listening import Listening
@@ -38,9 +39,6 @@ from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
 
-BACK_WITHIN = 2.0
-"""Seconds in which the programs of an owner before come back, unless they are gone, too."""
-
 
 class ShareServer:
     """Serves the programs that attach; lives in the line's loop, and is its facts' voice."""
@@ -59,7 +57,7 @@ class ShareServer:
         self._gone_before: set[str] = set()  # looked after
         self._handling: set[asyncio.Task[None]] = set()
         self._stops_left: list[Job] = []
-        self._missed: asyncio.TimerHandle | None = None
+        self._coming_back = ComingBack(self._loop, self._is_greeting, self._miss_departed)
 
     async def start(self) -> None:
         """Listen. Raises OSError where no socket can be made."""
@@ -69,14 +67,13 @@ class ShareServer:
         await self._listening.start()
         self._signs.start()
         self._miss_departed(ended=True)
-        self._missed = self._loop.call_later(BACK_WITHIN, self._miss_departed)
+        self._coming_back.start()
 
     async def close(self) -> None:
         """Listen no more, and leave no socket behind; the programs start the next keeper."""
         self._inside.facts.voice = None
         self._signs.close()
-        if self._missed is not None:
-            self._missed.cancel()
+        self._coming_back.close()
         await self._listening.close()
         for client in list(self._clients.values()):
             with suppress(OSError, RuntimeError):
@@ -91,6 +88,10 @@ class ShareServer:
     def serves(self) -> bool:
         """True while a program is attached."""
         return bool(self._clients)
+
+    def _is_greeting(self) -> bool:
+        """True while a program has called that is not attached yet."""
+        return len(self._handling) > len(self._clients)
 
     @property
     def stops_wait(self) -> bool:

@@ -1,0 +1,54 @@
+"""How long a new holder waits for programs to come back, by a loop whose time is the test's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import pytest
+
+from tui.bus.share.coming_back import BACK_AT_LATEST, BACK_LOOK, BACK_WITHIN, ComingBack
+
+
+class StarvedLoop:
+    """A loop whose timers come so much later than they are due."""
+
+    def __init__(self, late: float) -> None:
+        self.late = late
+        self.now = 0.0
+        self.next: Callable[[], None] | None = None
+
+    def time(self) -> float:
+        return self.now
+
+    def call_later(self, delay: float, call: Callable[[], None]) -> None:
+        self.next = call
+        self.now += delay + self.late
+
+    def waited(self, *, greets: bool = False) -> float:
+        """Seconds after which programs that are not back count as gone."""
+        over: list[float] = []
+        coming = ComingBack(cast("Any", self), lambda: greets, lambda: over.append(self.now))
+        coming.start()
+        while not over:
+            assert self.next is not None
+            self.next()
+        return over[0]
+
+
+def test_programs_have_their_time_on_a_computer_that_keeps_up() -> None:
+    assert StarvedLoop(0.0).waited() == pytest.approx(BACK_WITHIN, abs=BACK_LOOK)
+
+
+def test_time_in_which_nobody_was_served_does_not_count() -> None:
+    quota = 0.9 * BACK_LOOK
+    assert StarvedLoop(quota).waited() == pytest.approx(1.9 * BACK_WITHIN, abs=2 * BACK_LOOK)
+
+
+def test_program_that_has_called_is_heard_first_up_to_the_bound() -> None:
+    assert StarvedLoop(0.0).waited(greets=True) == pytest.approx(BACK_AT_LATEST, abs=BACK_LOOK)
+
+
+def test_wait_is_bounded_however_slow_the_computer_is() -> None:
+    stall = 1.0
+    assert StarvedLoop(stall).waited() <= BACK_AT_LATEST + BACK_LOOK + stall
