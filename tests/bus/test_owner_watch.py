@@ -28,7 +28,7 @@ from tui.bus.share.owner_watch import (
     OwnerWatch,
     is_stop,
 )
-from tui.bus.share.place import Owner
+from tui.bus.share.place import Owner, Peer
 
 LISTENS = """
 import socket, sys
@@ -220,10 +220,35 @@ def test_nothing_but_a_known_keeper_at_the_other_end_is_killed(listener: Any) ->
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
         found = KeeperProcess(owner(other.pid), connection)
         assert not found.kill()
-        assert found.remedy == OTHER_CONTAINER
+        # the lock file is behind: what is at the other end is named
+        assert found.remedy == BY_HAND.format(pid=process.pid)
         assert other.poll() is None
         other.kill()
     assert process.poll() is None
+
+
+def test_keeper_of_another_container_is_named_as_such(
+    listener: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process, connection = listener
+    elsewhere = Owner(VERSION, Program("k", KEEPER, process.pid, space="pid:[1]"), "socket")
+    found = KeeperProcess(elsewhere, connection)
+    assert not found.kill()
+    assert found.remedy == OTHER_CONTAINER
+    # its lock file does not tell, but the system: no process here has its number
+    monkeypatch.setattr("tui.bus.share.keeper_process.peer_of", lambda _: Peer(0, os.getuid()))
+    assert KeeperProcess(owner(process.pid), connection).remedy == OTHER_CONTAINER
+    assert process.poll() is None
+
+
+def test_keeper_without_a_known_peer_is_ended_by_hand(
+    listener: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process, connection = listener
+    monkeypatch.setattr("tui.bus.share.keeper_process.peer_of", lambda _: None)
+    found = KeeperProcess(owner(process.pid), connection)
+    assert not found.kill()
+    assert found.remedy == BY_HAND.format(pid=process.pid)
 
 
 def test_a_number_that_another_process_has_got_is_not_killed(listener: Any) -> None:

@@ -8,7 +8,7 @@ import signal
 import socket
 from contextlib import suppress
 
-from ..program import KEEPER
+from ..program import KEEPER, pid_namespace
 from .messages import VERSION
 from .place import Owner, peer_of
 
@@ -29,15 +29,18 @@ class KeeperProcess:
         self._pid = owner.program.pid
         self._handle: int | None = None
         known = owner.program.name == KEEPER and owner.version == VERSION
-        self._remedy = BY_HAND
-        if known and self._pid != os.getpid() and hasattr(os, "pidfd_open"):
-            if (peer := peer_of(connection)) is not None and peer.pid == self._pid:
-                self._open(connection)
-            else:
-                self._remedy = OTHER_CONTAINER
+        peer = peer_of(connection)
+        # a number of another PID namespace may be that of any process here
+        inside = owner.program.process[0] == pid_namespace() and (peer is None or peer.pid != 0)
+        self._remedy = BY_HAND if inside else OTHER_CONTAINER
+        if inside and peer is not None and peer.pid != self._pid:
+            # the lock file is behind: what hangs is at the other end
+            self._pid, known = peer.pid, False
+        if known and inside and peer is not None and self._pid != os.getpid():
+            self._open(connection)
 
     def _open(self, connection: socket.socket) -> None:
-        with suppress(OSError):
+        with suppress(OSError, AttributeError):  # a system without handles
             self._handle = os.pidfd_open(self._pid)
         # an end that is open yet: the number was not given to another process since
         ended = select.poll()

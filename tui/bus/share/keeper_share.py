@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from ..model import LineStatus
-from ..program import KEEPER, Program
+from ..program import KEEPER, Program, pid_namespace
 from ..schedule.inside import LineInside, Say
 from .client import LEAVE_WITHIN
 from .messages import VERSION
@@ -69,8 +69,9 @@ class KeeperShare(Sharing):
             self._inside.facts.set_programs(self._keeping.before)
             if not await self._listens():
                 # the program that has started this process gets the lock back, and counts a death
+                me = Program(STARTING, KEEPER, os.getpid(), space=pid_namespace())
                 with suppress(OSError):
-                    self._lock.tell(Owner(VERSION, Program(STARTING, KEEPER, os.getpid()), ""))
+                    self._lock.tell(Owner(VERSION, me, ""))
                 self._lock.hand_over()
                 self._keeping.end()
                 await asyncio.Event().wait()
