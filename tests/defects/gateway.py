@@ -123,8 +123,8 @@ DEFECTS = (
     Defect(
         "start-kept-running-by-reads",
         "tui/session/gateway/writes.py",
-        "        self._line.resting.release(self._session.device)\n",
-        "",
+        "                self._line.resting.release(self._session.device)\n",
+        "                pass\n",
         "Reads keep the motor of a controller running that has died.",
         ("tests/session/test_gateway_resting.py",),
     ),

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
 import pytest
 
+from tui.bus.gateway.pdu import Unanswerable
 from tui.bus.gateway.talk import TcpClient
 from tui.session.gateway.resting import RestingDrives
+from tui.session.gateway.started import StartedMotors
+from tui.session.gateway.writes import GatewayWrite
+from tui.session.starts.errors import StartNotRecorded
 from tui.simulator import DriveSpec
 
 from .test_gateway import CMD, LFR, Bench, Make, bench, start_motor
@@ -21,6 +26,10 @@ STOP_21 = 0xC000
 FAMILIES = {
     "atv71": (ALTIVAR_71, CMD, 0x0007),
     "atv21": (DriveSpec("atv21", 1, sets={"F803": 2}), 0xFA00, STOP_21),
+}
+REFUSED_BY = {
+    "on record": (StartedMotors, "begin"),
+    "on the line": (GatewayWrite, "_exchange"),
 }
 
 
@@ -60,6 +69,24 @@ async def test_running_motor_is_not_kept_alive(bench: Make) -> None:
     await start_motor(made)
     await left_for(made, 0)
     await wait_for(lambda: fault(made) is not None)
+
+
+@pytest.mark.parametrize("where", ["on record", "on the line"])
+async def test_refused_start_leaves_a_resting_drive_alive(
+    bench: Make, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    made = bench(ALTIVAR_71, commands=True)
+    assert await made.write(CMD, 0x0007) == 0
+
+    async def refused(*_: object, **__: object) -> bool:
+        if where == "on record":
+            raise StartNotRecorded(1, Path("/state"), "the disk is full")
+        raise Unanswerable(6)
+
+    monkeypatch.setattr(*REFUSED_BY[where], refused)
+    assert await made.write(CMD, 0x000F) != 0
+    await left_for(made, 3 * TIMEOUT)
+    assert fault(made) is None
 
 
 async def test_motor_that_another_source_starts_is_not_kept_alive(bench: Make) -> None:

@@ -179,7 +179,6 @@ class GatewayWrite:
 
     async def _start(self, order: StartDirection) -> bytes:
         """Send what may start the motor, once that is on record. Raises StartNotRecorded."""
-        self._line.resting.release(self._session.device)
         begun = await self._line.started.begin(self._session, order)
         sent = True
         try:
@@ -188,6 +187,8 @@ class GatewayWrite:
             sent = False
             raise
         finally:
+            if sent:
+                self._line.resting.release(self._session.device)
             if begun or sent:
                 self._line.started.sent(self._session, sent=sent)
 
