@@ -46,10 +46,11 @@ class SharedLines:
         place: SharePlace | None = None,
         wait: float | None = 5.0,
         pid: int = 0,
+        space: str = "",
         gated: bool = False,
     ) -> Line:
         """A program of this name, on the line."""
-        program = Program(name, name, pid or os.getpid())
+        program = Program(name, name, pid or os.getpid(), space=space)
         place = place or place_in(self.folder)
         line = Line(self.link, timing=timing, place=place, program=program, gated=gated)
         for device in range(1, 10):

@@ -136,6 +136,53 @@ async def test_the_next_holder_learns_of_it(share: Share) -> None:
         assert written(peer) == [RUN, RUN]
 
 
+async def test_the_next_holder_learns_how_to_stop_what_was_armed_before(share: Share) -> None:
+    heard: list[tuple[int, bytes]] = []
+
+    def hear(device: int, care: bytes) -> bool:
+        heard.append((device, care))
+        return True
+
+    with PtyPeer(prompt) as peer:
+        lines = share(peer.path)
+        holder, first, second = (lines.open(name, gated=True) for name in ("a", "b", "c"))
+        for device in (1, 2):
+            first.facts.leases.arm(device, 60.0, CARE)
+            first.facts.leases.disarm(device)
+        # drive 2 is another program's since, which may know better
+        assert second.facts.claim(2) == ""
+        second.facts.leases.arm(2, 60.0, b"its own")
+        await asyncio.to_thread(eventually, lambda: first.facts.commander(2) is not None)
+        second.facts.leases.disarm(2)
+        second.facts.release(2)
+        await asyncio.to_thread(eventually, lambda: first.facts.commander(2) is None)
+        for one in (first, second):
+            one.facts.holder.on_care(hear)
+        await asyncio.to_thread(holder.close)
+        await asyncio.to_thread(eventually, lambda: _meet(lines, [first, second]))
+        # whichever holds the line hears how to stop what the other one has armed, and arms nothing
+        holds, other = first, second
+        if second.facts.programs[0] == second.facts.me:
+            holds, other = second, first
+        expected = [(2, b"its own")] if other is second else [(1, CARE)]
+        await asyncio.to_thread(eventually, lambda: heard == expected)
+        assert "drive 1 is not armed" in await refusal(other)
+        assert holds.facts.leases.of(other.facts.me.id) == {}
+        assert written(peer) == []
+
+
+async def test_stop_stays_due_if_arming_ends_with_it(share: Share) -> None:
+    due: list[tuple[int, ...]] = []
+    with PtyPeer(prompt) as peer:
+        holder, program = pair(share, peer)
+        holder.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        program.facts.leases.arm(1, 60.0, CARE)
+        program.facts.give_stop([1], "the stop key")
+        program.facts.leases.disarm(1)
+        await asyncio.to_thread(program.close)
+        await asyncio.to_thread(eventually, lambda: due == [(1,)])
+
+
 def _meet(lines: SharedLines, programs: list[Line]) -> bool:
     names = {one.facts.me.id for one in programs}
     return all({each.id for each in one.facts.programs} == names for one in programs)

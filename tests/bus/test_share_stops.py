@@ -267,8 +267,7 @@ async def test_the_owner_hears_a_stop_of_a_program_that_is_gone_again(share: Sha
 async def test_a_keeper_in_another_container_is_named_with_what_to_do(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
-        # this process is not the one that the lock file names, as in a container
-        keeper, other = lines.open(KEEPER, pid=4711), lines.open("panel")
+        keeper, other = lines.open(KEEPER, space="pid:[1]"), lines.open("panel")
         await other.read(1, 1)
         with frozen(keeper), pytest.raises(LineLost, match=OTHER_CONTAINER):
             await send_stop(other, 1)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
+from functools import partial
 
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, keepers, served, wait_until
 from tui.bus.program import Program
 from tui.bus.shared_facts import SharedFacts
+from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, open_line
+from tui.session.drive import DriveSession
 from tui.simulator import DriveSpec
 
 from .test_commands import bench, turns
@@ -130,3 +135,23 @@ def test_stop_is_carried_out_by_a_keeper_whose_port_is_closed() -> None:
         command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "-d", "1"]
         subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+
+
+@pytest.mark.usefixtures("with_keepers")
+def test_next_keeper_stops_a_motor_whose_arming_has_ended() -> None:
+    with (
+        bench(DriveSpec("atv71", 1, sets={"TTO": 300})) as (simulation, line),
+        closing(open_line(line, wait=PATIENCE, program="panel")) as opened,
+    ):
+        session = DriveSession(opened.line, 1, library.load("atv71"))
+        session.arming.arm()
+        session.arming.disarm()
+        simulation.drive(1).run(20.0)
+        wait_until(lambda: turns(simulation), "the motor turns")
+        (before,) = keepers()
+        os.kill(before, signal.SIGKILL)
+        programs = partial(getattr, opened.line.facts, "programs")
+        wait_until(lambda: programs()[0].pid in {*keepers()} - {before}, "the panel is attached")
+        command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "-d", "1"]
+        subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops", 10.0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -19,6 +19,8 @@ from .stop_counts import StopCounts
 if TYPE_CHECKING:
     from .facts_heard import LineVoice
 
+LEASE_ENDED = 0.0
+"""The end of a lease that its program has ended."""
 RENEWED_EACH = 1.0
 """Seconds after which the holder of a line hears that a device stays armed."""
 
@@ -33,6 +35,11 @@ class WriteLease:
     """When it ends (monotonic); None: when the program leaves the line."""
     care: bytes = b""
     """The care for the device: see tui.session.care_data."""
+
+    @property
+    def has_ended(self) -> bool:
+        """True if its program has ended it."""
+        return self.until == LEASE_ENDED
 
 
 class WriteLeases:
@@ -56,7 +63,8 @@ class WriteLeases:
         until = None if seconds is None else time.monotonic() + seconds + RENEWED_EACH
         known = care if len(care) <= MOST_CARE else b""
         if not known:
-            self.disarm(device)  # or the care of before would count
+            self.disarm(device)
+            self.end(self._me, device)  # or the care of before would count
         self._say(device, self.grant(self._me, device, self._lease(device, until, known)))
 
     def _lease(self, device: int, until: float | None, care: bytes) -> WriteLease:
@@ -69,16 +77,24 @@ class WriteLeases:
         until, mine = time.monotonic() + seconds + RENEWED_EACH, (self._me, device)
         with self._lock:  # one that ended just now stays ended
             lease = self._leases.get(mine)
-            if lease is None or lease.until is None or until - lease.until < RENEWED_EACH:
+            if lease is None or not lease.until or until - lease.until < RENEWED_EACH:
                 return
             self._leases = MappingProxyType({**self._leases, mine: replace(lease, until=until)})
         self._say(device, WriteLease(lease.stamp, until))
 
     def disarm(self, device: int) -> None:
-        """Write to a device no more."""
-        if (self._me, device) in self._leases:
-            self.end(self._me, device)
-            self._say(device, WriteLease(self._stops.stamp(device), 0.0))
+        """Write to a device no more; the next holder of the line learns how to stop it still."""
+        lease = self._leases.get((self._me, device))
+        if lease is not None and not lease.has_ended:
+            self.grant(self._me, device, replace(lease, until=LEASE_ENDED))
+            self._say(device, WriteLease(self._stops.stamp(device), LEASE_ENDED))
+
+    def forget_ended(self, devices: Iterable[int]) -> None:
+        """Other programs command these devices, and may know better how to stop them."""
+        for device in devices:
+            lease = self._leases.get((self._me, device))
+            if lease is not None and lease.has_ended:
+                self.end(self._me, device)
 
     def _say(self, device: int, lease: WriteLease) -> None:
         if (voice := self._voice()) is not None:

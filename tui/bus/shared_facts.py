@@ -90,6 +90,7 @@ class SharedFacts(FactsHeard):
             known = {one.id for one in (*self.departed, *programs, self.me)}
             earlier = tuple(one for one in departed if one.id not in known)
             self.departed = (*earlier, *self.departed)[-DEPARTED_KEPT:]
+        self.leases.forget_ended(others)
         self.set_programs(programs)
         return unheard
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from ..leases import WriteLease
 from ..program import Program
@@ -52,19 +53,21 @@ class Commanding:
         return True
 
     def _armed(self, program: Program, message: Armed) -> None:
-        """A program may write to a device; care that nobody here can make use of is none."""
+        """A program may write to a device, or no more; care that nobody here can use is none."""
         facts, device, care = self._facts, message.device, message.care
-        for client in self._clients.values():
-            client.stops_due.pop(device, None)  # whoever arms it now knows of that stop
+        lease = WriteLease(message.stamp, message.until, care)
+        if not lease.has_ended:
+            for client in self._clients.values():
+                client.stops_due.pop(device, None)  # whoever arms it now knows of that stop
         if program.id == facts.me.id:
             return  # granted already
-        if message.until is not None and message.until <= 0:
+        # one that commands it now knows better how to stop it than one that armed it before
+        other = lease.has_ended and facts.commanders.get(device) not in (None, program.id)
+        known = not care or other or facts.holder.hear_care(device, care)
+        if lease.has_ended or not known:
             facts.leases.end(program.id, device)
-            return
-        if care and not facts.holder.hear_care(device, care):
-            facts.leases.end(program.id, device)
-            care = b""
-        facts.leases.grant(program.id, device, WriteLease(message.stamp, message.until, care))
+        if not lease.has_ended:
+            facts.leases.grant(program.id, device, lease if known else replace(lease, care=b""))
 
     def claimed(self, program: Program, claim: Claim) -> None:
         """A program wants to command a device, or no longer."""

@@ -76,7 +76,10 @@ class ProgramVoice:
 
 
 def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
-    """Send the holder of a line what this program has armed, commands or leaves alone."""
+    """Send the holder of a line what this program has armed, commands or leaves alone.
+
+    Of drives that it has armed before, how to stop them.
+    """
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
         send(Armed(device, lease.stamp, lease.until, lease.care))
@@ -91,7 +94,8 @@ def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
 def give_up_own(facts: SharedFacts, why: str) -> None:
     """Command and write to no drive any more: this program was taken for gone."""
     me = facts.me.id
-    facts.leases.end(me)
+    for device in facts.leases.of(me):
+        facts.leases.disarm(device)
     for device, holder in facts.commanders.items():
         if holder == me:
             facts.release(device)
