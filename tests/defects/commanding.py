@@ -415,10 +415,10 @@ DEFECTS = (
     Defect(
         "unfed-until-its-time-out-is-learnt",
         "tui/session/monitor/line_watch.py",
-        "        if kept.learned is not None and kept.watch is None and not kept.unknown:\n",
-        "        if kept.watch is None and not kept.unknown:\n",
+        "            self._keep_alive(kept, UNKNOWN_TIMEOUT)\n",
+        "            pass\n",
         "A drive trips while a word that it does not have is waited for.",
-        (f"{LINE_WATCH}::test_a_drive_is_fed_while_its_time_out_is_learnt",),
+        (f"{LINE_WATCH}::test_drive_is_kept_alive_while_its_timeout_is_learned",),
     ),
     Defect(
         "silent-after-a-word-it-lacks",

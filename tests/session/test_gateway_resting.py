@@ -62,6 +62,15 @@ async def test_drive_stays_alive_after_a_run(bench: Make) -> None:
     assert fault(made) is None
 
 
+async def test_start_ends_keeping_its_drive_alive(bench: Make) -> None:
+    made = bench(ALTIVAR_71, commands=True)
+    facts = made.line.facts
+    assert await made.write(CMD, 0x0007) == 0
+    await wait_for(lambda: bool(facts.keep_alives.of(facts.me.id)))
+    assert await made.write(CMD, 0x000F) == 0
+    assert facts.keep_alives.of(facts.me.id) == []
+
+
 async def test_running_motor_is_not_kept_alive(bench: Make) -> None:
     """Its controller is gone: the drive's own timeout stops it."""
     made = bench(ALTIVAR_71, commands=True)

@@ -12,6 +12,7 @@ import pytest
 
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
+from tui.bus.keep_alive import KeepAlive
 from tui.bus.leases import WriteLease
 from tui.bus.notes import LineNote
 from tui.bus.program import Program
@@ -56,6 +57,9 @@ class Told:
 
     def armed(self, device: int, lease: WriteLease) -> None:
         self.said.append(("armed", device, lease.until != 0))
+
+    def kept_alive(self, one: KeepAlive) -> None:
+        self.said.append(("kept alive", one.device, one.timeout, one.until != 0))
 
     def told(self, device: int, text: str) -> None:
         self.said.append(("told", device, text))

@@ -12,9 +12,11 @@ from typing import Any, cast
 import pytest
 
 from tui.bus.api import DeviceState, LineWorker, Priority
+from tui.bus.keep_alive import KeepAlive
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
+from tui.session.read.presence import UNKNOWN_TIMEOUT
 
 from .fakes import OneDrive, parameter, profile_of
 
@@ -103,19 +105,19 @@ async def keep() -> AsyncIterator[Callable[[int], Kept]]:
         await kept.end()
 
 
-async def test_a_drive_is_asked_before_its_time_is_up_and_before_the_polls(
-    keep: Callable[[int], Kept],
-) -> None:
-    line = keep(20).line
-    # behind its time-out it has acted already and would be asked as a poll
-    await until(lambda: (STATE, Priority.FEED) in line.looked)
+def kept_alive(line: HeardLine) -> list[KeepAlive]:
+    """What the holder of the line is to keep alive."""
+    return line.facts.keep_alives.of(line.facts.me.id)
 
 
-async def test_a_drive_that_was_just_heard_is_not_asked(keep: Callable[[int], Kept]) -> None:
-    kept = keep(10_000)
+async def test_drive_is_kept_alive_by_its_own_timeout(keep: Callable[[int], Kept]) -> None:
+    kept = keep(35)
     await until(lambda: kept.watch.watch(1) is not None)
-    await asyncio.sleep(0.1)
+    assert kept_alive(kept.line) == [KeepAlive(1, 3.5, STATE)]
+    # the holder of the line reads, and no worker of this program
     assert Priority.FEED not in [priority for _, priority in kept.line.looked]
+    kept.watch.stop()
+    assert kept_alive(kept.line) == []
 
 
 @pytest.mark.parametrize(("silent", "told"), [(40.0, False), (60.0, True), (150.0, True)])
@@ -142,13 +144,16 @@ async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
     assert kept.watch.watch(1) is None
     assert kept.watch.warnings() == []
     assert kept.watch.left_alone() == {}
+    await until(lambda: kept_alive(kept.line) == [])
 
 
-async def test_a_drive_is_fed_while_its_time_out_is_learnt(keep: Callable[[int], Kept]) -> None:
+async def test_drive_is_kept_alive_while_its_timeout_is_learned(
+    keep: Callable[[int], Kept],
+) -> None:
     """Polls wait for seconds behind the silence of a word that it does not have."""
-    kept = keep(20)
+    kept = keep(70)
     kept.line.answers.clear()
-    await until(lambda: (STATE, Priority.FEED) in kept.line.looked)
+    assert kept_alive(kept.line) == [KeepAlive(1, UNKNOWN_TIMEOUT, STATE)]
     assert kept.watch.watch(1) is None
     kept.line.answers.set()
     await until(lambda: kept.watch.watch(1) is not None)

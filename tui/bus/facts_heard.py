@@ -10,6 +10,7 @@ from .leases import WriteLease
 from .program import Program, readable
 
 if TYPE_CHECKING:
+    from .keep_alive import KeepAlive
     from .notes import LineNote
 
 log = logging.getLogger(__name__)
@@ -40,6 +41,9 @@ class LineVoice(Protocol):
 
     def armed(self, device: int, lease: WriteLease) -> None:
         """This program may write to a device until a time, or no more if that is over."""
+
+    def kept_alive(self, one: KeepAlive) -> None:
+        """This program has a device kept alive, or no more."""
 
     def told(self, device: int, text: str) -> None:
         """Something that everybody on the line is to read."""

@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 from .facts_heard import FactsHeard, LineVoice, heard
 from .holder_heard import HolderHeard
+from .keep_alive import KeepAlives
 from .leases import WriteLeases
 from .notes import Notes
 from .program import KEEPER, Program
@@ -40,6 +41,8 @@ class SharedFacts(FactsHeard):
         """How many stops each device was given, by all programs."""
         self.leases = WriteLeases(self.me.id, self.stops, lambda: self.voice)
         """Which program may write to which device."""
+        self.keep_alives = KeepAlives(self.me.id, lambda: self.voice)
+        """Which devices are kept from their communication timeout."""
         self.notes = Notes(lambda: self.voice)
         """Notes for the next program on the line."""
         self.unkept = ""
@@ -217,6 +220,7 @@ class SharedFacts(FactsHeard):
             self.hushed = MappingProxyType(left)
             rest = tuple(one for one in self.programs if one.id != program.id)
         self.leases.end(program.id)
+        self.keep_alives.end(program.id)
         self.set_programs(rest)
         for listener in tuple(self._on_gone):
             heard(listener, program)

@@ -85,7 +85,7 @@ class Fleet:
         self.starts = starts
         """Where starts of motors are put on record; None where none are."""
         self.line_watch = LineWatch(line)
-        self._strangers = StrangersAsked(line, clock)
+        self._strangers = StrangersAsked(line)
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.event_notes = EventNotes(line.facts, self.events)

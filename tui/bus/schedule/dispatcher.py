@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -13,6 +14,7 @@ from ..requests import Diagnose
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
+from .alive_reads import AliveReads
 from .back_to_back import BackToBack
 from .echo import resolve_echo
 from .last_way import LastWay
@@ -48,6 +50,7 @@ class Dispatcher:
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
         self.proof = StepProof(devices, self._outcomes, clock, self.submit)
         """Decides which replies are trusted after another process has used the line."""
+        self._alive_reads = AliveReads(devices, self.facts, clock, self.submit)
         self.in_flight = False
         """Whether a request was sent whose end is not known yet."""
         self.held_back: Callable[[], bool] = bool
@@ -115,7 +118,7 @@ class Dispatcher:
             self._wake.clear()
             if self.last_way is not None and self.last_way.waits:
                 await self.last_way.send_waiting()
-            pause: float | None = None
+            due = self._alive_reads.put_due()
             if master.failure is not None:
                 raise LineLost(str(master.failure))
             if len(self._queue):
@@ -127,12 +130,12 @@ class Dispatcher:
                 if job is not None:
                     await self._run(master, job)
                     continue
-                pause = None if ready is None else max(0.0, ready - now)
-            await self._sleep(pause)
+                due = due if ready is None else min(due, ready)
+            await self._sleep(max(0.0, due - self._clock()))
 
-    async def _sleep(self, pause: float | None) -> None:
+    async def _sleep(self, pause: float) -> None:
         with suppress(TimeoutError):
-            async with asyncio.timeout(pause):
+            async with asyncio.timeout(None if pause == math.inf else pause):
                 await self._wake.wait()
 
     def _not_before(self, job: Job) -> float:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TypeVar
 
 from ..errors import LineClosed, LineError, LineLost, NotShared, PortBusy, PortMissing, PortRefused
@@ -78,6 +79,7 @@ class Engine:
             gateway=isinstance(link, TcpLink),
             facts=self.facts,
         )
+        self.facts.keep_alives.changed = self._wake
         around = LineContext(timing, self.trace, self.tally, clock, self._dispatcher.stray)
         inside = LineInside(
             link,
@@ -156,6 +158,12 @@ class Engine:
     def _stop(self) -> None:
         if self._main is not None:
             self._main.cancel()
+
+    def _wake(self) -> None:
+        """Something has changed that the loop may wait for; for any thread."""
+        if self._loop is not None:
+            with suppress(RuntimeError):  # it has ended
+                self._loop.call_soon_threadsafe(self._dispatcher.wake)
 
     def submit(self, job: Job) -> None:
         """Hand a job to the loop. Raises LineClosed."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from ..keep_alive import KeepAlive
 from ..leases import WriteLease
 from ..program import Program
 from ..shared_facts import SharedFacts, commanded_by
@@ -48,6 +49,10 @@ class Commanding:
                 self._tell_facts()
             case Armed():
                 self._armed(program, message)
+            case KeepAlive() if program.id != facts.me.id:
+                facts.keep_alives.hear(program.id, message)
+            case KeepAlive():
+                pass  # known already
             case _:
                 return False
         return True

@@ -31,6 +31,7 @@ from ..bounds import (
     Text,
     Word,
 )
+from ..keep_alive import KeepAlive
 from ..limits import Limits
 from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
 from ..notes import LineNote
@@ -253,7 +254,7 @@ class Goodbye(Message, frozen=True):
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
     | Alive | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
-    | Facts | News | Goodbye | Armed | LineNote
+    | Facts | News | Goodbye | Armed | LineNote | KeepAlive
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..bounds import MOST_NOTICE, MOST_TEXT
+from ..keep_alive import KeepAlive
 from ..leases import WriteLease
 from ..notes import LineNote
 from ..shared_facts import SharedFacts
@@ -66,6 +67,10 @@ class ProgramVoice:
         """This program may write to a device until a time, or no more if that is over."""
         self._send(Armed(device, lease.stamp, lease.until, lease.care))
 
+    def kept_alive(self, one: KeepAlive) -> None:
+        """This program has a device kept alive, or no more."""
+        self._send(one)
+
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""
         self._send(Told(device, text[:MOST_TEXT]))
@@ -76,13 +81,15 @@ class ProgramVoice:
 
 
 def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
-    """Send the holder of a line what this program has armed, commands or leaves alone.
+    """Send the holder of a line what this program has armed, commands, keeps or leaves alone.
 
     Of drives that it has armed before, how to stop them.
     """
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
         send(Armed(device, lease.stamp, lease.until, lease.care))
+    for one in facts.keep_alives.of(me):
+        send(one)
     for device, holder in facts.commanders.items():
         if holder == me:
             send(Claim(device, True))

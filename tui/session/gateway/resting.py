@@ -1,6 +1,7 @@
 """Keeps drives from tripping on their communication timeout after a client has stopped them.
 
-A controller stops its motor and leaves. Without another request the drive trips.
+A controller stops its motor and leaves. Without another request the drive trips. The holder of
+the line reads it as long as the motor was seen at rest within the time of that timeout.
 """
 
 from __future__ import annotations
@@ -10,23 +11,27 @@ import logging
 
 from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import LineClosed, LineError
+from tui.bus.keep_alive import READS_PER_TIMEOUT
 from tui.drive.chart import read_chart
 from tui.drive.orders import chart_codes
 from tui.drive.settings.writable import AT_REST
 
 from ..drive import DriveSession
-from ..monitor.line_watch import ASKED_PER_TIMEOUT, LEARN_AGAIN, UNKNOWN_TIMEOUT
+from ..monitor.line_watch import LEARN_AGAIN
 from ..monitor.timeout import read_timeout
+from ..read.presence import UNKNOWN_TIMEOUT, alive_read
 from ..read.reader import Reader
 
 log = logging.getLogger(__name__)
 
 JUST_SEEN = 2.0
 """Seconds up to which a state counts as seen just now."""
+LOOKS_PER_TIMEOUT = 2.0
+"""Looks at a motor at rest in each timeout of its drive."""
 
 
 class RestingDrives:
-    """Reads the stopped drives of one line while no program does; lives in the gateway's loop.
+    """Keeps the stopped drives of one line alive; lives in the gateway's loop.
 
     Only while the motor is at rest: otherwise reads would keep it running for a dead controller.
     """
@@ -48,6 +53,7 @@ class RestingDrives:
         """Leave a drive to its controller, which starts the motor."""
         if (task := self._tasks.pop(device, None)) is not None:
             task.cancel()
+        self._line.facts.keep_alives.let_go(device)
 
     def close(self) -> None:
         """Leave all drives alone."""
@@ -65,8 +71,8 @@ class RestingDrives:
             # is to act by itself
             if timeout is None or not (rests or clock.monotonic() - begun < timeout):
                 return
-            rest = timeout / ASKED_PER_TIMEOUT - self._silence(session)
-            if rest > 0:
+            rest = timeout / READS_PER_TIMEOUT - self._silence(session)
+            if not rests and rest > 0:
                 await clock.sleep(rest)
                 continue
             try:
@@ -74,11 +80,22 @@ class RestingDrives:
                 if learned is None or clock.monotonic() - learned > LEARN_AGAIN:
                     session.timeout = await read_timeout(reader, Priority.POLL)
                     learned = clock.monotonic()
+                self._keep_alive(session, rests=rests)
+                if rests:
+                    await clock.sleep(timeout / LOOKS_PER_TIMEOUT)
             except LineClosed:
                 return
             except LineError as error:
                 log.info("device %s is not kept alive: %s", session.device, error)
-                await clock.sleep(timeout / ASKED_PER_TIMEOUT)
+                await clock.sleep(timeout / READS_PER_TIMEOUT)
+
+    def _keep_alive(self, session: DriveSession, *, rests: bool) -> None:
+        alive, timeout = self._line.facts.keep_alives, _timeout(session)
+        read = alive_read(session, timeout) if rests and timeout is not None else None
+        if read is None:
+            alive.let_go(session.device)
+        else:
+            alive.keep(read, timeout)
 
     async def _is_at_rest(self, reader: Reader) -> bool:
         profile, image = reader.profile, reader.session.image

@@ -1,18 +1,20 @@
 """Looking after every drive found on a line, watched or not.
 
-Some drives watch the line and trip when it falls silent (communication time-out): they are
-asked on as long as the line is open, at least three times in each time-out, before polls and
-before an operator's own requests. Other requests tell the state of the drives in a list.
+Some drives watch the line and trip when it falls silent (communication time-out). The holder of
+the line reads them as long as this program is on it, at least three times in each time-out, before
+polls and before an operator's own requests. Other requests tell the state of the drives in a list.
 """
 
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
 
 from tui.bus.api import Contact, LineWorker, ModbusLine, Priority, contact_of
 from tui.bus.errors import LineError
+from tui.bus.keep_alive import READS_PER_TIMEOUT
 from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, watched_codes
 from tui.drive.orders import deciding_codes
@@ -21,7 +23,7 @@ from tui.drive.profile.schema import Quantity
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
-from ..read.presence import presence_read
+from ..read.presence import UNKNOWN_TIMEOUT, alive_read
 from ..read.reader import Reader
 from ..timeout_told import TimeoutWatch
 from .alarms import FaultOnsets
@@ -43,9 +45,6 @@ GLANCE = 3.0
 """Seconds between two looks at a drive that no monitor watches."""
 GLANCE_EACH = 0.15
 """Seconds of that for each drive of the line."""
-ASKED_PER_TIMEOUT = 4.0
-UNKNOWN_TIMEOUT = 2.0
-"""Seconds that a time-out is taken for which a drive refuses to tell."""
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
 SHORTEST = 0.02
@@ -58,8 +57,6 @@ class _Kept:
     reader: Reader
     since: float
     watch: TimeoutWatch | None = None
-    unknown: bool = False
-    """Whether the drive refuses to tell its time-out."""
     learned: float | None = None
     workers: tuple[LineWorker, ...] = ()
 
@@ -70,6 +67,8 @@ class LineWatch:
     def __init__(self, line: ModbusLine) -> None:
         self._line = line
         self._kept: dict[int, _Kept] = {}
+        self._changing = threading.RLock()
+        """Held while a drive comes or goes, and while it is kept alive."""
         self._looks: dict[int, Look] = {}
         self.onsets = FaultOnsets()
 
@@ -177,25 +176,37 @@ class LineWatch:
         """Look after a drive from now on; its monitor, while it runs, spares the looks."""
         device = session.device
         kept = _Kept(session, monitor, Reader(session), session.clock.monotonic())
-        if device in self._kept:
-            self._let_go(self._kept[device])
-        self._kept = {**self._kept, device: kept}
+        with self._changing:
+            if device in self._kept:
+                self._let_go(self._kept[device])
+            self._kept = {**self._kept, device: kept}
+            # until it is learnt, too: words that the drive does not have may take seconds
+            self._keep_alive(kept, UNKNOWN_TIMEOUT)
         kept.workers = (
             self._line.spawn(lambda: self._again(kept, self._learn), f"learner {device}"),
-            self._line.spawn(lambda: self._again(kept, self._feed), f"feeder {device}"),
             self._line.spawn(lambda: self._again(kept, self._glance), f"line_watch {device}"),
         )
 
     def stop(self) -> None:
         """Let every drive go."""
-        for kept in self._kept.values():
-            self._let_go(kept)
-        self._kept = {}
+        with self._changing:
+            for kept in self._kept.values():
+                self._let_go(kept)
+            self._kept = {}
         self._looks = {}
 
     def _let_go(self, kept: _Kept) -> None:
         for worker in kept.workers:
             worker.cancel()
+        self._line.facts.keep_alives.let_go(kept.session.device)
+
+    def _keep_alive(self, kept: _Kept, timeout: float | None) -> None:
+        """Have a drive kept from its timeout; None if it has none."""
+        read = alive_read(kept.session, timeout) if timeout is not None else None
+        if read is None:
+            self._line.facts.keep_alives.let_go(kept.session.device)
+        else:
+            self._line.facts.keep_alives.keep(read)
 
     async def _again(self, kept: _Kept, step: Callable[[_Kept], Awaitable[float]]) -> None:
         """Do a step for good; it says how many seconds later it is due again."""
@@ -212,30 +223,8 @@ class LineWatch:
 
     @staticmethod
     def _after_failure(kept: _Kept) -> float:
-        timeout = kept.watch.timeout if kept.watch else 4 * ASKED_PER_TIMEOUT
-        return min(1.0, timeout / ASKED_PER_TIMEOUT / 2)
-
-    async def _feed(self, kept: _Kept) -> float:
-        """Ask a drive that watches the line, if nobody else does often enough."""
-        if kept.learned is not None and kept.watch is None and not kept.unknown:
-            return UNKNOWN_TIMEOUT / ASKED_PER_TIMEOUT
-        # until it is learnt, too: words that the drive does not have may take seconds of silence
-        timeout = kept.watch.timeout if kept.watch else UNKNOWN_TIMEOUT
-        period = timeout / ASKED_PER_TIMEOUT
-        silent = kept.session.clock.monotonic() - self._heard(kept)
-        if silent < period:
-            return period - silent
-        # past its time-out it has acted: it need no longer go before the others
-        priority = Priority.FEED if silent < timeout else Priority.POLL
-        if (ask := presence_read(kept.session.profile)) is not None:
-            await self._line.read(
-                kept.session.device,
-                ask.address,
-                ask.count,
-                priority=priority,
-                function=ask.function,
-            )
-        return period
+        timeout = kept.watch.timeout if kept.watch else 4 * READS_PER_TIMEOUT
+        return min(1.0, timeout / READS_PER_TIMEOUT / 2)
 
     async def _glance(self, kept: _Kept) -> float:
         """Look at a drive's state, unless its monitor does."""
@@ -276,8 +265,11 @@ class LineWatch:
         """Read the drive's time-out and its reaction."""
         found = await read_timeout(kept.reader, Priority.POLL, deciding_codes(kept.session.profile))
         kept.session.timeout = found
-        kept.watch, kept.unknown = found.watch, not found.known
-        kept.learned = kept.session.clock.monotonic()
+        kept.watch, kept.learned = found.watch, kept.session.clock.monotonic()
+        unknown = None if found.known else UNKNOWN_TIMEOUT
+        with self._changing:
+            if self._kept.get(kept.session.device) is kept:
+                self._keep_alive(kept, found.watch.timeout if found.watch else unknown)
         return LEARN_AGAIN
 
 

@@ -1,17 +1,23 @@
-"""The read that each drive of a family answers: it tells that the drive is there, and feeds it."""
+"""The read that each drive of a family answers: it shows that the drive is there, and keeps it
+from its communication timeout."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
+from tui.bus.keep_alive import KeepAlive
 from tui.drive.chart import watched_codes
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import word_count
 
 from ..drive import DriveSession
+
+UNKNOWN_TIMEOUT = 2.0
+"""Seconds that a communication timeout is taken for which a drive refuses to tell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +26,7 @@ class PresenceRead:
 
     address: int
     count: int
-    function: int
+    function: Literal[3, 4]
 
 
 def presence_read(profile: Profile) -> PresenceRead | None:
@@ -35,6 +41,14 @@ def presence_read(profile: Profile) -> PresenceRead | None:
     code = next(iter(watched_codes(profile)), profile.data.faults.parameter)
     word = profile[code] if code else profile.quantity("status_word")
     return None if word is None else PresenceRead(word.address, 1, word.function)
+
+
+def alive_read(session: DriveSession, timeout: float) -> KeepAlive | None:
+    """The read that keeps a drive from a timeout of so many seconds; None if none is known."""
+    ask = presence_read(session.profile)
+    if ask is None:
+        return None
+    return KeepAlive(session.device, timeout, ask.address, ask.count, ask.function)
 
 
 async def look_for_drive(session: DriveSession, met: NoAnswer) -> None:

@@ -1,0 +1,77 @@
+"""The reads that keep devices from their communication timeout, by the holder of the line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ..keep_alive import READS_PER_TIMEOUT, KeepAlive
+from ..master import MonotonicClock
+from ..model import Priority
+from ..shared_facts import SharedFacts
+from .patience import Devices
+from .queue import Job
+
+LONGEST_RETRY = 1.0
+"""Seconds after which a read that failed is repeated, at most."""
+
+
+class AliveReads:
+    """Queues a read for each device that is kept alive and was not heard for a while.
+
+    Lives in the line's loop, and is used only while this program holds the line.
+    """
+
+    def __init__(
+        self,
+        devices: Devices,
+        facts: SharedFacts,
+        clock: MonotonicClock,
+        submit: Callable[[Job], None],
+    ) -> None:
+        self._devices = devices
+        self._facts = facts
+        self._clock = clock
+        self._submit = submit
+        self._jobs: dict[int, Job] = {}
+        """The last read of each device."""
+        self._since: dict[int, float] = {}
+        """When each device was first kept alive."""
+        self._due = 0.0
+        self._seen: object = None
+
+    def put_due(self) -> float:
+        """Queue the reads that are due now; returns when to look again, by the line's clock."""
+        now, kept = self._clock(), self._facts.keep_alives.kept
+        if kept is not self._seen or now >= self._due:
+            self._seen = kept
+            shortest: dict[int, tuple[str, KeepAlive]] = {}
+            for (program, device), one in kept.items():
+                best = shortest.get(device)
+                lasts = one.until is None or now < one.until
+                if lasts and (best is None or one.timeout < best[1].timeout):
+                    shortest[device] = program, one
+            self._since = {device: self._since.get(device, now) for device in shortest}
+            self._jobs = {device: job for device, job in self._jobs.items() if device in shortest}
+            due = [self._look(program, one, now) for program, one in shortest.values()]
+            self._due = min(due, default=math.inf)
+        return self._due
+
+    def _look(self, program: str, one: KeepAlive, now: float) -> float:
+        """Queue the read of a device if it is due; returns when to look again."""
+        period = one.timeout / READS_PER_TIMEOUT
+        retry = min(LONGEST_RETRY, period / 2)
+        heard = max(self._devices[one.device].heard or 0.0, self._since[one.device])
+        due, last = heard + period, self._jobs.get(one.device)
+        if last is not None and last.asked > heard:
+            # it waits for the line, or was not answered
+            due = max(due, last.asked + retry) if last.answer.done() else now + retry
+        if due > now:
+            return due
+        # beyond its timeout it has acted: it need no longer go before the others
+        priority = Priority.FEED if now - heard < one.timeout else Priority.POLL
+        job = Job(one.request, priority, self._devices[one.device].limits)
+        job.program, job.asked = program, now
+        self._jobs[one.device] = job
+        self._submit(job)
+        return now + retry
