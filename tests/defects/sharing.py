@@ -8,6 +8,7 @@ STOPS = "tests/bus/test_share_stops.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
 LEASES = "tests/bus/test_leases.py"
+HEARTBEAT = "tests/bus/test_heartbeat.py"
 CARE = "tests/session/test_care.py"
 STEP = "tests/bus/test_step_proof.py"
 BOUNDS = "tests/bus/test_share_bounds.py"
@@ -41,6 +42,22 @@ DEFECTS = (
         "if False:",
         "A program that hangs for an hour starts a motor when it goes on.",
         (LEASES,),
+    ),
+    Defect(
+        "heartbeat-beside-a-hung-loop",
+        "tui/bus/share/heartbeat.py",
+        "if time.monotonic() - self._turned < LOOP_HANGS:",
+        "if True:",
+        "The motor of a program that hangs for good runs on.",
+        (HEARTBEAT,),
+    ),
+    Defect(
+        "heartbeat-by-another-process",
+        "tui/bus/share/greeting.py",
+        'if peer_of(client.writer.get_extra_info("socket")) != peer:',
+        "if False:",
+        "A frozen program counts as alive, and its motor runs on.",
+        (HEARTBEAT,),
     ),
     Defect(
         "care-lost-with-the-keeper",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 import time
 from contextlib import closing
 
 import pytest
 
-from tests.programs import served, wait_until
+from tests.programs import DRIVEPANEL, served, wait_until
 from tui.session.api import open_drives
 from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
@@ -61,6 +63,33 @@ def test_motor_of_a_frozen_program_is_kept_alive_until_it_is_stopped() -> None:
         # nobody reads it from then on
         wait_until(lambda: tripped(simulation), "the drive trips")
         runner.process.kill()
+
+
+HANGS = """
+import gc, sys, threading, time
+from tui.bus.schedule.engine import Engine
+from tui.cli.main import main
+
+def hang():
+    sys.stdin.readline()
+    for engine in [one for one in gc.get_objects() if isinstance(one, Engine)]:
+        engine._loop.call_soon_threadsafe(time.sleep, 600)
+
+threading.Thread(target=hang, daemon=True).start()
+main()
+"""
+"""A command the loop of whose line hangs once it reads a line."""
+
+
+def test_motor_of_a_program_whose_loop_hangs_is_stopped() -> None:
+    with bench(STRICT) as (simulation, line):
+        command = [sys.executable, "-c", HANGS, *runs_a_motor(line)[len(DRIVEPANEL) :]]
+        with served(command, ready="running forward", stdin=subprocess.PIPE) as runner:
+            wait_until(lambda: turns(simulation), "the motor turns")
+            assert runner.process.stdin is not None
+            print(file=runner.process.stdin, flush=True)
+            wait_until(lambda: stopped_by_commands(simulation), "it stops on its ramp", 15.0)
+            assert runner.process.poll() is None
 
 
 @pytest.mark.usefixtures("with_keepers")

@@ -16,6 +16,7 @@ from ..model import LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
+from .heartbeat import Heartbeat
 from .messages import (
     VERSION,
     Alive,
@@ -45,8 +46,6 @@ from .voices import ProgramVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)
 
-LOOKS_A_SIGN = 4
-"""Looks at the owner for each own sign of life."""
 LEAVE_WITHIN = 1.0
 """Seconds that a program which leaves waits for the port to be closed."""
 STOP_UNHEARD = ("a stop while nobody owned the line", "a stop while this program stood still")
@@ -73,6 +72,7 @@ class ShareClient:
         self.again = False  # attached to the line before
         self.taken_in = False  # attached to this owner
         self._watching = OwnerWatch(inside.clock, owner)
+        self._heartbeat: Heartbeat | None = None
 
     @property
     def frozen(self) -> bool:
@@ -101,6 +101,8 @@ class ShareClient:
             # what is said from here on would not be heard: a stop takes another way
             self.writer = None
             self._watching.close()
+            if self._heartbeat is not None:
+                self._heartbeat.close()
             if closing and self.taken_in and not self.frozen:
                 await self._leave(reader, writer)
             with suppress(OSError, RuntimeError):
@@ -151,6 +153,7 @@ class ShareClient:
         if not message.asked:
             self._news.note = f" It is open as {message.label}."
         self._gone, self.taken_in = message.gone, True
+        self._heartbeat = Heartbeat(self._owner.socket, self._inside.facts.me.id)
         self._claim()
 
     def _claim(self) -> None:
@@ -188,12 +191,12 @@ class ShareClient:
     async def _watch(self) -> None:
         """Notice an owner that does not answer any more, and one that does again."""
         notes = iter(self._inside.facts.notes.all)
-        for turn in itertools.count():
+        while True:
             await asyncio.sleep(WATCH_INTERVAL)
+            if self._heartbeat is not None:
+                self._heartbeat.turn()
             for note in itertools.islice(notes, NOTES_A_LOOK * self.taken_in):
                 self._tell(note)
-            if turn % LOOKS_A_SIGN == 0:
-                self._tell(Alive())
             wish = self._inside.pace.own, self._inside.around.trace.looked_at
             if wish != self._wish:
                 self._wish = wish

@@ -7,19 +7,23 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Protocol
 
 from ..bounds import MOST_PROGRAMS
 from ..link import label
 from ..schedule.inside import LineInside
+from .attached import Client
 from .line_clients import LOOK_HEAD, look_answer
 from .messages import (
     LENGTH,
     VERSION,
+    Alive,
+    AnyMessage,
     Goodbye,
     Hello,
     NoMessage,
+    Pulse,
     StopGiven,
     TurnedAway,
     next_message,
@@ -62,11 +66,14 @@ class Greeting:
         self._holder = holder
 
     async def heard(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, present: Collection[str]
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        present: Mapping[str, Client],
     ) -> Hello | None:
         """The greeting of a program that is taken in; None for one that is not, and knows why.
 
-        `present` are the ids of the programs that are attached. Raises NoMessage, EOFError,
+        `present` are the programs that are attached, by id. Raises NoMessage, EOFError,
         OSError, TimeoutError.
         """
         async with asyncio.timeout(HELLO_WITHIN):
@@ -79,6 +86,9 @@ class Greeting:
                 writer.write(look_answer(self._inside.facts.programs, shares))
                 return None
             message = await next_message(reader, head)
+        if isinstance(message, Pulse):
+            await self._hear_pulse(reader, writer, present, message.program)
+            return None
         leaves = isinstance(message, Goodbye)
         needs_way = leaves or (isinstance(message, Hello) and not self._suits(message))
         if needs_way and (await self._holder.makes_way() or leaves):
@@ -89,6 +99,22 @@ class Greeting:
             writer.write(packed(TurnedAway(why)))
             return None
         return message
+
+    async def _hear_pulse(
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        present: Mapping[str, Client],
+        program: str,
+    ) -> None:
+        """Hear the heartbeat of a program while it is attached; of the process itself alone."""
+        peer = peer_of(writer.get_extra_info("socket"))
+        message: AnyMessage = Alive()
+        while isinstance(message, Alive) and (client := present.get(program)) is not None:
+            if peer_of(client.writer.get_extra_info("socket")) != peer:
+                return
+            client.hears(message, self._inside.clock())
+            message = await next_message(reader)
 
     async def _hear_stop(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if self._is_stranger(writer):

@@ -150,6 +150,12 @@ class Alive(Message, frozen=True):
     """A program's sign of life: one that gives none for long is let go. Answers each stop, too."""
 
 
+class Pulse(Message, frozen=True):
+    """In place of a Hello: this connection brings the heartbeat of a program that is attached."""
+
+    program: ProgramId
+
+
 class Claim(Message, frozen=True):
     """A program wants to command a device, or no longer."""
 
@@ -253,7 +259,7 @@ class Goodbye(Message, frozen=True):
 
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
-    | Alive | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
+    | Alive | Pulse | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
     | Facts | News | Goodbye | Armed | LineNote | KeepAlive
 )  # fmt: skip
 
