@@ -90,7 +90,7 @@ def _state(line: Line, monitors: Mapping[int, Monitor]) -> dict[str, object]:
         "counters": {
             name: count
             for name, count in asdict(line.counters).items()
-            if name not in ("devices", "programs")  # the line's own alone
+            if name not in ("devices", "programs", "minute")  # the line's own alone
         },
     }
 

@@ -11,6 +11,7 @@ import pytest
 from tui.bus.api import TURNAROUND_EDGES, DeviceCounters, Priority
 from tui.bus.errors import ExchangeError
 from tui.bus.link import TcpLink
+from tui.bus.model import LastMinute
 from tui.bus.tally import DeviceTally
 from tui.wire.frames import frame
 
@@ -45,8 +46,9 @@ async def test_each_device_has_its_own_counts(open_line: OpenLine) -> None:
         assert one.bytes_in == 3 * REPLY_SIZE + REFUSAL_SIZE
         assert sum(one.turnarounds) == one.replies
         assert replace(other, busy_seconds=0.0, turnarounds=()) == DeviceCounters(
-            2, 2, bytes_out=2 * READ_SIZE, bytes_in=2 * REPLY_SIZE, turnarounds=()
-        )
+            2, 2, bytes_out=2 * READ_SIZE, bytes_in=2 * REPLY_SIZE, turnarounds=(),
+            minute=LastMinute(good=2),
+        )  # fmt: skip
         assert line.counters.repeats == 2
         assert one.busy_seconds + other.busy_seconds == pytest.approx(line.counters.busy_seconds)
         assert one.busy_seconds > 2 * BRISK.first_timeout
@@ -87,12 +89,12 @@ async def test_a_program_that_is_attached_has_the_owners_counts(share: Share) ->
 def test_a_turnaround_falls_into_one_bar(seconds: float, bar: int) -> None:
     tally = DeviceTally()
     tally.count_reply(seconds)
-    assert [at for at, count in enumerate(tally.frozen().turnarounds) if count] == [bar]
+    assert [at for at, count in enumerate(tally.frozen(0.0).turnarounds) if count] == [bar]
 
 
 def test_what_was_given_out_does_not_change_any_more() -> None:
     tally = DeviceTally()
-    before = tally.frozen()
+    before = tally.frozen(0.0)
     tally.count_exception(2)
     tally.count_reply(0.1)
     assert before == DeviceCounters()

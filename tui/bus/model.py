@@ -135,6 +135,43 @@ ExceptionCounts = Annotated[Mapping[ByteValue, Number], Meta(max_length=256)]
 
 
 @dataclass(frozen=True, slots=True)
+class LastMinute:
+    """Replies of the last minute; those that a search for drives awaits do not count.
+
+    A missed reply is `lost` once the drive answers again, after one or two misses or within 5 s.
+    Until then, and while the drive stays silent, it is `silent`: a trouble of the drive alone.
+    """
+
+    good: Number = 0
+    """Right replies, refusals among them."""
+    lost: Number = 0
+    silent: Number = 0
+    """Missed by a drive that has not answered since; of a device only, not of a line."""
+    damaged: Number = 0
+    """Replies that came damaged, or as that to another request."""
+    foreign: Number = 0
+    """Frames of another master or an unknown device; of a line only."""
+    strays: Number = 0
+    """Other whole frames that answer no request: second copies, but no late replies."""
+
+    @property
+    def replies(self) -> int:
+        """Replies by which the line is judged."""
+        return self.good + self.lost + self.damaged
+
+    @property
+    def share(self) -> float | None:
+        """The share of good replies by which the line is judged; None without any."""
+        return self.good / self.replies if self.replies else None
+
+    @property
+    def whole_share(self) -> float | None:
+        """The share of good replies, those of a silent drive counted as missed."""
+        awaited = self.replies + self.silent
+        return self.good / awaited if awaited else None
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceCounters:
     """What was exchanged with one device since the line was opened; device 0 is all of them."""
 
@@ -156,6 +193,7 @@ class DeviceCounters:
     busy_seconds: Seconds = 0.0
     turnarounds: TurnaroundBars = (0,) * _BARS
     """Replies by their turnaround: up to each edge, and beyond the last."""
+    minute: LastMinute = LastMinute()
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +228,7 @@ class LineCounters:
     devices: Annotated[Mapping[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = field(
         default_factory=dict
     )
+    minute: LastMinute = LastMinute()
 
 
 @dataclass(frozen=True, slots=True)

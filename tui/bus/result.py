@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Literal
+
+StrayKind = Literal["late", "copy", ""]
+"""A frame beside the awaited reply: a late reply, a second copy of one, or not known."""
 
 
 @dataclass(frozen=True, slots=True)

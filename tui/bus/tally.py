@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from .model import TURNAROUND_EDGES, DeviceCounters, LineCounters, Priority
+from .minute import MinuteWindow
+from .model import TURNAROUND_EDGES, DeviceCounters, LineCounters
 from .program_use import ProgramUse
 
-_OF_SEVERAL = ("devices", "programs")
+_OF_SEVERAL = ("devices", "programs", "minute")
 _PLAIN = tuple(name for name in LineCounters.__slots__ if name not in _OF_SEVERAL)
+_PLAIN_OF_DEVICE = tuple(name for name in DeviceCounters.__slots__ if name != "minute")
 
 
 @dataclass(slots=True)
@@ -28,6 +31,7 @@ class DeviceTally:
     bytes_in: int = 0
     busy_seconds: float = 0.0
     turnarounds: tuple[int, ...] = (0,) * (len(TURNAROUND_EDGES) + 1)
+    minute: MinuteWindow = field(default_factory=MinuteWindow)
 
     def count_reply(self, turnaround: float) -> None:
         """A right reply came, so many seconds after its request."""
@@ -40,9 +44,10 @@ class DeviceTally:
         """That reply was a refusal. The mapping is replaced: others may be reading it."""
         self.exceptions = {**self.exceptions, code: self.exceptions.get(code, 0) + 1}
 
-    def frozen(self) -> DeviceCounters:
+    def frozen(self, now: float) -> DeviceCounters:
         """The counts of this moment."""
-        return DeviceCounters(**{n: getattr(self, n) for n in DeviceCounters.__slots__})
+        plain = {n: getattr(self, n) for n in _PLAIN_OF_DEVICE}
+        return DeviceCounters(**plain, minute=self.minute.total(now))
 
 
 @dataclass(slots=True)
@@ -70,6 +75,8 @@ class Tally:
     use: ProgramUse = field(default_factory=ProgramUse)
     shares: dict[str, float] = field(default_factory=dict)
     """The share of each program, from the program that owns the line."""
+    clock: Callable[[], float] = time.monotonic
+    minute: MinuteWindow = field(default_factory=MinuteWindow)
 
     def of(self, device: int) -> DeviceTally:
         """The counts of a device; in the line's thread only."""
@@ -115,28 +122,46 @@ class Tally:
         self.repeats += 1
         self.of(device).repeats += 1
 
-    def count_silence(self, device: int, priority: Priority, *, known: bool) -> None:
+    def count_silence(self, device: int, *, searched: bool) -> None:
         """No answer came; an empty address that a search has asked is no failure of the line."""
-        if priority >= Priority.BACKGROUND and not known:
+        if searched:
             self.searched += 1
         else:
             self.timeouts += 1
+            self.of(device).minute.count("silent", self.clock())
         self.of(device).timeouts += 1
+
+    def count_minute(self, device: int | None, kind: str) -> None:
+        """Count a reply of the last minute by its field of LastMinute; of a device, or of none."""
+        now = self.clock()
+        self.minute.count(kind, now)
+        if device is not None:
+            self.of(device).minute.count(kind, now)
+
+    def count_lost(self, device: int, number: int) -> None:
+        """It answers again, after so few misses that they are a trouble of the line."""
+        if not number:
+            return
+        now, own = self.clock(), self.of(device).minute
+        self.minute.count("lost", now, number)
+        own.count("lost", now, number)
+        own.count("silent", now, -number)
 
     def copy(self, counters: LineCounters, devices: Mapping[int, DeviceCounters]) -> None:
         """Take over the counts of the program that owns the line, of devices those that changed."""
         for name in _PLAIN:
             setattr(self, name, getattr(counters, name))
         self.shares = dict(counters.programs)
+        self.minute = MinuteWindow(counters.minute)
         for device, one in devices.items():
-            self.devices[device] = DeviceTally(
-                **{n: getattr(one, n) for n in DeviceCounters.__slots__}
-            )
+            plain = {n: getattr(one, n) for n in _PLAIN_OF_DEVICE}
+            self.devices[device] = DeviceTally(**plain, minute=MinuteWindow(one.minute))
 
     def frozen(self) -> LineCounters:
         """The counts of this moment, of each device too."""
         # copy() runs without giving up the interpreter, so no device comes in between
-        each = self.devices.copy()
-        found = {device: one.frozen() for device, one in each.items()}
+        each, now = self.devices.copy(), self.clock()
+        found = {device: one.frozen(now) for device, one in each.items()}
         plain = {name: getattr(self, name) for name in _PLAIN}
-        return LineCounters(**plain, devices=found, programs=self.use.shares or self.shares)
+        shares, minute = self.use.shares or self.shares, self.minute.total(now)
+        return LineCounters(**plain, devices=found, programs=shares, minute=minute)

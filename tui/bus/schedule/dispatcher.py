@@ -109,7 +109,7 @@ class Dispatcher:
 
     def stray(self, piece: Piece, time: float) -> None:
         """A whole frame came that nobody waited for; it may be what others were held back for."""
-        self._devices.stray(piece, time)
+        self._outcomes.note_stray(piece, time)
         self._wake.set()
 
     async def serve(self, master: Master) -> None:

@@ -55,7 +55,7 @@ class Engine:
         self.facts = facts or SharedFacts()
         self.pace = Pace()
         self.trace = Trace(timing.trace_length)
-        self.tally = Tally(use=ProgramUse(clock))
+        self.tally = Tally(use=ProgramUse(clock), clock=clock)
         self.devices = Devices(timing, mistakable=not isinstance(link, TcpLink))
         self.state = LineState(LineStatus.CLOSED, "", clock())
         self._link = link

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from tui.wire.overheard import overheard_request
+
 from ..errors import (
     UNKNOWN_FATE,
     ChecksumFault,
@@ -28,6 +30,8 @@ GATEWAY_EXCEPTIONS = frozenset({10, 11})
 STILL = 1.0
 """Seconds past the time-out after which an answer cannot have come just now."""
 REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL + 1))
+SHORT_SILENCE = 5.0
+"""Seconds after which several misses in a row are a trouble of the drive, not of the line."""
 POLL_REPEATS = MISSES - 1
 """Repeats of a poll whose reply was lost or damaged: a value is needed in each cycle."""
 
@@ -76,7 +80,7 @@ class Outcomes:
         if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
             result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
-            self._tally.count_reply(request.device, result.turnaround)
+            self._count_good(request.device, result, now)
             exchanged = (job.pdu, result.pdu)
             refused = result.kind is ResultKind.EXCEPTION
             self._devices.answered(
@@ -99,7 +103,16 @@ class Outcomes:
     def count_beside(self, device: int, result: ExchangeResult) -> None:
         """Count the reply to a request that was sent beside the one that was asked for."""
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
-            self._tally.count_reply(device, result.turnaround)
+            self._count_good(device, result, result.end)
+
+    def _count_good(self, device: int, result: ExchangeResult, now: float) -> None:
+        """A right reply; misses before it are those of the line if they were few."""
+        record, tally = self._devices[device], self._tally
+        tally.count_reply(device, result.turnaround)
+        tally.count_minute(device, "good")
+        since = now if record.silent_since is None else record.silent_since
+        if record.ever_answered and (record.failures < MISSES or now - since < SHORT_SILENCE):
+            tally.count_lost(device, record.failures)
 
     def _share(self, job: Job, result: ExchangeResult) -> None:
         """Keep what was read, while somebody else may want it.
@@ -121,6 +134,11 @@ class Outcomes:
         assert expectation is not None
         place = (request.device, request.function, request.register)
         again = b"" if request.changes else job.pdu
+        # who says how long is waited looks whether anybody answers that at all
+        known = job.within is None and self._devices[request.device].ever_answered
+        searched = job.priority >= Priority.BACKGROUND and not known
+        if result.kind in (ResultKind.DAMAGED, ResultKind.WRONG) and not searched:
+            self._tally.count_minute(request.device, "damaged")
         error: LineError
         match result.kind:
             case ResultKind.DAMAGED:
@@ -133,9 +151,7 @@ class Outcomes:
                 self._devices.may_come(request.device, expectation, result.sent, now, again)
                 error = WrongReply(*place, result.detail, result.received)
             case _:
-                # who says how long is waited looks whether anybody answers that at all
-                known = job.within is None and self._devices[request.device].ever_answered
-                self._tally.count_silence(request.device, job.priority, known=known)
+                self._tally.count_silence(request.device, searched=searched)
                 self._devices.silent(request.device, expectation, result.sent, now, again)
                 error = NoAnswer(*place, self._no_answer(job, result.detail))
         if self._is_repeated(job, result.kind):
@@ -166,9 +182,19 @@ class Outcomes:
         unexplained = set()
         for piece in strays:
             self._tally.stale += 1
-            if not self._devices.stray(piece, time):
+            if not self.note_stray(piece, time):
                 unexplained.add(piece.device)
         return unexplained
+
+    def note_stray(self, piece: Piece, time: float) -> bool:
+        """Take note of a frame that answers no present request; True if it is explained."""
+        kind, device = self._devices.stray(piece, time), piece.device
+        answers = device in self._devices.known and self._devices[device].ever_answered
+        if not kind and (not answers or overheard_request(piece.data) is not None):
+            self._tally.count_minute(None, "foreign")
+        elif kind != "late":
+            self._tally.count_minute(device, "strays")
+        return bool(kind)
 
     def _is_gateways(self, job: Job, code: int) -> bool:
         meanings = job.limits.exceptions

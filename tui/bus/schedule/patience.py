@@ -8,7 +8,7 @@ from ..expectation import EXCEPTION, Expectation
 from ..limits import Limits
 from ..model import DeviceState, Priority, Timing
 from ..requests import Read, WriteMany
-from ..result import Piece
+from ..result import Piece, StrayKind
 from .backoff import pause
 from .device_record import Device, Outstanding, note_turnaround, usual
 
@@ -263,11 +263,11 @@ class Devices:
             quiet = QUIET_SHARE * self._timing.first_timeout
             self.quiet_until = now + min(LATE_MARGIN * record.lateness, quiet)
 
-    def stray(self, piece: Piece, now: float) -> bool:
-        """A whole frame came that was not the awaited one; True if it is a known late reply."""
+    def stray(self, piece: Piece, now: float) -> StrayKind:
+        """A whole frame came that was not the awaited one: what it is, as far as is known."""
         record = self._devices.get(piece.device)
         if record is None:
-            return False
+            return ""
         for late in record.outstanding:
             if late.copy and late.expires < now:
                 continue
@@ -276,15 +276,15 @@ class Devices:
                 record.outstanding.remove(late)
                 if late.copy:
                     self._note_copy(record, now - late.sent, now)
-                else:
-                    self._note_late(record, late, now)
-                return True
+                    return "copy"
+                self._note_late(record, late, now)
+                return "late"
         if record.last is not None and record.last.fits(piece.pdu):
             self._note_copy(record, now - record.last_time, now)
             again = Outstanding(record.last, record.last_time, now, now + record.settle, copy=True)
             record.outstanding.append(again)
-            return True
-        return False
+            return "copy"
+        return ""
 
     @staticmethod
     def _note_late(record: Device, late: Outstanding, now: float) -> None:

@@ -198,11 +198,11 @@ def device_since(now: DeviceCounters, before: DeviceCounters) -> DeviceCounters:
     plain = {
         one.name: getattr(now, one.name) - getattr(before, one.name)
         for one in fields(DeviceCounters)
-        if one.name not in ("exceptions", "turnarounds")
+        if one.name not in ("exceptions", "turnarounds", "minute")
     }
     bars = tuple(a - b for a, b in zip(now.turnarounds, before.turnarounds, strict=True))
     refused = _grown(now.exceptions, before.exceptions)
-    return DeviceCounters(**plain, exceptions=refused, turnarounds=bars)
+    return DeviceCounters(**plain, exceptions=refused, turnarounds=bars, minute=now.minute)
 
 
 def _grown(now: Mapping[int, int], before: Mapping[int, int]) -> dict[int, int]:

@@ -1,0 +1,40 @@
+"""Replies of the last minute of a line or of one device, good and not: counts in buckets of 5 s."""
+
+from __future__ import annotations
+
+from .model import LastMinute
+
+BUCKET, BUCKETS = 5.0, 12
+"""Seconds of one bucket, and how many of them are kept: the last 55 to 60 s."""
+_KINDS = LastMinute.__slots__
+_PLACES = {kind: place for place, kind in enumerate(_KINDS)}
+
+
+class MinuteWindow:
+    """Counted in the line's loop, read from any thread: the buckets are replaced as a whole."""
+
+    __slots__ = ("_buckets", "_copied")
+
+    def __init__(self, copied: LastMinute | None = None) -> None:
+        self._buckets: tuple[tuple[int, tuple[int, ...]], ...] = ()
+        self._copied = copied
+        """What the program that owns the line has counted; None where this one counts."""
+
+    def count(self, kind: str, now: float, number: int = 1) -> None:
+        """Count so many of a field of LastMinute; a negative number corrects an earlier count."""
+        newest = int(now // BUCKET)
+        kept = [one for one in self._buckets if newest - BUCKETS < one[0] <= newest]
+        counts = [0] * len(_KINDS)
+        if kept and kept[-1][0] == newest:
+            counts = list(kept.pop()[1])
+        counts[_PLACES[kind]] += number
+        self._buckets, self._copied = (*kept, (newest, tuple(counts))), None
+
+    def total(self, now: float) -> LastMinute:
+        """The counts of the last minute."""
+        if self._copied is not None:
+            return self._copied
+        oldest = int(now // BUCKET) - BUCKETS
+        counted = [counts for bucket, counts in self._buckets if bucket > oldest]
+        # what corrects a count may be kept for longer than the count
+        return LastMinute(*(max(0, sum(one)) for one in zip(*counted, strict=True)))
