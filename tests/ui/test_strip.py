@@ -72,6 +72,48 @@ def test_nothing_moves_when_a_value_changes(
         assert cells_before(other.plain, " A ") == cells_before(plain, " A ")
 
 
+POOR = ("line 91 % good", "line 91 %", "91 %", "")
+FOREIGN = ("foreign frames", "foreign", "")
+
+
+@pytest.mark.parametrize(
+    ("drive", "faults", "shown"),
+    [
+        (RUNS._replace(armed=None), 0, "▲ line 91 % good "),
+        (RUNS._replace(armed=None), 1, "▲ line 91 %  ■ 1 fault  "),
+        (RUNS, 0, "▲ line 91 %  ARMED 56 s "),
+        (RUNS, 1, " ■ 1 fault   ARMED 56 s "),
+        (RUNS._replace(armed=None, by="Terminals"), 0, "▲ 91 % by Terminals "),
+        (None, 0, "▲ line 91 % 14:02:11 "),
+        (None, 1, " ■ 1 fault  ▲ line 91 % 14:02:11 "),
+    ],
+)
+def test_a_trouble_of_the_line_takes_what_faults_and_arming_leave(
+    drive: DriveNow | None, faults: int, shown: str
+) -> None:
+    view = VIEW._replace(drive=drive, faults=faults, trouble=POOR)
+    line = strip_line(view, 80)
+    assert line.plain.endswith(shown)
+    assert line.cell_len == 80
+    assert strip_line(VIEW._replace(drive=None, trouble=POOR), 120).plain.endswith(
+        "▲ line 91 % good  ■ 1 fault  load  40 %  14:02:11 "
+    )
+
+
+@pytest.mark.parametrize("drive", [None, RUNS, RUNS._replace(armed=None)])
+@pytest.mark.parametrize("trouble", [POOR, FOREIGN])
+@pytest.mark.parametrize("width", [60, 72, 80, 120])
+def test_a_trouble_of_the_line_moves_nothing_else(
+    drive: DriveNow | None, trouble: tuple[str, ...], width: int
+) -> None:
+    view = VIEW._replace(drive=drive, line="pump", faults=1 if drive is None else 0)
+    plain = strip_line(view, width).plain
+    marked = strip_line(view._replace(trouble=trouble), width).plain
+    for part in ("14:02:11", "■ 1 fault") if drive is None else ("ARM", "▶", " A "):
+        if part in plain:
+            assert marked.rindex(part) == plain.rindex(part)
+
+
 def test_a_drive_that_is_not_heard_is_told_by_its_age() -> None:
     line = strip_line(VIEW._replace(drive=RUNS._replace(age=12.0)), 80).plain
     assert "? 12s ago" in line

@@ -61,6 +61,7 @@ class FrameSource:
             clock=app.clock.time_of_day(),
             read_only=app.read_only,
             off_record=bool(app.journal_trouble),
+            trouble=fleet.health.troubles[0].signs if fleet and fleet.health.troubles else (),
         )
         marks = _marks(console, fleet)
         news, not_stopped = self._said(console, now), not_stopped_texts(app, now)
@@ -285,6 +286,8 @@ def _marks(console: DriveConsole | None, fleet: Fleet | None) -> dict[str, tuple
     device = console.device if console is not None else None
     if fleet.search is not None and fleet.search.goes_on:
         marks[CONNECTION] = ("…", FAINT)
+    if fleet.health.troubles:
+        marks[CONNECTION] = ("▲", ALARM)
     for fault in fleet.alarms.active:
         marks[FAULTS if fault.device == device else CONNECTION] = ("■", FAULT)
     if console is None:

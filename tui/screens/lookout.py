@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from tui.widgets.strip import FrameView
@@ -13,8 +14,8 @@ from .frame_source import FrameSource
 if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
-FRAME_LOOK = 0.25
-"""Seconds between two looks at what stands around every screen."""
+FRAME_LOOK, HEALTH_LOOK = 0.25, 1.0
+"""Seconds between two looks at what stands around every screen, and at the last minute of lines."""
 
 WHAT_TO_DO = "Open it: Space stops it, T takes it over."
 
@@ -36,6 +37,8 @@ class Lookout(Panel):
         self._journal_trouble = ""
         self._left_behind_seen: set[DriveConsole] = set()
         """Drives of which it was said that no program commands their motor."""
+        self._judged_at = -math.inf
+        """When the health of the lines was last judged, on the panel's clock."""
 
     def look_around(self) -> None:
         """What must be seen on every screen: the frame with stops that failed, and a new fault."""
@@ -46,6 +49,9 @@ class Lookout(Panel):
         if any(new) and self.bell_rings:
             self.bell()
         self._say_left_behind()
+        if (now := self.clock.monotonic()) >= self._judged_at + HEALTH_LOOK:
+            self._judged_at = now
+            self._judge_lines()
         trouble = self.journal_trouble
         if trouble and trouble != self._journal_trouble:
             self.notify(trouble, severity="error")
@@ -72,6 +78,19 @@ class Lookout(Panel):
             return
         self._drawn, self._drawn_at = drawn, now
         self.screen.draw_frame(view)
+
+    def _judge_lines(self) -> None:
+        """Say once of each trouble that the last minute of a line shows, and of its end."""
+        labels = {id(one.fleet): one.opened.label for one in self.panel_lines}
+        for fleet in self.fleets:
+            # not among the events of the line: each program on it sees the same
+            label = "" if fleet is self.fleet else f"{labels[id(fleet)]}: "
+            health, line = fleet.health, fleet.line
+            if line.state.status.value != "connected":
+                health.forget()
+                continue
+            for kind, text in health.look(line.counters):
+                self.events.add(kind, f"{label}{text}")
 
     def _say_left_behind(self) -> None:
         """Say once of a motor that its program has exited and that no program commands it."""

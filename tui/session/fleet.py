@@ -30,6 +30,7 @@ from .event_notes import EventNotes
 from .events import EventLog
 from .journal import FAULT_WHYS, Entry, Journal, entry_time
 from .monitor.alarms import LineAlarms, PresentFault
+from .monitor.line_health import LineHealth
 from .monitor.line_watch import LineWatch
 from .monitor.snapshot import Snapshot
 from .monitor.strangers_asked import StrangersAsked
@@ -86,6 +87,7 @@ class Fleet:
         """Where starts of motors are put on record; None where none are."""
         self.line_watch = LineWatch(line)
         self._strangers = StrangersAsked(line)
+        self.health = LineHealth()
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.event_notes = EventNotes(line.facts, self.events)

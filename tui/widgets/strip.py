@@ -37,8 +37,10 @@ VALUES_WIDTH = 26
 """`123.4 → 123.4 Hz  123.4 A`, each at its place."""
 RIGHT_WIDTH, NARROW_RIGHT = 24, 13
 """Kept for the faults of the line and for ARMED, whether they are there or not."""
-NARROW = 72
-"""Columns below which these are short."""
+NARROW, WIDE = 72, 100
+"""Columns below which these are short, and from which a trouble of the line has its own place."""
+LOAD_WIDTH = 12
+"""Cells of the load of the line; on fewer than `WIDE` columns a trouble of the line is there."""
 NAME_WIDEST = 44
 BETWEEN = " · "
 NAME_LEAST = 12
@@ -90,11 +92,13 @@ class StripView(NamedTuple):
     read_only: bool = False
     off_record: bool = False
     """Whether the journal cannot be written."""
+    trouble: tuple[str, ...] = ()
+    """A few words for a trouble of the line, the longest first; empty while it is healthy."""
 
 
 def strip_line(view: StripView, width: int) -> Text:
     """The first line: the open drive, or the line where none is open."""
-    right = _right(view, narrow=width < NARROW)
+    right = _right(view, width)
     if view.drive is None:
         left = Text(no_wrap=True)
         left.append(" Drive Panel", STRONG)
@@ -162,9 +166,10 @@ def _values(drive: DriveNow) -> Text:
     return text
 
 
-def _right(view: StripView, *, narrow: bool) -> Text:
+def _right(view: StripView, width: int) -> Text:
     """What concerns the whole line, and whether keys move this drive's motor."""
-    text, drive = Text(no_wrap=True), view.drive
+    text, drive, narrow = Text(no_wrap=True), view.drive, width < NARROW
+    room = NARROW_RIGHT if narrow else RIGHT_WIDTH
     off_record = "J!" if narrow and drive is not None else "NO JOURNAL "
     narrow = narrow or view.off_record
     if view.faults:
@@ -181,12 +186,24 @@ def _right(view: StripView, *, narrow: bool) -> Text:
     elif view.read_only:
         text.append("read-only ", FAINT)
     elif drive is not None and drive.by:
-        room = (NARROW_RIGHT if narrow else RIGHT_WIDTH) - text.cell_len - len("by  ")
-        text.append(f"by {short(drive.by, max(4, room))} ", FAINT)
-    if drive is None:
-        load = f"load {view.load * 100:3.0f} %  " if view.load is not None else ""
-        text.append(f"{load}{view.clock} ", FAINT)
-    return text
+        left = (NARROW_RIGHT if narrow else room) - text.cell_len - len("by  ")
+        text.append(f"by {short(drive.by, max(4, left))} ", FAINT)
+    if drive is not None:
+        return _trouble(view.trouble, room - text.cell_len).append_text(text)
+    load = f"load {view.load * 100:3.0f} %  " if view.load is not None else ""
+    if width >= WIDE or not view.trouble:
+        trouble = _trouble(view.trouble, width)
+        return trouble.append_text(text).append(f"{load}{view.clock} ", FAINT)
+    trouble = _trouble(view.trouble, LOAD_WIDTH)
+    text.append_text(trouble).append(" " * (LOAD_WIDTH - trouble.cell_len))
+    return text.append(f"{view.clock} ", FAINT)
+
+
+def _trouble(signs: Sequence[str], room: int) -> Text:
+    """The longest of the words for a trouble that there is room for; its sign alone, or nothing."""
+    forms = (f"▲ {sign} " if sign else "▲ " for sign in signs)
+    form = next((form for form in forms if len(form) <= room), "")
+    return Text(no_wrap=True).append(form, ALARM)
 
 
 class Tab(NamedTuple):
@@ -275,5 +292,5 @@ class FrameView(NamedTuple):
         armed = drive is not None and drive.armed is not None
         # figures in a message count seconds
         text = said and re.sub(r"\d+", "", said.text)
-        faults = strip.faults, strip.unseen
+        faults = strip.faults, strip.unseen, bool(strip.trouble)
         return who, armed, faults, strip.off_record, self.place, self.marks, text, self.not_stopped

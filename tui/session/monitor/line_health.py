@@ -1,0 +1,119 @@
+"""Troubles that the last minute of a line shows: few good replies, foreign frames, strays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+from tui.bus.api import LastMinute, LineCounters
+
+LEAST_REPLIES = 20
+"""Fewer replies in the last minute are too few to judge by."""
+POOR, HEALTHY = 0.98, 0.99
+"""A share of good replies below which there is trouble, and from which it is over."""
+SEVERAL_FRAMES = 3
+"""Foreign frames, or strays, from which there is trouble; it is over when a minute has none."""
+HEALTHY_AGAIN = "The line is healthy again: {} % of the replies were good in the last minute."
+
+TroubleKind = Literal["poor", "foreign", "strays"]
+
+
+class LineTrouble(NamedTuple):
+    """One trouble of a line."""
+
+    kind: TroubleKind
+    signs: tuple[str, ...]
+    """A few words for it: the longest first."""
+    text: str
+    """What it is, what it means, and what to do first."""
+
+
+class LineHealth:
+    """Judges a line by its last minute, again and again; in one thread only."""
+
+    def __init__(self) -> None:
+        self.troubles: tuple[LineTrouble, ...] = ()
+        """The troubles at the last look."""
+        self._poor: frozenset[int | None] = frozenset()
+        """Drives with few good replies, None for the line."""
+
+    def look(self, counted: LineCounters) -> list[tuple[str, str]]:
+        """Judge by these counts; returns new messages, each after the kind of its event."""
+        line, drives = counted.minute, {d: one.minute for d, one in counted.devices.items()}
+        before = {one.kind for one in self.troubles}
+        judged: list[tuple[int | None, LastMinute]] = [(None, line), *drives.items()]
+        poor = (of for of, minute in judged if _is_poor(minute, of in self._poor))
+        self._poor = frozenset(poor)
+        self.troubles = tuple(self._found(line, drives, before))
+        if before and not self.troubles and line.share is not None:
+            return [("told", HEALTHY_AGAIN.format(percent(line.share).strip()))]
+        return [("alarm", one.text) for one in self.troubles if one.kind not in before]
+
+    def forget(self) -> None:
+        """Judge anew: the line is lost."""
+        self.troubles, self._poor = (), frozenset()
+
+    def _found(
+        self, line: LastMinute, drives: dict[int, LastMinute], before: set[TroubleKind]
+    ) -> Iterator[LineTrouble]:
+        if self._poor:
+            yield _few_good(line, drives, line_is_poor=None in self._poor)
+        if line.foreign >= (1 if "foreign" in before else SEVERAL_FRAMES):
+            yield LineTrouble("foreign", ("foreign frames", "foreign", ""), _foreign(line.foreign))
+        if line.strays >= (1 if "strays" in before else SEVERAL_FRAMES):
+            yield LineTrouble("strays", ("stray replies", "strays", ""), _strays(line.strays))
+
+
+def percent(share: float | None) -> str:
+    """A share in whole per cent, in three cells; 100 only where it is."""
+    return " --" if share is None else f"{int(100 * share):>3}"
+
+
+def _is_poor(minute: LastMinute, was_poor: bool) -> bool:
+    share = minute.share
+    if share is None:
+        return False
+    if minute.replies < LEAST_REPLIES:
+        return was_poor and share < HEALTHY
+    return share < (HEALTHY if was_poor else POOR)
+
+
+def _few_good(
+    line: LastMinute, drives: dict[int, LastMinute], *, line_is_poor: bool
+) -> LineTrouble:
+    """The line has few good replies, or the worst of its drives alone."""
+    judged = [one for one in drives if drives[one].replies >= LEAST_REPLIES]
+    worst = min(judged or drives, key=lambda one: drives[one].share or 0.0)
+    choose = f"Choose drive {worst} on Line and press N for the cause."
+    if not line_is_poor:
+        share = percent(drives[worst].share).strip()
+        text = f"{_lost(drives[worst], f' of drive {worst}')} {choose}"
+        return LineTrouble("poor", (f"drive {worst} {share:>2} % good", f"drive {worst}", ""), text)
+    share = percent(line.share).strip()
+    if len(drives) > 1:
+        choose = f"Worst: drive {worst}, {percent(drives[worst].share).strip()} %. {choose}"
+    signs = (f"line {share:>2} % good", f"line {share:>2} %", f"{share:>2} %", "")
+    return LineTrouble("poor", signs, f"{_lost(line)} {choose}")
+
+
+def _lost(minute: LastMinute, whose: str = "") -> str:
+    return (
+        f"Only {percent(minute.share).strip()} % of {minute.replies} replies{whose} were good in"
+        f" the last minute: {minute.lost} lost, {minute.damaged} damaged."
+    )
+
+
+def _foreign(count: int) -> str:
+    frames = "1 frame" if count == 1 else f"{count} frames"
+    return (
+        f"Foreign frames: {frames} in the last minute from no program here. Another master is on"
+        " this line, or an adapter echoes. Press N to find out before you command a motor."
+    )
+
+
+def _strays(count: int) -> str:
+    replies = "1 reply" if count == 1 else f"{count} replies"
+    return (
+        f"Stray replies: {replies} in the last minute to no request. Two drives have one address,"
+        " or an adapter repeats frames. Press N to find out before you command a motor."
+    )
