@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from tui.bus.api import Contact, LineState
+from tui.bus.api import Contact, DeviceCounters, LastMinute, LineState
 from tui.bus.errors import PortBusy
 from tui.bus.program import KEEPER, Program
 from tui.screens.open_lines import LineOpening
@@ -214,6 +214,22 @@ async def shared(app: Any, pilot: Pilot[None]) -> None:
     await pilot.pause()
 
 
+async def poor_line(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(5)
+    minutes = {device: DeviceCounters(minute=LastMinute(good=102)) for device in (1, 3, 4, 5)}
+    minutes[2] = DeviceCounters(minute=LastMinute(good=81, lost=38, damaged=3, strays=2))
+    line = LastMinute(good=489, lost=38, damaged=3, foreign=14, strays=2)
+    counters = replace(fakes.COUNTED, minute=line, devices=minutes)
+    await show(app, pilot, fleet, fakes.CONNECTED)
+    app.opened.line.counters = counters
+    for kind, text in fleet.health.look(counters):
+        app.events.add(kind, text)
+    await pilot.press("down")
+    app.connection.look()
+    app.draw_frame()
+    await pilot.pause()
+
+
 async def line_lost(app: Any, pilot: Pilot[None]) -> None:
     await show(app, pilot, wall(5, line=fakes.LOST), fakes.LOST)
 
@@ -246,6 +262,7 @@ STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
     "lost-drive": lost_drive,
     "not-answering": not_answering,
     "shared": shared,
+    "poor-line": poor_line,
     "line-lost": line_lost,
     "wrong-addresses": wrong_addresses,
     "dialog": dialog,

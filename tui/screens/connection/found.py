@@ -72,16 +72,24 @@ def use_text(line: ModbusLine) -> str:
     return " · ".join((f"In use {total:>4.0%}", *parts))
 
 
-def about_lines(drive: FoundDrive | None, left: str, width: int, use: str = "") -> list[Text]:
-    """All that a drive says of itself, and what to do about one that does not.
+def about_lines(
+    drive: FoundDrive | None, left: str, width: int, line: ModbusLine | None = None
+) -> list[Text]:
+    """All that a drive says of itself, what to do about one that does not, and the last minute.
 
-    First of all a motor that no program commands: `left` says who started it. `use` is the use of
-    the line, if there is nothing to do about the drive.
+    First of all a motor that no program commands: `left` says who started it. The use of the line
+    is shown if there is nothing to do about the drive.
     """
+    use = use_text(line) if line is not None else ""
     parts = [about_drive(drive), next_step(drive) or use] if drive else ["", use] if use else []
     lines = [Text(f" {short(plain(part), width - 2)}", FAINT) for part in parts]
     if left:
         del lines[1:]
         text = f"{left} Press Enter: then Space stops it, T takes it over."
         lines[:0] = [Text(f" {row}", ATTENTION) for row in wrapped(text, width - 2, LEFT_LINES)]
-    return lines + [Text("")] * (ABOUT - len(lines))
+    lines += [Text("")] * (ABOUT - len(lines))
+    if line is None:
+        return lines
+    from .health_view import health_lines  # the first picture needs none of it
+
+    return lines + health_lines(line.counters, drive.identity.device if drive else None, width)

@@ -24,7 +24,7 @@ from ..base import PanelScreen
 from ..frame import SELDOM
 from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines
 from .drive_list import DriveList
-from .found import about_lines, use_text
+from .found import about_lines
 from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
@@ -196,8 +196,8 @@ class LineView(PanelScreen):
         """All that the drive under the cursor says of itself, and what to do about one that not."""
         drive, fleet = self.found.get(self.drives.chosen or 0), self.app.fleet
         left = fleet.left_behind(drive.console) if drive and drive.console and fleet else ""
-        use = use_text(self.app.opened.line) if self.app.opened is not None else ""
-        self.put_all("about", about_lines(drive, left, self.size.width, use))
+        line = self.app.opened.line if self.app.opened is not None else None
+        self.put_all("about", about_lines(drive, left, self.size.width, line))
 
     def on_key(self, event: Key) -> None:
         """While keys come, nothing changes its place under them."""

@@ -57,7 +57,7 @@ class LineHealth:
         self, line: LastMinute, drives: dict[int, LastMinute], before: set[TroubleKind]
     ) -> Iterator[LineTrouble]:
         if self._poor:
-            yield _few_good(line, drives, line_is_poor=None in self._poor)
+            yield _few_good(line, drives, self._poor)
         if line.foreign >= (1 if "foreign" in before else SEVERAL_FRAMES):
             yield LineTrouble("foreign", ("foreign frames", "foreign", ""), _foreign(line.foreign))
         if line.strays >= (1 if "strays" in before else SEVERAL_FRAMES):
@@ -79,19 +79,20 @@ def _is_poor(minute: LastMinute, was_poor: bool) -> bool:
 
 
 def _few_good(
-    line: LastMinute, drives: dict[int, LastMinute], *, line_is_poor: bool
+    line: LastMinute, drives: dict[int, LastMinute], poor: frozenset[int | None]
 ) -> LineTrouble:
     """The line has few good replies, or the worst of its drives alone."""
-    judged = [one for one in drives if drives[one].replies >= LEAST_REPLIES]
-    worst = min(judged or drives, key=lambda one: drives[one].share or 0.0)
+    shares = {device: one.share for device, one in drives.items() if one.share is not None}
+    judged = [one for one in shares if one in poor or drives[one].replies >= LEAST_REPLIES]
+    worst = min(judged or shares, key=lambda one: shares[one], default=0)
     choose = f"Choose drive {worst} on Line and press N for the cause."
-    if not line_is_poor:
-        share = percent(drives[worst].share).strip()
+    if None not in poor:
+        share = percent(shares[worst]).strip()
         text = f"{_lost(drives[worst], f' of drive {worst}')} {choose}"
         return LineTrouble("poor", (f"drive {worst} {share:>2} % good", f"drive {worst}", ""), text)
     share = percent(line.share).strip()
-    if len(drives) > 1:
-        choose = f"Worst: drive {worst}, {percent(drives[worst].share).strip()} %. {choose}"
+    if len(shares) > 1:
+        choose = f"Worst: drive {worst}, {percent(shares[worst]).strip()} %. {choose}"
     signs = (f"line {share:>2} % good", f"line {share:>2} %", f"{share:>2} %", "")
     return LineTrouble("poor", signs, f"{_lost(line)} {choose}")
 
@@ -104,16 +105,16 @@ def _lost(minute: LastMinute, whose: str = "") -> str:
 
 
 def _foreign(count: int) -> str:
-    frames = "1 frame" if count == 1 else f"{count} frames"
+    frames = "1 foreign frame" if count == 1 else f"{count} foreign frames"
     return (
-        f"Foreign frames: {frames} in the last minute from no program here. Another master is on"
-        " this line, or an adapter echoes. Press N to find out before you command a motor."
+        f"{frames} in the last minute. Another master is on this line, or an adapter echoes."
+        " Press N to find out before you command a motor."
     )
 
 
 def _strays(count: int) -> str:
-    replies = "1 reply" if count == 1 else f"{count} replies"
+    replies = "1 stray reply" if count == 1 else f"{count} stray replies"
     return (
-        f"Stray replies: {replies} in the last minute to no request. Two drives have one address,"
-        " or an adapter repeats frames. Press N to find out before you command a motor."
+        f"{replies} in the last minute. Two drives have one address, or an adapter repeats frames."
+        " Press N to find out before you command a motor."
     )

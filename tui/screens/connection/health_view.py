@@ -1,0 +1,61 @@
+"""The last minute of the open line, and of the drive under the cursor, on Line. Pure functions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rich.text import Text
+
+from tui.bus.api import DeviceCounters, LastMinute, LineCounters
+from tui.session.monitor.line_health import LEAST_REPLIES, POOR, SEVERAL_FRAMES, percent
+from tui.widgets.palette import ALARM, FAINT, PLAIN
+
+ONE_ROW, NARROW = 120, 80
+"""Columns from which line and drive have one row, and below which a figure has no word."""
+LINE, DRIVE = " Line 60 s ", " Drive {:<4}"
+_STRANGE = ("foreign", "strays")
+
+
+def health_lines(counted: LineCounters, device: int | None, width: int) -> list[Text]:
+    """Good, lost, damaged, foreign and stray: each figure has its place."""
+    beside, cells = width >= ONE_ROW, 5 if NARROW <= width < ONE_ROW else 4
+    minute = counted.minute
+    line = Text(LINE, FAINT, no_wrap=True)
+    _good(line, minute.share, minute.replies, width)
+    _count_all(line, minute, ("lost", "damaged", *_STRANGE), cells)
+    if device is None:
+        return [line] if beside else [line, Text("")]
+    own = counted.devices.get(device, DeviceCounters()).minute
+    # those missed while it is silent are its own alone
+    own = replace(own, lost=own.lost + own.silent, silent=0)
+    drive = Text(DRIVE.format(device), FAINT, no_wrap=True)
+    _good(drive, own.share, own.replies, width)
+    _count_all(drive, own, ("lost", "damaged"), cells)
+    drive.append("" if beside else " " * (cells + len(" foreign")))
+    _count_all(drive, own, ("strays",), cells)
+    return [line.append("  ").append_text(drive)] if beside else [line, drive]
+
+
+def _good(text: Text, share: float | None, replies: int, width: int) -> None:
+    text.append(f"{percent(share)} %", ALARM if _is_poor(share, replies) else PLAIN)
+    words = f" of{_count(replies, 6)} good" if width < ONE_ROW else " good"
+    text.append(words if width >= NARROW else "", FAINT)
+
+
+def _is_poor(share: float | None, replies: int) -> bool:
+    return share is not None and share < POOR and replies >= LEAST_REPLIES
+
+
+def _count_all(text: Text, minute: LastMinute, names: tuple[str, ...], cells: int) -> None:
+    poor = _is_poor(minute.share, minute.replies)
+    for name in names:
+        number: int = getattr(minute, name)
+        bad = number >= SEVERAL_FRAMES if name in _STRANGE else poor and number
+        style = ALARM if bad else PLAIN if number else FAINT
+        text.append(_count(number, cells), style).append(f" {name}", FAINT)
+
+
+def _count(number: int, cells: int) -> str:
+    """A count in so many cells, the first of them empty."""
+    short = str(number) if number < 10 ** (cells - 1) else f"{number // 1000}k"
+    return f"{short:>{cells}}"
