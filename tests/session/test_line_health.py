@@ -100,6 +100,12 @@ def test_a_drive_that_never_answered_is_not_the_worst() -> None:
     assert "Worst: drive 1, 90 %." in text
 
 
+def test_the_worst_drive_is_that_with_most_lost_replies() -> None:
+    drives = {1: LastMinute(good=21), 2: LastMinute(good=14, lost=4), 3: LastMinute(good=1, lost=1)}
+    ((_, text),) = LineHealth().look(counted(LastMinute(good=36, lost=5), drives))
+    assert "Worst: drive 2, 77 %." in text
+
+
 def test_a_share_is_never_rounded_up_to_a_better_one() -> None:
     shares = (None, 0.0, 0.9799, 0.999, 1.0)
     assert [percent(one) for one in shares] == [" --", "  0", " 97", " 99", "100"]

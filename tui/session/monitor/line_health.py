@@ -83,8 +83,11 @@ def _few_good(
 ) -> LineTrouble:
     """The line has few good replies, or the worst of its drives alone."""
     shares = {device: one.share for device, one in drives.items() if one.share is not None}
-    judged = [one for one in shares if one in poor or drives[one].replies >= LEAST_REPLIES]
-    worst = min(judged or shares, key=lambda one: shares[one], default=0)
+    if None in poor:
+        # by what it missed: of a few replies, one lost is much
+        worst = max(shares, key=lambda one: drives[one].replies - drives[one].good, default=0)
+    else:
+        worst = min((one for one in poor if one), key=lambda one: shares[one])
     choose = f"Choose drive {worst} on Line and press N for the cause."
     if None not in poor:
         share = percent(shares[worst]).strip()
