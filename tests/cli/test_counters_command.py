@@ -23,6 +23,10 @@ def test_a_good_line_ends_with_0() -> None:
     assert names["Keypad port"]["frames"] == 0
     assert sum(one["count"] for one in told["ours"]["turnarounds"]) == told["ours"]["replies"]
     assert told["since_opened"]["frames"] > told["ours"]["frames"]
+    minutes = told["last_minute"]
+    assert minutes["line"]["share"] == minutes["device"]["share"] == 1.0
+    assert minutes["device"]["good"] == told["since_opened"]["replies"]
+    assert (minutes["line"]["foreign"], minutes["line"]["strays"]) == (0, 0)
 
 
 def test_lost_answers_end_with_1_and_are_told() -> None:
@@ -32,6 +36,9 @@ def test_lost_answers_end_with_1_and_are_told() -> None:
         assert found["kind"] == "not-answered"
         assert found["count"] >= 1
         assert found["text"].startswith("The drive saw ")
+        own = told["last_minute"]["device"]
+        assert own["lost"] + own["silent"] >= 1
+        assert own["share"] < 1.0
 
 
 def test_a_drive_without_counters_is_compared_with_nothing() -> None:

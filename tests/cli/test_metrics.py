@@ -13,7 +13,7 @@ from typing import get_args
 import pytest
 import pytest_asyncio
 
-from tui.bus.api import Contact
+from tui.bus.api import Contact, DeviceCounters, LastMinute, LineCounters
 from tui.cli.plant.metrics import BASE_UNITS, metrics_text, value_metric
 from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
 from tui.cli.plant.sights import DriveSight, LineSight
@@ -70,6 +70,18 @@ def test_a_fault_is_told_by_its_code_and_its_name_is_escaped() -> None:
     assert f"drivepanel_drive_alarm{{{WHERE}}} 1" in seen
     past = text_of(line_of(drive_of(cycle(small_drive(), ETA=0x27, LFT=18))))
     assert "fault_info" not in past
+
+
+def test_the_last_minute_of_line_and_drive_is_a_ratio() -> None:
+    drive = drive_of(cycle(small_drive(), ETA=0x27))
+    own = DeviceCounters(minute=LastMinute(good=30, lost=8, silent=2))
+    line = LastMinute(good=90, lost=8, damaged=2, foreign=5, strays=4)
+    seen = samples(line_of(drive, counters=LineCounters(minute=line, devices={2: own})))
+    assert 'drivepanel_line_good_replies_ratio{line="pump"} 0.9' in seen
+    assert 'drivepanel_line_foreign_frames{line="pump"} 5' in seen
+    assert 'drivepanel_line_stray_frames{line="pump"} 4' in seen
+    assert f"drivepanel_drive_good_replies_ratio{{{WHERE}}} 0.75" in seen
+    assert "good_replies_ratio" not in text_of(line_of(drive))
 
 
 def test_line_quality_and_turnarounds_add_up() -> None:

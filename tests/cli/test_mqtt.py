@@ -63,6 +63,7 @@ def test_a_line_is_told_with_what_it_counted() -> None:
     assert topic == "plant/pump/line"
     told = json.loads(text)
     assert (told["state"], told["reason"], told["counters"]["requests"]) == ("connected", None, 0)
+    assert told["last_minute"]["share"] is None
 
 
 def test_a_line_is_one_level_of_a_topic() -> None:

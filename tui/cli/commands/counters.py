@@ -21,7 +21,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.output import drive_json, print_json
+from ..shared.output import drive_json, minute_json, print_json
 from ..shared.say import say, say_row
 from .orders import arm_option, close_journal, need_arming, told_journal
 
@@ -138,6 +138,7 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
     yield "Answered", f"{ours.replies}, {ours.bytes_in} bytes"
     lost = f"{ours.timeouts} time-outs, {ours.checksum} damaged, {ours.wrong} strange"
     yield "Not answered", lost
+    yield "Last minute", _minute_text(found)
     yield "Refused", ", ".join(f"exception {c}: {n}" for c, n in ours.exceptions.items()) or "0"
     if found.line_load is not None and found.device_load is not None:
         share = f"{found.device_load:.0%} with this drive"
@@ -153,6 +154,18 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
         yield "Drive", found.trouble
 
 
+def _minute_text(found: CountersNow) -> str:
+    line, own = found.line_minute, found.total.minute
+    texts = (
+        f"{name} {one.good} of {awaited} replies good"
+        for name, one, awaited in (
+            ("line", line, line.replies),
+            ("this drive", own, own.replies + own.silent),
+        )
+    )
+    return f"{'; '.join(texts)}; {line.foreign} foreign frames, {line.strays} strays"
+
+
 def counters_json(found: CountersNow) -> dict[str, Any]:
     """The same as an object."""
     return {
@@ -160,6 +173,10 @@ def counters_json(found: CountersNow) -> dict[str, Any]:
         "seconds": round(found.seconds, 3),
         "ours": _ours_json(found.since),
         "since_opened": _ours_json(found.total),
+        "last_minute": {
+            "line": minute_json(found.line_minute, found.line_minute.share),
+            "device": minute_json(found.total.minute, found.total.minute.whole_share),
+        },
         "load": {"line": found.line_load, "device": found.device_load},
         "drive": [
             {

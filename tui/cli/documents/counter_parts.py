@@ -28,6 +28,28 @@ class OurCountersTold(PartTold):
     turnarounds: list[TurnaroundTold]
 
 
+class LastMinuteField(PartTold):
+    """Replies of the last minute, and the share of good ones, 0 to 1; null without a reply.
+
+    `silent` are those missed by a drive that has not answered since, not part of a line's share.
+    """
+
+    share: float | None
+    good: int
+    lost: int
+    silent: int
+    damaged: int
+    foreign: int
+    strays: int
+
+
+class LastMinutesField(PartTold):
+    """The last minute of the line, and of the drive."""
+
+    line: LastMinuteField
+    device: LastMinuteField
+
+
 class LoadTold(PartTold):
     """Shares of the time, 0 to 1, in which the line was busy: at all, and with this drive."""
 

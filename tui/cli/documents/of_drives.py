@@ -13,6 +13,7 @@ from .counter_parts import (
     CountingTestTold,
     DifferenceTold,
     DriveCountersTold,
+    LastMinutesField,
     LoadTold,
     OurCountersTold,
 )
@@ -275,6 +276,7 @@ class CountersTold(OfDriveTold, kw_only=True):
     seconds: float
     ours: OurCountersTold
     since_opened: OurCountersTold
+    last_minute: LastMinutesField
     load: LoadTold
     drive: list[DriveCountersTold]
     differences: list[DifferenceTold]

@@ -87,6 +87,11 @@ METRICS: Mapping[str, MetricHead] = {
     "line_sent_bytes_total": MetricHead("counter", "Bytes that were sent."),
     "line_received_bytes_total": MetricHead("counter", "Bytes that came."),
     "line_busy_seconds_total": MetricHead("counter", "Time in which the line was taken."),
+    "line_good_replies_ratio": MetricHead(
+        "gauge", "Good replies of the last minute, without those of silent drives."
+    ),
+    "line_foreign_frames": MetricHead("gauge", "Frames of another master in the last minute."),
+    "line_stray_frames": MetricHead("gauge", "Frames to no request in the last minute."),
     "drive_info": MetricHead("gauge", "The profile of the drive, and what it says of itself."),
     "drive_up": MetricHead("gauge", "Whether the last cycle brought the values of the drive."),
     "drive_contact": MetricHead("gauge", "1 for the result of the last requests to the drive."),
@@ -100,6 +105,7 @@ METRICS: Mapping[str, MetricHead] = {
     "drive_timeouts_total": MetricHead("counter", "Requests that the drive did not answer."),
     "drive_damaged_total": MetricHead("counter", "Replies of the drive that came damaged."),
     "drive_exceptions_total": MetricHead("counter", "Refusals of the drive, by their code."),
+    "drive_good_replies_ratio": MetricHead("gauge", "Good replies of the last minute."),
     "drive_turnaround_seconds": MetricHead(
         "histogram", "From a request's end to its reply's start."
     ),
@@ -177,6 +183,11 @@ def _of_line(line: LineSight) -> Iterator[MetricSample]:
         ("busy_seconds", counted.busy_seconds),
     ):
         yield MetricSample(f"line_{name}_total", where, number)
+    minute = counted.minute
+    if minute.share is not None:
+        yield MetricSample("line_good_replies_ratio", where, round(minute.share, 4))
+    yield MetricSample("line_foreign_frames", where, minute.foreign)
+    yield MetricSample("line_stray_frames", where, minute.strays)
 
 
 def _of_counters(where: Labels, counted: DeviceCounters | None) -> Iterator[MetricSample]:
@@ -188,6 +199,8 @@ def _of_counters(where: Labels, counted: DeviceCounters | None) -> Iterator[Metr
         ("damaged", counted.checksum),
     ):
         yield MetricSample(f"drive_{name}_total", where, number)
+    if (share := counted.minute.whole_share) is not None:
+        yield MetricSample("drive_good_replies_ratio", where, round(share, 4))
     for code, number in sorted(counted.exceptions.items()):
         yield MetricSample("drive_exceptions_total", {**where, "exception": f"{code:02X}"}, number)
     total = 0

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from ..shared.output import JSON_SCHEMA, json_text
+from ..shared.output import JSON_SCHEMA, json_text, minute_json
 from ..shared.watch_outputs import cycle_json
 from .broker import level
 
@@ -68,6 +68,7 @@ def _line(text: str, state: LineState, counters: LineCounters) -> dict[str, Any]
         "state": state.status.value,
         "reason": state.reason or None,
         "counters": {name: counted[name] for name in LINE_COUNTS},
+        "last_minute": minute_json(counters.minute, counters.minute.share),
     }
 
 

@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from rich.segment import Segment
     from rich.table import Table
 
+    from tui.bus.api import LastMinute
     from tui.session.drive import DriveSession
     from tui.session.reading import Reading
 
@@ -236,3 +238,8 @@ def _remark(reading: Reading) -> str:
     if reading.value is not None and reading.value.taught:
         return "taught"
     return reading.physical.display if reading.physical else ""
+
+
+def minute_json(minute: LastMinute, share: float | None) -> dict[str, Any]:
+    """The last minute of a line or a drive, with its share of good replies."""
+    return {"share": None if share is None else round(share, 4), **asdict(minute)}

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from tui.bus.api import DeviceCounters, LineCounters, Priority
+from tui.bus.api import DeviceCounters, LastMinute, LineCounters, Priority
 from tui.bus.errors import LineError, RequestRefused
 from tui.drive.chart import watched_codes
 from tui.drive.profile.schema import PortCounters
@@ -60,6 +60,7 @@ class CountersNow:
     trouble: str
     """Why the drive's own were not read; empty where they were, or where it has none."""
     differences: tuple[Difference, ...] = ()
+    line_minute: LastMinute = field(default_factory=LastMinute)
 
     @property
     def agree(self) -> bool:
@@ -240,6 +241,7 @@ class CounterWatch:
             self.counted_by,
             tuple(self._drive.items()),
             self.trouble,
+            line_minute=line.minute,
         )
         return replace(found, differences=_told(found.compared, since))
 
