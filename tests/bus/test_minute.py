@@ -45,6 +45,10 @@ class Ended:
         for _ in range(times):
             self.reply(device, ResultKind.REPLY)
 
+    def doubted(self, device: int) -> None:
+        """A reply that is asked for once more, as it may be a copy of the one before."""
+        self._outcomes.count_beside(device, ExchangeResult(ResultKind.REPLY, end=self.now))
+
     def missed(self, device: int, times: int = 1, priority: Priority = Priority.POLL) -> None:
         """So many requests without an answer."""
         for _ in range(times):
@@ -95,6 +99,14 @@ def test_a_missed_reply_is_the_lines_once_the_drive_answers_again(ended: Ended) 
     assert ended.line == LastMinute(good=9, lost=2)
     assert ended.of(1) == LastMinute(good=9, lost=2)
     assert ended.line.share == pytest.approx(9 / 11)
+
+
+def test_a_reply_that_was_doubted_counts_no_miss_twice(ended: Ended) -> None:
+    ended.good(1)
+    ended.missed(1)
+    ended.doubted(1)
+    ended.good(1)
+    assert ended.line == ended.of(1) == LastMinute(good=3, lost=1)
 
 
 def test_damaged_and_wrong_replies_count_at_once(ended: Ended) -> None:

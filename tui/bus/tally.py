@@ -32,6 +32,8 @@ class DeviceTally:
     busy_seconds: float = 0.0
     turnarounds: tuple[int, ...] = (0,) * (len(TURNAROUND_EDGES) + 1)
     minute: MinuteWindow = field(default_factory=MinuteWindow)
+    missed: int = 0
+    """Requests of the last minute's counts that it did not answer since its last reply."""
 
     def count_reply(self, turnaround: float) -> None:
         """A right reply came, so many seconds after its request."""
@@ -128,6 +130,7 @@ class Tally:
             self.searched += 1
         else:
             self.timeouts += 1
+            self.of(device).missed += 1
             self.of(device).minute.count("silent", self.clock())
         self.of(device).timeouts += 1
 
@@ -138,14 +141,15 @@ class Tally:
         if device is not None:
             self.of(device).minute.count(kind, now)
 
-    def count_lost(self, device: int, number: int) -> None:
-        """It answers again, after so few misses that they are a trouble of the line."""
-        if not number:
-            return
-        now, own = self.clock(), self.of(device).minute
-        self.minute.count("lost", now, number)
-        own.count("lost", now, number)
-        own.count("silent", now, -number)
+    def count_good(self, device: int, *, was_heard: bool) -> None:
+        """It answers: its misses before are lost replies of the line, unless it was away."""
+        own, now = self.of(device), self.clock()
+        if own.missed and was_heard:
+            self.minute.count("lost", now, own.missed)
+            own.minute.count("lost", now, own.missed)
+            own.minute.count("silent", now, -own.missed)
+        own.missed = 0
+        self.count_minute(device, "good")
 
     def copy(self, counters: LineCounters, devices: Mapping[int, DeviceCounters]) -> None:
         """Take over the counts of the program that owns the line, of devices those that changed."""

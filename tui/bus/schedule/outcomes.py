@@ -109,10 +109,9 @@ class Outcomes:
         """A right reply; misses before it are those of the line if they were few."""
         record, tally = self._devices[device], self._tally
         tally.count_reply(device, result.turnaround)
-        tally.count_minute(device, "good")
         since = now if record.silent_since is None else record.silent_since
-        if record.ever_answered and (record.failures < MISSES or now - since < SHORT_SILENCE):
-            tally.count_lost(device, record.failures)
+        short = record.failures < MISSES or now - since < SHORT_SILENCE
+        tally.count_good(device, was_heard=record.ever_answered and short)
 
     def _share(self, job: Job, result: ExchangeResult) -> None:
         """Keep what was read, while somebody else may want it.
