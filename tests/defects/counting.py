@@ -5,6 +5,8 @@ from __future__ import annotations
 from .defect import Defect
 
 COMPARED = ("tests/session/test_counters.py",)
+MINUTE = ("tests/bus/test_minute.py",)
+HEALTH = ("tests/session/test_line_health.py",)
 
 DEFECTS = (
     Defect(
@@ -65,5 +67,45 @@ DEFECTS = (
             "tests/session/test_counters.py::"
             "test_the_drives_counters_are_reset_and_compared_from_there",
         ),
+    ),
+    Defect(
+        "dead-drive-spoils-the-line",
+        "tui/bus/schedule/outcomes.py",
+        "tally.count_good(device, was_heard=record.ever_answered and short)",
+        "tally.count_good(device, was_heard=True)",
+        "A drive that was switched off for an hour is reported as a poor line.",
+        MINUTE,
+    ),
+    Defect(
+        "late-replies-taken-for-strays",
+        "tui/bus/schedule/outcomes.py",
+        'elif kind != "late":',
+        "else:",
+        "A slow drive is taken for two drives at one address.",
+        MINUTE,
+    ),
+    Defect(
+        "foreign-frames-raise-no-alert",
+        "tui/session/monitor/line_health.py",
+        'if line.foreign >= (1 if "foreign" in before else SEVERAL_FRAMES):',
+        "if line.foreign and self._poor:",
+        "Another master commands the drives, and the panel calls the line healthy.",
+        HEALTH,
+    ),
+    Defect(
+        "alert-that-flickers",
+        "tui/session/monitor/line_health.py",
+        "return share < (HEALTHY if was_poor else POOR)",
+        "return share < POOR",
+        "The alert of a poor line comes and goes each second, until no one looks at it.",
+        HEALTH,
+    ),
+    Defect(
+        "trouble-hidden-behind-arming",
+        "tui/widgets/strip.py",
+        'form = next((form for form in forms if len(form) <= room), "")',
+        'form = next((form for form in forms if len(form) <= 0), "")',
+        "The line loses a tenth of its replies, and the status bar shows nothing of it.",
+        ("tests/ui/test_strip.py",),
     ),
 )

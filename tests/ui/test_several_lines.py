@@ -6,8 +6,10 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from tui.app import DrivePanelApp
+from tui.bus.line import Line
 from tui.screens.dialogs.confirm import Confirm
 from tui.session.connect.open_line import OpenLine, demo_line
+from tui.session.monitor.line_health import SEVERAL_FRAMES
 
 from .test_frame import Panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
@@ -126,3 +128,35 @@ async def test_the_same_line_with_other_settings_is_closed_only_after_asking() -
         await made.pilot.press("escape")
         await made.until(lambda: app.screen is app.connection)
         assert len(app.panel_lines) == 2
+
+
+async def test_foreign_frames_are_reported_with_the_name_of_a_line_that_is_not_shown() -> None:
+    async with two_lines() as made:
+        below, shown = made.app.panel_lines
+        for one in (below, shown):
+            line = one.opened.line
+            assert isinstance(line, Line)
+            for _ in range(SEVERAL_FRAMES):
+                line._engine.tally.count_minute(None, "foreign")
+        told = f"{SEVERAL_FRAMES} foreign frames in the last minute."
+
+        def reports() -> set[str]:
+            return {e.text.partition(told)[0] for e in made.app.events.events if told in e.text}
+
+        await made.until(lambda: reports() == {"", f"{below.opened.label}: "})
+        await made.until(lambda: "▲ foreign frames" in made.shown("strip"))
+        assert "1 Line ▲" in made.shown("tabs")
+
+
+async def test_a_line_that_is_lost_has_no_health() -> None:
+    async with two_lines() as made:
+        shown = made.app.panel_lines[1]
+        line, simulation = shown.opened.line, shown.opened.simulation
+        assert isinstance(line, Line)
+        assert simulation is not None
+        for _ in range(SEVERAL_FRAMES):
+            line._engine.tally.count_minute(None, "foreign")
+        await made.until(lambda: "▲ foreign frames" in made.shown("strip"))
+        simulation.unplug()
+        await made.until(lambda: "▲" not in made.shown("strip"))
+        assert not shown.fleet.health.troubles
