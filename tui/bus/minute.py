@@ -13,12 +13,14 @@ _PLACES = {kind: place for place, kind in enumerate(_KINDS)}
 class MinuteWindow:
     """Counted in the line's loop, read from any thread: the buckets are replaced as a whole."""
 
-    __slots__ = ("_buckets", "_copied")
+    __slots__ = ("_buckets", "_copied", "_summed")
 
     def __init__(self, copied: LastMinute | None = None) -> None:
         self._buckets: tuple[tuple[int, tuple[int, ...]], ...] = ()
         self._copied = copied
         """What the program that owns the line has counted; None where this one counts."""
+        self._summed: tuple[object, int, LastMinute] = (None, 0, LastMinute())
+        """The last sum, of which buckets and in which bucket: it is looked at more often."""
 
     def count(self, kind: str, now: float, number: int = 1) -> None:
         """Count so many of a field of LastMinute; a negative number corrects an earlier count."""
@@ -34,7 +36,12 @@ class MinuteWindow:
         """The counts of the last minute."""
         if self._copied is not None:
             return self._copied
-        oldest = int(now // BUCKET) - BUCKETS
-        counted = [counts for bucket, counts in self._buckets if bucket > oldest]
+        buckets, newest = self._buckets, int(now // BUCKET)
+        of, then, total = self._summed
+        if of is buckets and then == newest:
+            return total
+        counted = [counts for bucket, counts in buckets if bucket > newest - BUCKETS]
         # what corrects a count may be kept for longer than the count
-        return LastMinute(*(max(0, sum(one)) for one in zip(*counted, strict=True)))
+        total = LastMinute(*(max(0, sum(one)) for one in zip(*counted, strict=True)))
+        self._summed = (buckets, newest, total)
+        return total

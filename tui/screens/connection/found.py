@@ -75,7 +75,7 @@ def use_text(line: ModbusLine) -> str:
 def about_lines(
     drive: FoundDrive | None, left: str, width: int, line: ModbusLine | None = None
 ) -> list[Text]:
-    """All that a drive says of itself, what to do about one that does not, and the last minute.
+    """The last minute, all that a drive says of itself, and what to do about one that does not.
 
     First of all a motor that no program commands: `left` says who started it. The use of the line
     is shown if there is nothing to do about the drive.
@@ -83,13 +83,16 @@ def about_lines(
     use = use_text(line) if line is not None else ""
     parts = [about_drive(drive), next_step(drive) or use] if drive else ["", use] if use else []
     lines = [Text(f" {short(plain(part), width - 2)}", FAINT) for part in parts]
+    first: list[Text] = []
     if left:
         del lines[1:]
         text = f"{left} Press Enter: then Space stops it, T takes it over."
-        lines[:0] = [Text(f" {row}", ATTENTION) for row in wrapped(text, width - 2, LEFT_LINES)]
-    lines += [Text("")] * (ABOUT - len(lines))
+        first = [Text(f" {row}", ATTENTION) for row in wrapped(text, width - 2, LEFT_LINES)]
+    lines += [Text("")] * (ABOUT - len(lines) - len(first))
     if line is None:
-        return lines
+        return [*first, *lines]
     from .health_view import health_lines  # the first picture needs none of it
 
-    return lines + health_lines(line.counters, drive.identity.device if drive else None, width)
+    # above the rest: a long message covers the lowest lines
+    device = drive.identity.device if drive else None
+    return [*first, *health_lines(line.counters, device, width), *lines]

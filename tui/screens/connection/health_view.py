@@ -21,7 +21,7 @@ def health_lines(counted: LineCounters, device: int | None, width: int) -> list[
     beside, cells = width >= ONE_ROW, 5 if NARROW <= width < ONE_ROW else 4
     minute = counted.minute
     line = Text(LINE, FAINT, no_wrap=True)
-    _good(line, minute.share, minute.replies, width)
+    _good(line, minute.share, minute.replies, " good" if beside else _of(minute.replies, width))
     _count_all(line, minute, ("lost", "damaged", *_STRANGE), cells)
     if device is None:
         return [line] if beside else [line, Text("")]
@@ -29,17 +29,20 @@ def health_lines(counted: LineCounters, device: int | None, width: int) -> list[
     # those missed while it is silent are its own alone
     own = replace(own, lost=own.lost + own.silent, silent=0)
     drive = Text(DRIVE.format(device), FAINT, no_wrap=True)
-    _good(drive, own.share, own.replies, width)
+    _good(drive, own.share, own.replies, "" if beside else _of(own.replies, width))
     _count_all(drive, own, ("lost", "damaged"), cells)
     drive.append("" if beside else " " * (cells + len(" foreign")))
     _count_all(drive, own, ("strays",), cells)
     return [line.append("  ").append_text(drive)] if beside else [line, drive]
 
 
-def _good(text: Text, share: float | None, replies: int, width: int) -> None:
+def _good(text: Text, share: float | None, replies: int, words: str) -> None:
     text.append(f"{percent(share)} %", ALARM if _is_poor(share, replies) else PLAIN)
-    words = f" of{_count(replies, 6)} good" if width < ONE_ROW else " good"
-    text.append(words if width >= NARROW else "", FAINT)
+    text.append(words, FAINT)
+
+
+def _of(replies: int, width: int) -> str:
+    return f" of{_count(replies, 6)} good" if width >= NARROW else ""
 
 
 def _is_poor(share: float | None, replies: int) -> bool:
