@@ -541,6 +541,28 @@ async def test_identification_follows_on(open_line: OpenLine) -> None:
         assert [request[4] for request in peer.requests] == [0, 1]
 
 
+TWICE_IN_ONE = [bytes([43, 14, 1, 2, 0, 0, 2, 1, 3]) + b"one" + bytes([1, 3]) + b"two"]
+TWICE_IN_TWO = [
+    bytes([43, 14, 1, 2, 0xFF, 1, 1, 1, 3]) + b"one",
+    bytes([43, 14, 1, 2, 0, 0, 2, 1, 3]) + b"two" + bytes([6, 2]) + b"xy",
+]
+
+
+@pytest.mark.parametrize("parts", [TWICE_IN_ONE, TWICE_IN_TWO])
+async def test_object_with_two_contents_is_named_and_refused(
+    parts: list[bytes], open_line: OpenLine
+) -> None:
+    with PtyPeer(lambda _, count: [frame(1, parts[count])]) as peer:
+        line = open_line(peer.path)
+        with pytest.raises(WrongReply, match="object 1 came with two contents, 'one' and 'two'"):
+            await line.identify(1)
+
+
+async def test_object_that_comes_twice_alike_is_one(open_line: OpenLine) -> None:
+    with PtyPeer(lambda _, count: [frame(1, TWICE_IN_ONE[0].replace(b"two", b"one"))]) as peer:
+        assert (await open_line(peer.path).identify(1)).objects == {1: b"one"}
+
+
 async def test_identification_without_end_is_refused(open_line: OpenLine) -> None:
     with PtyPeer(instead(bytes([43, 14, 1, 2, 0xFF, 0, 1, 0, 1, 65]))) as peer:
         line = open_line(peer.path)

@@ -8,6 +8,7 @@ import pytest
 
 from tui.bus.errors import DeviceException
 from tui.bus.expectation import exception_code
+from tui.bus.identification import Objects, own_words_of
 from tui.bus.limits import CAUTIOUS, Limits, Window, send_refusal
 from tui.bus.requests import (
     Diagnose,
@@ -18,8 +19,6 @@ from tui.bus.requests import (
     Request,
     WriteMany,
     WriteOne,
-    objects_of,
-    own_words_of,
     words_of,
 )
 from tui.wire.frames import frame
@@ -101,7 +100,7 @@ def test_contents_of_replies() -> None:
         "01 0F 41 54 56 33 31 48 55 30 39 4D 33 53 33 32 33 02 04 30 32 30 31"
     )
     assert Identify(2).expectation().fits(pdu)
-    found = objects_of(pdu)
+    found = Objects().with_more(pdu)
     assert found.objects == {0: b"TELEMECANIQUE", 1: b"ATV31HU09M3S323", 2: b"0201"}
     assert found.conformity == 2
     assert found.next_object is None

@@ -179,6 +179,26 @@ def test_two_drives_at_one_address_are_told_as_unclear() -> None:
     assert told["device"] == 3
 
 
+def test_damaged_identification_is_unclear_and_no_family_is_likely() -> None:
+    """An Altivar that answers the read by which others are found; its name comes damaged."""
+
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        if request[0] != 3:
+            return []
+        if request[1] == 43:
+            return [frame(3, bytes.fromhex("2B 0E 01 01 00 00 01 00 01 41"))[:-1] + b"\0"]
+        return [frame(3, bytes.fromhex("03 02 0001"))]
+
+    with PtyPeer(script) as peer:
+        done = invoked("scan", peer.path, "--addresses", "2-4", "--json")
+    assert done.exit_code == 3
+    assert not events(done.stdout, "hit")
+    (unclear,) = events(done.stdout, "unclear")
+    assert unclear["device"] == 3
+    assert "damaged" in unclear["text"]
+    assert [request[1] for request in peer.requests if request[0] == 3][:4] == [3, 43, 43, 43]
+
+
 def test_over_a_network_there_is_no_setting() -> None:
     with tcp_line("atv71@2") as line:
         (hit,) = events(ended(0, "scan", line, "--addresses", "1-2", "--json").stdout, "hit")

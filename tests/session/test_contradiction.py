@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tui.bus.api import IdentificationObjects, Priority
-from tui.bus.errors import ChecksumFault, DeviceException, LineLost, NoAnswer
+from tui.bus.errors import ChecksumFault, DeviceException, LineLost, NoAnswer, WrongReply
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -102,13 +102,29 @@ class Answering(OneDrive):
         return self.answer
 
 
-@pytest.mark.parametrize(
-    "error", [NoAnswer(1, 43, 0), DeviceException(1, 43, 0, code=1), ChecksumFault(1, 43, 0)]
-)
+@pytest.mark.parametrize("error", [NoAnswer(1, 43, 0), DeviceException(1, 43, 0, code=1)])
 async def test_who_says_nothing_is_asked_once_and_believed(error: Exception) -> None:
     line = Answering(error)
     assert await own_words(line, 1, library.load("powerdrive")) is None
     assert line.asked_by == [Priority.BACKGROUND], "a silent family is not waited for long"
+
+
+@pytest.mark.parametrize("family", ["atv71", "powerdrive"])
+@pytest.mark.parametrize("error", [ChecksumFault(1, 43, 0), WrongReply(1, 43, 0)])
+async def test_damaged_identification_is_requested_again_and_decides_nothing(
+    family: str, error: Exception
+) -> None:
+    line = Answering(error)
+    with pytest.raises(type(error)):
+        await own_words(line, 1, library.load(family))
+    assert len(line.asked_by) == 3
+
+
+async def test_silence_of_a_drive_that_answers_its_status_is_no_contradiction() -> None:
+    line = Answering(NoAnswer(1, 43, 0))
+    profile = library.load("atv71")
+    assert await own_words(line, 1, profile) is None
+    assert len(line.asked_by) == 2
 
 
 async def test_a_lost_line_is_told() -> None:

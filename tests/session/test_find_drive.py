@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from tui.bus.api import Priority
-from tui.bus.errors import NoAnswer
+from tui.bus.api import IdentificationObjects, LineCounters, Priority, Reply
+from tui.bus.errors import ChecksumFault, ExchangeError, NoAnswer, WrongReply
 from tui.bus.fake import FakeLine
 from tui.bus.requests import Identify, Read, ReportId
 from tui.drive.finding import PresenceProbe
-from tui.session.connect.identify import ScanResult, find_drive
+from tui.session.connect.identify import ScanResult, find_drive, identify_drive
 
 STATUS = 1039
 PROBES = (PresenceProbe(STATUS, ("powerdrive", "varmeca")),)
@@ -86,3 +88,113 @@ async def test_where_nothing_is_sure_to_be_refused_function_43_finds_it() -> Non
     result = await found(line, (*PROBES, PresenceProbe(None)))
     assert result.by == "function 43"
     assert line.requests.count(Identify(1)) == 1
+
+
+ATV71 = {0: b"Telemecanique", 1: b"ATV71HU15M3", 2: b"0201"}
+"""An Altivar that answers the read by which Leroy-Somer drives are found, as some gateways do."""
+LOST, DAMAGED, TWOFOLD = NoAnswer(1, 43, 0), ChecksumFault(1, 43, 0), WrongReply(1, 43, 0)
+
+
+def altivar_with_every_word() -> FakeLine:
+    line = FakeLine({1: {STATUS: 0}})
+    line.devices[1].identity = ATV71
+    return line
+
+
+@pytest.mark.parametrize("error", [LOST, DAMAGED, TWOFOLD])
+@pytest.mark.parametrize("times", [1, 2])
+async def test_lost_identification_is_requested_again(error: ExchangeError, times: int) -> None:
+    line = altivar_with_every_word()
+    line.fail_identify(1, error, times=times)
+    result = await found(line)
+    assert result.identity is not None
+    assert (result.identity.profile, result.error) == ("atv71", "")
+
+
+@pytest.mark.parametrize("error", [DAMAGED, TWOFOLD])
+async def test_identification_that_stays_damaged_infers_no_family(error: ExchangeError) -> None:
+    line = altivar_with_every_word()
+    line.fail_identify(1, error)
+    result = await found(line)
+    assert result.identity is not None
+    assert (result.identity.profile, result.identity.candidates) == (None, ())
+    assert result.error == str(error)
+    assert line.requests.count(Identify(1)) == 3
+
+
+class LosesReads(FakeLine):
+    """A line that loses the reply to the second read, and carries the others."""
+
+    async def read(self, device: int, address: int, *some: int, **how: Any) -> Reply:
+        reply = await super().read(device, address, *some, **how)
+        if sum(isinstance(one, Read) for one in self.requests) == 2:
+            raise NoAnswer(device, 3, address)
+        return reply
+
+
+async def test_silence_beside_a_lost_read_infers_no_family() -> None:
+    line = LosesReads({1: {STATUS: 0}})
+    line.fail_identify(1, LOST)
+    result = await found(line)
+    assert result.identity is not None
+    assert result.identity.candidates == ()
+    assert "No identification of device 1 came through" in result.error
+
+
+class DamagedThenSilent(FakeLine):
+    """A line that damages the first identification, and loses all that follow."""
+
+    async def identify(self, device: int, **_: Any) -> IdentificationObjects:
+        self.requests.append(Identify(device))
+        raise DAMAGED if self.requests.count(Identify(device)) == 1 else LOST
+
+
+class Damaging(FakeLine):
+    """A line on which damaged frames of any device are counted at each identification."""
+
+    async def identify(self, device: int, **how: Any) -> IdentificationObjects:
+        self.counters = LineCounters(checksum=self.counters.checksum + 1)
+        return await super().identify(device, **how)
+
+
+async def test_silence_on_a_line_that_damages_frames_infers_no_family() -> None:
+    line = Damaging({1: {STATUS: 0}})
+    line.fail_identify(1, LOST)
+    result = await found(line)
+    assert result.identity is not None
+    assert result.identity.candidates == ()
+    assert "No identification of device 1 came through" in result.error
+
+
+async def test_damaged_reply_to_the_first_read_shows_that_somebody_is_there() -> None:
+    line = altivar_with_every_word()
+    line.fail_read(1, STATUS, ChecksumFault(1, 3, STATUS))
+    result = await found(line)
+    assert result.identity is not None
+    assert result.identity.profile == "atv71"
+
+
+@pytest.mark.parametrize("error", [DAMAGED, TWOFOLD])
+async def test_identification_of_one_drive_fails_after_three_damaged_replies(
+    error: ExchangeError,
+) -> None:
+    line = altivar_with_every_word()
+    line.fail_identify(1, error)
+    with pytest.raises(ExchangeError):
+        await identify_drive(line, 1)
+    assert line.requests.count(Identify(1)) == 3
+    line = altivar_with_every_word()
+    line.fail_identify(1, error, times=2)
+    assert (await identify_drive(line, 1)).profile == "atv71"
+
+
+async def test_operator_request_to_a_family_without_function_43_gets_the_likely_ones() -> None:
+    line = FakeLine({1: {STATUS: 0}})
+    line.fail_identify(1, LOST)
+    assert set((await identify_drive(line, 1)).candidates) >= {"powerdrive", "varmeca"}
+
+
+async def test_silence_after_damage_identifies_nothing() -> None:
+    line = DamagedThenSilent({1: {STATUS: 0}})
+    with pytest.raises(ChecksumFault, match="No identification"):
+        await identify_drive(line, 1)

@@ -10,7 +10,7 @@ from typing import cast
 import pytest
 
 from tests.bus.peer import PtyPeer, Step
-from tui.bus.api import DeviceState, IdentificationObjects, ModbusLine, Priority
+from tui.bus.api import DeviceState, IdentificationObjects, LineCounters, ModbusLine, Priority
 from tui.bus.errors import (
     ChecksumFault,
     DeviceException,
@@ -53,6 +53,7 @@ class Replies:
     heard_late: set[int] = field(default_factory=set)
     waits: list[float | None] = field(default_factory=list)
     """How long each answer was waited for that did not come."""
+    counters: LineCounters = field(default_factory=LineCounters)
 
     def device_state(self, device: int) -> DeviceState:
         return DeviceState(device in self.heard_late, 0, None, None, None, None, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 from textual.pilot import Pilot
@@ -12,6 +13,7 @@ from textual.widgets import Input
 from tests.programs import rtu_tcp
 from tui.app import DrivePanelApp
 from tui.screens.monitor.screen import MonitorScreen
+from tui.session.connect.identify import DriveIdentity, ScanResult
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.paths import recent_lines
 from tui.simulator import DriveSpec, Simulation
@@ -126,3 +128,20 @@ async def test_a_drive_whose_reaction_to_a_silent_line_is_off_does_not_act() -> 
         assert "Kept asking: 2 (3 s). Otherwise they trip" in text
         assert app.fleet is not None
         assert set(app.fleet.line_watch.left_alone()) <= {2}
+
+
+async def test_drive_whose_identification_comes_damaged_keeps_its_stop_keys() -> None:
+    damaged = ScanResult(1, DriveIdentity(1, "", "", "", "", None, ()), "It came damaged.")
+    other = replace(damaged, device=9, identity=DriveIdentity(9, "", "", "", "", None, ()))
+    async with panel(DriveSpec("atv71", 1)) as (app, pilot):
+        await until(pilot, lambda: 1 in app.connection.found)
+        app.connection.end_search()
+        fleet = app.fleet
+        assert fleet is not None
+        console = fleet.console(1)
+        assert console is not None
+        await app.connection._take(damaged)
+        assert fleet.console(1) is console
+        await app.connection._take(other)
+        assert fleet.found[9].console is None
+        assert "It came damaged. The address is taken." in said(app)

@@ -11,6 +11,7 @@ from functools import partial
 
 from .errors import RequestRefused, WrongReply
 from .expectation import IDENTIFY
+from .identification import REFERENCE, Objects, own_words_of
 from .limits import Limits, send_refusal
 from .link import Link
 from .model import (
@@ -27,15 +28,12 @@ from .prepared import PreparedWrite
 from .program import Program
 from .requests import (
     BROADCAST,
-    REFERENCE,
     Diagnose,
     Identify,
     ReadWrite,
     ReportId,
     Request,
     diagnostic_of,
-    objects_of,
-    own_words_of,
     read_request,
     write_request,
 )
@@ -227,17 +225,13 @@ class Line:
         if function == ReportId.function:
             reply = await self._ask(ReportId(device), priority, within=within)
             return IdentificationObjects(0, {REFERENCE: own_words_of(reply.pdu)})
-        found: dict[int, bytes] = {}
-        first = 0
-        while True:
+        found = Objects()
+        while (first := found.next_object) is not None:
             request = Identify(device, first_object=first)
-            part = objects_of((await self._ask(request, priority, within=within)).pdu)
-            found.update(part.objects)
-            if part.next_object is None:
-                return IdentificationObjects(part.conformity, found)
-            if part.next_object <= first:
-                raise WrongReply(device, request.function, 0, "its identification does not end")
-            first = part.next_object
+            found = found.with_more((await self._ask(request, priority, within=within)).pdu)
+            if found.trouble:
+                raise WrongReply(device, request.function, 0, found.trouble)
+        return IdentificationObjects(found.conformity, found.objects)
 
     async def broadcast(
         self,

@@ -6,7 +6,6 @@ before anything is read from a reply.
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -273,36 +272,6 @@ def words_of(pdu: bytes) -> tuple[int, ...]:
     return tuple(response.registers)
 
 
-REFERENCE = 1
-"""The object of function 43/14 that says which drive it is."""
-_WORDS = re.compile(rb"[ -~]{3,}")
-
-
-def own_words_of(pdu: bytes) -> bytes:
-    """The longest text in a checked reply of function 17; the bytes around it are its maker's."""
-    return max(_WORDS.findall(pdu[2:]), key=len, default=b"").strip()
-
-
 def diagnostic_of(pdu: bytes) -> int:
     """The data word of a checked reply of function 8."""
     return int.from_bytes(pdu[3:5], "big")
-
-
-@dataclass(frozen=True, slots=True)
-class Objects:
-    """One reply of function 43/14; `next_object` None when nothing follows."""
-
-    conformity: int
-    objects: dict[int, bytes]
-    next_object: int | None
-
-
-def objects_of(pdu: bytes) -> Objects:
-    """Objects of a checked reply of function 43/14."""
-    objects: dict[int, bytes] = {}
-    at = 7
-    for _ in range(pdu[6]):
-        length = pdu[at + 1]
-        objects[pdu[at]] = bytes(pdu[at + 2 : at + 2 + length])
-        at += 2 + length
-    return Objects(pdu[3], objects, pdu[5] if pdu[4] else None)

@@ -170,9 +170,11 @@ class Scan:
 
     async def _take(self, fleet: Fleet, result: ScanResult) -> None:
         """An address is not silent: tell it at once, then ask the drive on."""
-        if result.identity is None:
+        if result.identity is None or result.error:
             self.unknown.append(result.device)
             self.tell.unclear(self.setting, result)
+            if result.identity is not None and fleet.console(result.device) is None:
+                fleet.note(result.identity)  # it is there: its timeout is not to run out
             return
         hit = Hit(self.setting, result.identity, result.by)
         self.hits.append(hit)

@@ -155,12 +155,17 @@ class Scanning(LineView):
 
     async def _take(self, result: ScanResult) -> None:
         """Keep a drive that answered, with its profile and state."""
-        if result.identity is None:
+        if result.error:
             self.say(
                 f"{result.error} The address is taken.", "Press s to search again.", ALARM_KIND
             )
+        if result.identity is None:
             return
-        await self._equip(result.identity)
+        if not result.error:
+            await self._equip(result.identity)
+        elif (fleet := self.app.fleet) is not None and fleet.console(result.device) is None:
+            # of no family, not even of the one typed; a drive that is known keeps its stop keys
+            fleet.note(result.identity)
         self.look()
         self._lead_to_drives()
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from tui.bus.api import Priority
-from tui.bus.errors import ExchangeError, NoAnswer, RequestRefused
+from tui.bus.errors import NoAnswer
 from tui.bus.expectation import IDENTIFY
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 
-from .identify import Askable, DriveIdentity, identity_told
+from .identify import DriveIdentity, identity_told
+from .identifying import Askable, ask_identification, intact
 
 BRIEFLY = 0.4
 """Seconds in which a drive answers that has the function although its family lacks it."""
+SILENCES = 2
+"""Requests without a reply after which a drive of a family that has the function has said nothing,
+or is absent."""
 
 
 class Contradiction(DriveError):
@@ -22,24 +24,35 @@ class Contradiction(DriveError):
 
 
 async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdentity | None:
-    """What a drive says of itself, asked once; None where it says nothing.
+    """What a drive says of itself; None where it says nothing.
 
     Silence and refusals are no contradiction: families without function 43 do either. One that was
-    silent is asked for its status word, so that it does not count as absent. Raises the errors of
-    a line that is lost.
+    silent is asked for its status word, so that it does not count as absent. Raises ChecksumFault
+    or WrongReply if its reply only comes damaged, or is lost on a line that loses frames, and the
+    errors of a line that is lost.
     """
     # a family that has the function is waited for as always; the others are silent
     has_it = profile.function(IDENTIFY) is not None
     priority, within = (Priority.OPERATOR_READ, None) if has_it else (Priority.BACKGROUND, BRIEFLY)
+    silences = SILENCES if has_it else 1
+    misses = 0
+
+    async def control() -> bool:
+        nonlocal misses
+        if await intact(read_status(line, device, profile, Priority.OPERATOR_READ)):
+            return True
+        misses += 1
+        if misses == silences:
+            raise NoAnswer(device, IDENTIFY, 0)
+        return False
+
     try:
-        answer = await line.identify(device, priority=priority, within=within)
+        answer = await ask_identification(
+            line, device, control, priority=priority, within=within, silences=silences
+        )
     except NoAnswer:
-        with suppress(ExchangeError):
-            await read_status(line, device, profile, Priority.OPERATOR_READ)
         return None
-    except (ExchangeError, RequestRefused):
-        return None
-    return await identity_told(device, answer)
+    return await identity_told(device, answer) if answer is not None else None
 
 
 async def read_status(line: Askable, device: int, profile: Profile, priority: Priority) -> bool:

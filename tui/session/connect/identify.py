@@ -4,46 +4,26 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
 
-from tui.bus.api import IdentificationObjects, Priority, Reply
-from tui.bus.errors import DeviceException, ExchangeError, NoAnswer, RequestRefused
+from tui.bus.api import IdentificationObjects, Priority
+from tui.bus.errors import (
+    ChecksumFault,
+    DeviceException,
+    NoAnswer,
+    RequestRefused,
+    WrongReply,
+)
 from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.drive.errors import DriveError
 from tui.drive.finding import PresenceProbe
 from tui.drive.plain import plain
 from tui.drive.profile import library
 
+from .identifying import TRIES, Askable, NotIdentified, ask_identification, intact
+
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
-
-
-class Askable(Protocol):
-    """As much of a line as it takes to ask who is there."""
-
-    async def identify(
-        self,
-        device: int,
-        *,
-        priority: Priority,
-        within: float | None = None,
-        function: int = IDENTIFY,
-    ) -> IdentificationObjects:
-        """Function 43, or 17."""
-        ...
-
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority,
-        within: float | None = None,
-    ) -> Reply:
-        """Function 3."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,30 +65,38 @@ async def identify_drive(
     A drive that refuses the function is there, but nameless. One that stays silent, or of which
     it is known that it has no function 43 (its limits came from a profile before), is asked for
     the status word of each family without that function. Raises NoAnswer where nothing answers
-    at all, and the line's other errors.
+    at all, ChecksumFault or WrongReply where frames were lost or damaged so that nothing is
+    decided, and the line's other errors.
     """
-    try:
-        answer = await _ask(line, device, priority)
-    except DeviceException:
-        return _nameless(device)
-    except (NoAnswer, RequestRefused):
-        return _nameless(device, await _nameless_families(line, device, priority))
-    return await identity_told(device, answer)
+    # a person's question is asked again once: a lost reply is no absent drive
+    there = _Presence(damaged=True)
+    left = TRIES
+    for _ in range(1 if priority >= Priority.BACKGROUND else 2):
+        left -= 1
+        try:
+            return await identity_told(device, await line.identify(device, priority=priority))
+        except DeviceException:
+            return _nameless(device)
+        except (ChecksumFault, WrongReply):
+            break
+        except RequestRefused:
+            return _nameless(device, (await _nameless_families(line, device, priority)).families)
+        except NoAnswer:
+            continue
+    else:
+        there = await _nameless_families(line, device, priority)
+    answer = await ask_identification(
+        line, device, partial(_is_intact, line, device, there, priority), priority=priority,
+        tries=left,
+    )  # fmt: skip
+    if answer is not None:
+        return await identity_told(device, answer)
+    return _nameless(device, there.families)
 
 
 async def identity_told(device: int, answer: IdentificationObjects) -> DriveIdentity:
     """Who a drive is by its answer to function 43; looks for fitting profiles in a thread."""
     return await asyncio.to_thread(identity_from, device, answer)
-
-
-async def _ask(line: Askable, device: int, priority: Priority) -> IdentificationObjects:
-    """Function 43; a person's question is asked again once, a lost reply is no absent drive."""
-    try:
-        return await line.identify(device, priority=priority)
-    except NoAnswer:
-        if priority >= Priority.BACKGROUND:
-            raise
-        return await line.identify(device, priority=priority)
 
 
 BY_IDENTIFICATION = {IDENTIFY: "function 43", REPORT_ID: "function 17"}
@@ -131,22 +119,30 @@ async def find_drive(
     other errors.
     """
     there = await _present(line, device, probes, priority, within)
+    try:
+        return await _identified(line, device, there, priority, patience)
+    except (ChecksumFault, WrongReply) as fault:
+        return ScanResult(device, _nameless(device), str(fault))
+
+
+async def _identified(
+    line: Askable, device: int, there: _Presence, priority: Priority, patience: float | None
+) -> ScanResult:
+    """Who it is that has shown to be at an address. Raises ChecksumFault, WrongReply."""
     likely = patience if there.families else None
+    control = partial(_is_intact, line, device, there, priority, likely)
     for function, how in BY_IDENTIFICATION.items():
-        try:
-            answer = there.objects if function == IDENTIFY else None
-            if answer is None:
-                answer = await line.identify(
-                    device, priority=priority, within=likely, function=function
-                )
-        except (DeviceException, NoAnswer, RequestRefused):
-            continue
-        if answer.objects.get(REFERENCE) or function == IDENTIFY:
+        answer = there.objects if function == IDENTIFY else None
+        if answer is None:
+            answer = await ask_identification(
+                line, device, control, priority=priority, within=likely, function=function,
+                tries=TRIES if function == IDENTIFY else 1,
+            )  # fmt: skip
+        if answer is not None and (answer.objects.get(REFERENCE) or function == IDENTIFY):
             return ScanResult(device, await identity_told(device, answer), by=how)
-    if there.families:
-        # that it has no such functions makes it no silent one: its last answer is what counts
-        with suppress(ExchangeError):
-            await line.read(device, there.register, 1, priority=priority, within=likely)
+    # that it has no such functions makes it no silent one: its last answer is what counts
+    if there.families and not await control():
+        raise NotIdentified(device)
     by = f"read of register {there.register}" if there.families else ""
     return ScanResult(device, _nameless(device, there.families), by=by)
 
@@ -159,6 +155,21 @@ class _Presence:
     families: tuple[str, ...] = ()
     """Ids of those that tell their state by the read that was answered."""
     objects: IdentificationObjects | None = None
+    damaged: bool = False
+    """True if nothing of what came was intact."""
+
+
+async def _is_intact(
+    line: Askable,
+    device: int,
+    there: _Presence,
+    priority: Priority,
+    within: float | None = None,
+) -> bool:
+    """True if a device answers once more what has shown that it is there."""
+    if there.damaged:
+        return False
+    return await intact(line.read(device, there.register, 1, priority=priority, within=within))
 
 
 async def _present(
@@ -169,21 +180,24 @@ async def _present(
     within: float | None,
 ) -> _Presence:
     """How somebody answers at an address, were it with a refusal. Raises NoAnswer."""
-    refused = False
+    refused = damaged = False
+    register = 0
     for probe in probes:
         try:
             if probe.register is None:
                 found = await line.identify(device, priority=priority, within=within)
                 return _Presence(objects=found)
             await line.read(device, probe.register, 1, priority=priority, within=within)
-        except (DeviceException, RequestRefused) as error:
-            refused |= isinstance(error, DeviceException)
-        except NoAnswer:
+        except DeviceException:
+            refused, register = True, probe.register or register
+        except (ChecksumFault, WrongReply):
+            damaged = True
+        except (NoAnswer, RequestRefused):
             continue
         else:
             return _Presence(probe.register or 0, probe.families)
-    if refused:
-        return _Presence()
+    if refused or damaged:
+        return _Presence(register, damaged=not refused)
     raise NoAnswer(device, IDENTIFY, 0)
 
 
@@ -210,25 +224,14 @@ def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
     )
 
 
-async def _nameless_families(line: Askable, device: int, priority: Priority) -> tuple[str, ...]:
+async def _nameless_families(line: Askable, device: int, priority: Priority) -> _Presence:
     """Profiles without function 43 whose status word the device lets be read.
 
     None of them where it only refuses: it is there. Raises NoAnswer where nothing answers.
     """
-    probes = await asyncio.to_thread(status_words_without_identification)
-    refused = False
-    for address, profiles in probes.items():
-        try:
-            await line.read(device, address, 1, priority=priority)
-        except DeviceException:
-            refused = True
-        except NoAnswer:
-            continue
-        else:
-            return profiles
-    if refused:
-        return ()
-    raise NoAnswer(device, IDENTIFY, 0)
+    found = await asyncio.to_thread(status_words_without_identification)
+    probes = tuple(PresenceProbe(address, profiles) for address, profiles in found.items())
+    return await _present(line, device, probes, priority, None)
 
 
 def status_words_without_identification() -> dict[int, tuple[str, ...]]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from tui.bus.api import IdentificationObjects, ModbusLine, Priority, Reply
+from tui.bus.api import IdentificationObjects, LineCounters, ModbusLine, Priority, Reply
 from tui.bus.errors import LineClosed, LineError, LineLost, NoAnswer
 from tui.bus.expectation import IDENTIFY
 from tui.drive.finding import PresenceProbe
@@ -238,6 +238,11 @@ class _Considerate:
     def __init__(self, line: ModbusLine, rests: Rests) -> None:
         self._line = line
         self._rests = rests
+
+    @property
+    def counters(self) -> LineCounters:
+        """As the line's own."""
+        return self._line.counters
 
     async def identify(
         self,

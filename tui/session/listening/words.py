@@ -146,11 +146,14 @@ def objects_told(exchange: HeardExchange) -> IdentificationObjects | None:
     """What a drive said of itself in an exchange of function 43; None where it said nothing."""
     if exchange.answer != "ok" or exchange.function != WHO or len(exchange.reply) < _OBJECTS_FROM:
         return None
-    reply, at, objects = exchange.reply, _OBJECTS_FROM, {}
+    objects: dict[int, bytes] = {}
+    reply, at = exchange.reply, _OBJECTS_FROM
     for _ in range(reply[_OBJECTS_FROM - 1]):
         if at + 2 > len(reply):
             break
         number, length = reply[at], reply[at + 1]
-        objects[number] = reply[at + 2 : at + 2 + length]
+        content = reply[at + 2 : at + 2 + length]
+        if objects.setdefault(number, content) != content:
+            return None  # two contents decide nothing
         at += 2 + length
     return IdentificationObjects(reply[3], objects)

@@ -1,0 +1,120 @@
+"""Asking a drive for its identification until it is clear what its answer is, or that none is."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+from tui.bus.api import IdentificationObjects, LineCounters, Priority, Reply
+from tui.bus.errors import (
+    ChecksumFault,
+    DeviceException,
+    ExchangeError,
+    NoAnswer,
+    RequestRefused,
+    WrongReply,
+)
+from tui.bus.expectation import IDENTIFY
+
+TRIES = 3
+"""Requests for one identification whose replies are lost or damaged."""
+
+ControlRead = Callable[[], Awaitable[bool]]
+"""Asks the device something that it answers; False if nothing intact came back."""
+
+
+class Askable(Protocol):
+    """As much of a line as it takes to ask who is there."""
+
+    @property
+    def counters(self) -> LineCounters:
+        """What has happened on the line so far."""
+        ...
+
+    async def identify(
+        self,
+        device: int,
+        *,
+        priority: Priority,
+        within: float | None = None,
+        function: int = IDENTIFY,
+    ) -> IdentificationObjects:
+        """Function 43, or 17."""
+        ...
+
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority,
+        within: float | None = None,
+    ) -> Reply:
+        """Function 3."""
+        ...
+
+
+class NotIdentified(ChecksumFault):
+    """Frames were lost or damaged while a device was asked who it is: nothing is decided."""
+
+    def __init__(self, device: int, function: int = IDENTIFY) -> None:
+        text = (
+            f"No identification of device {device} came through: frames were lost or damaged."
+            " Its family is not known; identify it again."
+        )
+        super().__init__(device, function, 0, text)
+
+
+async def ask_identification(
+    line: Askable,
+    device: int,
+    control: ControlRead,
+    *,
+    priority: Priority,
+    within: float | None = None,
+    function: int = IDENTIFY,
+    tries: int = TRIES,
+    silences: int = TRIES,
+) -> IdentificationObjects | None:
+    """The identification of a device that is there; None if it has none.
+
+    It has none if it refuses the function, or is silent `silences` times on a line that carried
+    all other frames intact. Raises ChecksumFault or WrongReply if nothing is decided.
+    """
+    damage = _damage(line)
+    unclear: ExchangeError | None = None
+    for _ in range(tries):
+        try:
+            return await line.identify(device, priority=priority, within=within, function=function)
+        except (DeviceException, RequestRefused):
+            return None
+        except (ChecksumFault, WrongReply) as error:
+            unclear = error
+        except NoAnswer:
+            if not await control():
+                unclear = NotIdentified(device, function)
+            silences -= 1
+            if not silences:
+                break
+    if unclear is not None:
+        raise unclear
+    if _damage(line) != damage:
+        raise NotIdentified(device, function)
+    return None
+
+
+async def intact(request: Awaitable[object]) -> bool:
+    """True if a device answers a request, were it with a refusal."""
+    try:
+        await request
+    except (DeviceException, RequestRefused):
+        return True
+    except ExchangeError:
+        return False
+    return True
+
+
+def _damage(line: Askable) -> int:
+    """Replies on the line that came damaged, or that were another's."""
+    return line.counters.checksum + line.counters.wrong
