@@ -10,12 +10,54 @@ TIMEOUT = "tests/session/test_timeout.py"
 IDENTITY = "tests/cli/test_identity.py"
 LEFT = "tests/cli/test_left_alone.py"
 
+BYTES = "tests/session/test_byte_order.py"
+
 DEFECTS = (
+    Defect(
+        "swapped-bytes-armed",
+        "tui/session/arming.py",
+        "        if why := self.trouble():\n",
+        "        if (why := self.trouble()) and False:\n",
+        "A motor is commanded by words whose bytes arrive swapped.",
+        (f"{BYTES}::test_swapped_bytes_refuse_arming_and_what_was_armed_before",),
+    ),
+    Defect(
+        "swapped-bytes-kept",
+        "tui/session/read/reader.py",
+        "        if (error := order.error) is not None:\n",
+        "        if (error := order.error) is not None and False:\n",
+        "HSP 6246.5 Hz is shown as a good value.",
+        (f"{BYTES}::test_monitor_of_swapped_bytes_shows_no_good_value",),
+    ),
+    Defect(
+        "one-word-means-swapped-bytes",
+        "tui/session/byte_order.py",
+        "REGISTERS = 3\n",
+        "REGISTERS = 1\n",
+        "A value out of its range takes a healthy drive from its person.",
+        (f"{BYTES}::test_values_read_anyway_show_that_bytes_are_swapped_from_now_on",),
+    ),
+    Defect(
+        "line-that-was-lost-not-checked-again",
+        "tui/session/byte_order.py",
+        "        self._was_away = self._tested\n",
+        "        self._was_away = False\n",
+        "Behind another gateway a motor is commanded by swapped words.",
+        (f"{BYTES}::test_line_that_was_lost_is_checked_again_before_a_command",),
+    ),
+    Defect(
+        "stop-by-a-value-of-no-chart",
+        "tui/drive/orders.py",
+        "return found if found is None or found.when is None or found.when.holds(raws) else None",
+        "return found",
+        "The stop word of Drivecom runs a motor in the I/O profile.",
+        (f"{BYTES}::test_stop_on_swapped_bytes_never_takes_the_word_of_another_chart",),
+    ),
     Defect(
         "contradicted-drive-armed",
         "tui/session/arming.py",
-        "return self._line.held or self.barred",
-        "return self._line.held",
+        "return self._line.held or self.barred or",
+        "return self._line.held or",
         "A drive is commanded by the words of another family.",
         (CONTRADICTION,),
     ),

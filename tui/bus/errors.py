@@ -161,6 +161,22 @@ class WrongReply(ExchangeError):
         super().__init__(device, function, address, f"{text}: {detail}." if detail else f"{text}.")
 
 
+class BytesSwapped(ExchangeError):
+    """The two bytes of each word of a device arrive swapped; `codes` are words that show it."""
+
+    def __init__(self, device: int, codes: Sequence[str]) -> None:
+        self.codes = tuple(codes)
+        shown = ", ".join(self.codes[:4])
+        super().__init__(
+            device,
+            3,
+            0,
+            f"The bytes of each word of device {device} arrive swapped: {shown} make sense only the"
+            " other way round. Check the byte order setting of the gateway or converter."
+            " Only stops are sent.",
+        )
+
+
 class DeviceException(ExchangeError):
     """The device refused the request with a Modbus exception `code`; `meaning` says why."""
 

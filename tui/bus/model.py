@@ -19,7 +19,7 @@ from .bounds import (
     Seconds,
     Text,
 )
-from .errors import ChecksumFault, DeviceException, NoAnswer, WrongReply
+from .errors import BytesSwapped, ChecksumFault, DeviceException, NoAnswer, WrongReply
 
 
 class Priority(IntEnum):
@@ -57,8 +57,9 @@ class LineState:
     """When a lost line is tried again."""
 
 
-Contact = Literal["answers", "not_polled", "silent", "refused", "damaged"]
-"""Result of the last request to a device; `not_polled` if none was sent."""
+Contact = Literal["answers", "not_polled", "silent", "refused", "damaged", "swapped"]
+"""Result of the last request to a device; `not_polled` if none was sent, `swapped` if the bytes
+of its words arrive swapped."""
 
 
 def contact_of(error: BaseException) -> Contact:
@@ -68,6 +69,8 @@ def contact_of(error: BaseException) -> Contact:
             return "silent"
         case ChecksumFault() | WrongReply():
             return "damaged"
+        case BytesSwapped():
+            return "swapped"
         case DeviceException():
             return "refused"
         case _:

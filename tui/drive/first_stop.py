@@ -184,6 +184,7 @@ def _charts(family: StopFacts, known: Mapping[str, int]) -> list[Chart]:
     if sure:
         return sure
     may = [one for one in family.charts if one.when is None or one.when.holds(known) is None]
+    may = may or list(family.charts)  # a value of no chart decides nothing
     return [one for one in may if one.orders]
 
 

@@ -26,8 +26,12 @@ class OrderRefused(DriveError):
 
 
 def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
-    """The chart that surely holds; None while the word that decides between charts is unknown."""
-    return profile.chart(raws) if raws.keys() >= set(chart_codes(profile)) else None
+    """The chart that surely holds; None while the word that decides between charts is unknown.
+
+    It is unknown, too, while it holds a value of no chart.
+    """
+    found = profile.chart(raws) if raws.keys() >= set(chart_codes(profile)) else None
+    return found if found is None or found.when is None or found.when.holds(raws) else None
 
 
 def chart_codes(profile: Profile) -> list[str]:
@@ -94,7 +98,10 @@ def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order
     On its ramp where one word does that in all of them, else faster, else coasting. Raises
     OrderRefused where no word stops in all.
     """
-    charts = [chart for chart in profile.data.charts if chart.orders and _may_hold(chart, raws)]
+    ordered = [chart for chart in profile.data.charts if chart.orders]
+    may_hold = [chart for chart in profile.data.charts if _may_hold(chart, raws)]
+    # a value of no chart decides nothing
+    charts = [chart for chart in ordered if chart in may_hold] if may_hold else ordered
     for id in GENTLE_FIRST:
         for chart in charts:
             for order in chart.orders:

@@ -45,6 +45,8 @@ class Arming:
         self._why = ""
         self.times = 0
         """How often it was armed."""
+        self.trouble: Callable[[], str] = str
+        """Returns what is wrong with the drive's replies so that nothing may be written now."""
         self.barred = ""
         """Why the drive is not to be armed at all, for a person; empty where it may be."""
 
@@ -70,7 +72,7 @@ class Arming:
         """Why the drive cannot be armed now, whatever a person does here; empty if it can."""
         if self._line.read_only:
             return "The line is read-only: nothing is written."
-        return self._line.held or self.barred
+        return self._line.held or self.barred or self.trouble()
 
     def disarm(self, why: str = "") -> None:
         """Let no write through any more."""
@@ -101,6 +103,9 @@ class Arming:
             return None
         if self._line.held:
             self.disarm(self._line.held)
+            return None
+        if why := self.trouble():
+            self.disarm(why)
             return None
         return math.inf if until == math.inf else until - self._clock.monotonic()
 

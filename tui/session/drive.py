@@ -12,6 +12,7 @@ from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 
 from .arming import Arming
+from .byte_order import ByteOrder
 from .care_data import packed_care
 from .clock import REAL_CLOCK, Clock
 from .connect.contradiction import contradiction
@@ -61,6 +62,9 @@ class DriveSession:
         """How the drive contradicts its profile by what it says of itself; empty if it does not."""
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
+        self.byte_order = ByteOrder(device)
+        """Whether the bytes of its words arrive as they should."""
+        self.arming.trouble = lambda: self.byte_order.text
         self.work = WorkQueue(line, device, self.arming, clock)
         """What is being done to it; a stop ends it."""
         self.work.on_change = self.stir

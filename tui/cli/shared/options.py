@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
@@ -237,10 +237,23 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     if session.contradiction:
         _believe_the_person(session, target)
     mind_the_drive(opened, target.device, told, "" if session.contradiction else profile.id)
+    await _check_byte_order(session)
     await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session
+
+
+async def _check_byte_order(session: DriveSession) -> None:
+    """See how the words of a drive arrive that is there; what is wrong ends its first read."""
+    from tui.bus.api import Priority
+    from tui.bus.errors import LineError
+    from tui.session.read.order_check import check_byte_order
+    from tui.session.read.reader import Reader
+
+    if session.line.device_state(session.device).heard is not None:
+        with suppress(LineError):
+            await check_byte_order(Reader(session), Priority.OPERATOR_READ)
 
 
 def _believe_the_person(session: DriveSession, target: Target) -> None:

@@ -24,6 +24,7 @@ VAIN: Mapping[str, tuple[str, str]] = {
     "silent": ("no answer", "lost"),
     "refused": ("refuses", "refuses"),
     "damaged": ("damaged", "damaged"),
+    "swapped": ("swapped", "swapped"),
     "not_polled": ("not polled", "not polled"),
 }
 """Words for a look in vain: at first, and once nothing is current any more."""

@@ -6,6 +6,7 @@ import warnings
 from types import TracebackType
 from typing import Self
 
+from tui.bus.api import Priority
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
@@ -17,6 +18,8 @@ from ..connect.open_line import OpenLine, open_line
 from ..drive import DriveSession
 from ..fleet import Fleet
 from ..journal import Journal
+from ..read.order_check import check_byte_order
+from ..read.reader import Reader
 from ..sharing.guardian import Guardian
 from ..teaching.teacher import Teacher
 from .drive import Drive
@@ -87,6 +90,7 @@ class DriveLine:
         session = DriveSession(line, address, found, told)
         if session.contradiction:
             raise Contradiction(session.contradiction)
+        await check_byte_order(Reader(session), Priority.OPERATOR_READ)
         if self._opened.known is not None:
             self._opened.known.note(told, address, found.id)
         return session

@@ -21,6 +21,7 @@ from tui.drive.values import from_words
 
 from ..drive import DriveSession
 from ..journal import Journal
+from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
@@ -58,7 +59,10 @@ class CommandAccess:
 
     async def read(self, codes: list[str]) -> Mapping[str, Reading]:
         """Readings by code, as a person's request."""
-        return await Reader(self.session).read(codes, priority=Priority.OPERATOR_READ)
+        reader = Reader(self.session)
+        if self.session.byte_order.is_suspect:
+            await check_byte_order(reader, Priority.OPERATOR_READ)
+        return await reader.read(codes, priority=Priority.OPERATOR_READ)
 
     async def chart(self, wanted: OrderId | None = None) -> Chart:
         """The chart in force, with every word read anew that a command depends on.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from tui.bus.api import Priority
-from tui.bus.errors import ExchangeError
+from tui.bus.errors import ChecksumFault, ExchangeError, NoAnswer, WrongReply
 from tui.drive.chart import state_of
 from tui.drive.orders import (
     OrderRefused,
@@ -27,6 +28,7 @@ from tui.drive.values import from_words
 from ..connect.limits import limits_of
 from ..drive import DriveSession
 from ..drive_state import STATE_FRESH
+from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
@@ -226,6 +228,8 @@ class MotorStop:
 
     async def _follow(self, chart: Chart, order: Order) -> str | None:
         """See the motor stop; returns why it does not, or nothing."""
+        with suppress(NoAnswer, ChecksumFault, WrongReply):  # BytesSwapped ends it: nothing is seen
+            await check_byte_order(self.reader, Priority.OPERATOR_READ)
         progress, before = self.session.clock.monotonic(), None
         ending = last_word(chart, order)
         while (now := self.session.clock.monotonic()) - self.ordered < SEEN_FOR:

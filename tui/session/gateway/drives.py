@@ -9,7 +9,7 @@ from contextlib import suppress
 from math import inf
 
 from tui.bus.api import LineState, LineStatus, ModbusLine, Priority
-from tui.bus.errors import LineError
+from tui.bus.errors import BytesSwapped, LineError
 from tui.bus.limits import MAX_READ, Limits
 from tui.drive.foreign_write import WordKind, foreign_words
 from tui.drive.orders import chart_codes
@@ -20,6 +20,8 @@ from ..connect.contradiction import own_words
 from ..connect.identify import DriveIdentity, identify_drive
 from ..connect.known_lines import line_name, load_memory
 from ..drive import DriveSession
+from ..read.order_check import check_byte_order
+from ..read.reader import Reader
 
 log = logging.getLogger(__name__)
 
@@ -198,6 +200,12 @@ class GatewayDrives:
         session = DriveSession(self.line, device, profile, identity)
         if session.contradiction:
             log.warning("%s It is read only.", session.contradiction)
+            return self._take(device, None, losses)
+        try:
+            await check_byte_order(Reader(session), self._patience(device))
+        except BytesSwapped as error:
+            log.warning("%s Its clients read and stop it only.", error)
+            self._candidates[device] = (profile.id,)
             return self._take(device, None, losses)
         self._note(device, identity, profile.id)
         return self._take(device, session, losses)

@@ -133,7 +133,7 @@ class GatewayWrite:
     async def _check(self, words: list[ForeignWord]) -> None:
         """Raise Unanswerable where the request is not allowed as a whole."""
         self._commands = any(one.kind is WordKind.COMMAND for one in words)
-        if why := self._voided():
+        if why := self._voided() or self._session.byte_order.text:
             self._refuse(BUSY, why)
         drive = await self._line.drives.found(self._session.device)
         if drive is None or drive.profile.id != self._session.profile.id:

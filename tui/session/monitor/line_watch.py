@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
 
 from tui.bus.api import Contact, LineWorker, ModbusLine, Priority, contact_of
-from tui.bus.errors import LineError
+from tui.bus.errors import LineError, LineLost
 from tui.bus.keep_alive import READS_PER_TIMEOUT
 from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, watched_codes
@@ -23,6 +23,7 @@ from tui.drive.profile.schema import Quantity
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
+from ..read.order_check import check_byte_order
 from ..read.presence import UNKNOWN_TIMEOUT, alive_read
 from ..read.reader import Reader
 from ..timeout_told import TimeoutWatch
@@ -213,7 +214,9 @@ class LineWatch:
         while True:
             try:
                 rest = await step(kept)
-            except LineError:
+            except LineError as error:
+                if isinstance(error, LineLost):
+                    kept.session.byte_order.forget()
                 rest = self._after_failure(kept)
             except Exception:
                 # what goes wrong with one drive must not leave the others alone
@@ -262,7 +265,8 @@ class LineWatch:
         return max(GLANCE, GLANCE_EACH * len(self._kept))
 
     async def _learn(self, kept: _Kept) -> float:
-        """Read the drive's time-out and its reaction."""
+        """Read the drive's time-out and its reaction; before that, how its words arrive."""
+        await check_byte_order(kept.reader, Priority.POLL)
         found = await read_timeout(kept.reader, Priority.POLL, deciding_codes(kept.session.profile))
         kept.session.timeout = found
         kept.watch, kept.learned = found.watch, kept.session.clock.monotonic()

@@ -192,6 +192,8 @@ class Monitor:
                 except (LineError, DriveError) as fault:
                     error, contact = str(fault), contact_of(fault)
                     failures += 1
+                    if contact == "swapped":
+                        readings = self._none_good((*rates.fast, *rates.seldom), error)
                     begun.clear()
                     due.failed(self.reader.groups)
                     if self._may_be_another(fault, failures):
@@ -210,6 +212,11 @@ class Monitor:
                 await self.session.clock.sleep(period if error else max(0.0, rest))
         finally:
             self.line.pace.release(self)
+
+    def _none_good(self, codes: Sequence[str], error: str) -> dict[str, Reading]:
+        """No value of these is to be shown, and why."""
+        now = self.session.clock.monotonic()
+        return {code: Reading.bad(self.profile[code], now, error) for code in codes}
 
     def _period(self, rates: Rates) -> float:
         """The target cycle time, longer where the line cannot keep it for all."""

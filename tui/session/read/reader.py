@@ -33,7 +33,7 @@ class Reader:
     """Reads parameters of one drive into its image.
 
     Raises the line's errors for all but a drive's refusal, which makes only the refused
-    parameter bad.
+    parameter bad; BytesSwapped while the bytes of its words arrive swapped.
     """
 
     session: DriveSession
@@ -99,6 +99,7 @@ class Reader:
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
         self.session.image.distrust()
+        self.session.byte_order.forget()
         self._plans.clear()
         self._met.clear()
         self._slots.forget()
@@ -160,8 +161,17 @@ class Reader:
             found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
+        self._check_byte_order(found)
         image.take(found)
         return found
+
+    def _check_byte_order(self, found: Mapping[str, Reading]) -> None:
+        """Keep nothing of a drive whose words arrive with swapped bytes. Raises BytesSwapped."""
+        order = self.session.byte_order
+        order.note(self.profile, found, self.session.clock.monotonic())
+        if (error := order.error) is not None:
+            self.session.image.forget()
+            raise error
 
     async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Reading]:
         """Values of a plan; those of a block whose slots have changed meanwhile are left out."""

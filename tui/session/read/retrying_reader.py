@@ -14,6 +14,7 @@ from tui.drive.profile.schema import StateKind
 from ..drive import DriveSession
 from ..drive_state import drive_state
 from ..reading import Reading
+from .order_check import check_byte_order
 from .reader import Reader
 
 READ_TRIES = 3
@@ -73,6 +74,8 @@ class RetryingReader:
         wanted = list(dict.fromkeys(codes))
         for tried in range(1, READ_TRIES + 1):
             try:
+                if self.session.byte_order.is_suspect:
+                    await check_byte_order(self.reader, self.priority)
                 readings = await self.reader.read(wanted, priority=self.priority)
             except (NoAnswer, ChecksumFault, WrongReply) as error:
                 if tried == READ_TRIES:

@@ -1,0 +1,86 @@
+"""Commands on a line that swaps the two bytes of each word: reported, refused, stopped."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from .commands import ended, invoked, tcp_line
+
+TEXT = "The bytes of each word of device 2 arrive swapped"
+
+
+@pytest.fixture
+def line() -> Iterator[str]:
+    """An Altivar 71 at address 2 behind a gateway that swaps."""
+    with tcp_line("atv71@2", "--line-fault", "swapped=1") as text:
+        yield text
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("read", "HSP", "ETA"),
+        ("status",),
+        ("backup", "set.toml"),
+        ("report", "report.txt"),
+    ],
+)
+def test_values_of_swapped_bytes_are_not_shown(
+    line: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command, *rest = words
+    text = ended(3, command, line, *rest, "-d", "2").stderr
+    assert TEXT in text
+    assert "byte order setting of the gateway or converter" in text
+    assert not [*tmp_path.glob("set.*"), *tmp_path.glob("report.*")]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("reference", "30"),
+        ("write", "ACC=5"),
+        ("reset",),
+    ],
+)
+def test_commands_and_settings_are_refused(line: str, words: tuple[str, ...]) -> None:
+    command, *rest = words
+    assert TEXT in ended(3, command, line, *rest, "-d", "2", "--arm").stderr
+    assert "The journal is empty" in ended(0, "journal").stdout
+
+
+def test_run_is_refused(line: str) -> None:
+    words = ("run", line, "-d", "2", "--reference", "30Hz", "--arm")
+    done = subprocess.run(
+        [sys.executable, "-m", "tui", *words], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 3, done.stderr
+    assert TEXT in done.stderr
+    assert "The journal is empty" in ended(0, "journal").stdout
+
+
+def test_stop_is_sent_and_not_reported_as_done(line: str) -> None:
+    done = invoked("stop", line, "-d", "2")
+    assert done.exit_code not in (0, 5)
+    assert "NOT STOPPED" in done.output
+    assert TEXT in done.output
+    text = ended(0, "journal").stdout
+    assert "CMD" in text
+
+
+def test_json_of_watch_tells_it_with_the_quality_of_the_values(line: str) -> None:
+    done = invoked("watch", line, "-d", "2", "--json", "--count", "2")
+    rows = [json.loads(row) for row in done.stdout.splitlines()]
+    cycles = [one for one in rows if "values" in one]
+    assert cycles
+    for one in cycles:
+        assert TEXT in one["error"]
+        assert one["contact"] == "swapped"
+        assert {value["quality"] for value in one["values"].values()} == {"bad"}

@@ -1,0 +1,270 @@
+"""Words whose bytes arrive swapped: seen, told, and no command sent; stops go out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import product
+
+import pytest
+
+from tui.bus.api import Priority
+from tui.bus.errors import BytesSwapped
+from tui.bus.line import Line
+from tui.bus.link import Link, RtuTcpLink, SerialLink, TcpLink
+from tui.drive.byte_order import only_swapped, swapped_word, telling_codes
+from tui.drive.orders import OrderRefused, chart_in_force, stop_in_any
+from tui.drive.profile import library
+from tui.drive.values import is_enumeration, is_field, raw_range, to_words, word_count
+from tui.session.command.access import CommandAccess
+from tui.session.command.given import GivenCommands
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.session.monitor.monitor import Monitor
+from tui.session.read.order_check import check_byte_order
+from tui.session.read.reader import Reader
+from tui.session.read.retrying_reader import RetryingReader
+from tui.session.read.upload import readable_codes
+from tui.session.reading import Quality
+from tui.session.work import Permit
+from tui.simulator import DriveSpec, FaultRates, Simulation
+
+from .sets_bench import FAMILIES
+from .test_stop import wait_for, writes
+
+SWAPPED = FaultRates(swapped=1.0)
+HEALTHY = FaultRates()
+LINES = ("pty", "rtu-tcp", "tcp")
+
+
+@contextmanager
+def line_to(
+    spec: DriveSpec, faults: FaultRates = SWAPPED, kind: str = "rtu-tcp"
+) -> Iterator[tuple[Simulation, Line, DriveSession]]:
+    """A simulated drive on an open line."""
+    with Simulation([spec], faults=faults) as simulation:
+        link: Link
+        match kind:
+            case "pty":
+                link = SerialLink(simulation.serve_pty())
+            case "tcp":
+                link = TcpLink(*simulation.serve_tcp())
+            case _:
+                link = RtuTcpLink(*simulation.serve_rtu_tcp())
+        line = Line(link)
+        try:
+            line.open(wait=5.0)
+            yield simulation, line, DriveSession(line, spec.address, library.load(spec.profile))
+        finally:
+            line.close()
+
+
+def mend(simulation: Simulation) -> None:
+    """The gateway is set up as it should be."""
+    simulation.faults.rates = HEALTHY
+
+
+async def check(session: DriveSession) -> None:
+    await check_byte_order(Reader(session), Priority.OPERATOR_READ)
+
+
+@pytest.mark.parametrize(
+    ("family", "kind"), [*product(FAMILIES, ["tcp"]), *product(["atv71"], LINES)]
+)
+async def test_swapped_bytes_are_reported_at_the_connection(family: str, kind: str) -> None:
+    with line_to(DriveSpec(family, 2), kind=kind) as (_, _, session):
+        with pytest.raises(BytesSwapped, match="The bytes of each word of device 2 arrive swapped"):
+            await check(session)
+        assert "byte order setting of the gateway" in session.byte_order.text
+
+
+async def test_swapped_bytes_refuse_arming_and_what_was_armed_before() -> None:
+    with line_to(DriveSpec("atv71", 2)) as (_, line, session):
+        session.arming.arm()
+        permit = Permit(session.work, session.work.stops)
+        permit.check()
+        with pytest.raises(BytesSwapped):
+            await check(session)
+        with pytest.raises(OrderRefused, match="arrive swapped"):
+            permit.check()
+        with pytest.raises(OrderRefused, match="arrive swapped"):
+            session.arming.arm()
+        assert writes(line) == []
+
+
+@pytest.mark.parametrize("kind", LINES)
+async def test_monitor_of_swapped_bytes_shows_no_good_value(kind: str) -> None:
+    with line_to(DriveSpec("atv71", 2, run_hz=20.0), kind=kind) as (simulation, _, session):
+        monitor = Monitor(session)
+        with pytest.raises(BytesSwapped):
+            await check(session)
+        monitor.start(period=0.05)
+        await wait_for(lambda: monitor.latest is not None)
+        snapshot = monitor.latest
+        assert snapshot is not None
+        assert snapshot.contact == "swapped"
+        assert "arrive swapped" in snapshot.error
+        assert {one.quality for one in snapshot.readings.values()} == {Quality.BAD}
+        assert snapshot.state.kind == "unknown"
+        assert session.image.raws == {}
+        mend(simulation)
+        await wait_for_order(session)
+        await wait_for(lambda: monitor.latest is not None and not monitor.latest.error)
+        monitor.stop()
+
+
+async def wait_for_order(session: DriveSession) -> None:
+    """The settings of a mended line show that words arrive as they should."""
+    await check(session)
+    assert session.byte_order.error is None
+
+
+async def test_values_read_anyway_show_that_bytes_are_swapped_from_now_on() -> None:
+    with line_to(DriveSpec("atv31", 2), HEALTHY) as (simulation, _, session):
+        await check(session)
+        assert not session.byte_order.is_doubtful
+        simulation.faults.rates = SWAPPED
+        await Reader(session).read(["ttO"])
+        assert session.byte_order.is_doubtful, "one word proves nothing, and asks for more"
+        assert not session.byte_order.text
+        with pytest.raises(BytesSwapped):
+            await check(session)
+
+
+async def test_line_that_was_lost_is_checked_again_before_a_command() -> None:
+    with line_to(DriveSpec("atv71", 2), HEALTHY) as (simulation, line, session):
+        await check(session)
+        session.arming.arm()
+        simulation.faults.rates = SWAPPED
+        Reader(session).forget()
+        given = GivenCommands(session)
+        access = CommandAccess(session, Journal(), given, Permit(session.work, session.work.stops))
+        with pytest.raises(BytesSwapped):
+            await access.chart("forward")
+        assert not session.arming.armed
+        with pytest.raises(BytesSwapped):
+            await RetryingReader(session).ask(["ACC"])
+        assert writes(line) == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_stop_goes_out_on_swapped_bytes_and_is_never_reported_as_done(family: str) -> None:
+    spec = DriveSpec(family, 1)
+    with line_to(spec) as (_, line, session):
+        stopper = Stopper(line, Journal())
+        stopper.stop([session])
+        await wait_for(lambda: bool(stopper.reports) and stopper.reports[1].phase is Phase.FAILED)
+        assert "arrive swapped" in stopper.reports[1].text
+        chart, order = stop_in_any(session.profile, {})
+        assert writes(line)
+        assert {word for _, word in writes(line)} <= {
+            *(word & 0xFFFF for word in order.words),
+            *(word & 0xFFFF for o in chart.orders if o.id == "stop" for word in o.words),
+        }
+
+
+async def test_stop_on_swapped_bytes_never_takes_the_word_of_another_chart() -> None:
+    """16#0300 is CHCF 3 swapped: no chart; the words of Drivecom run a motor in the I/O profile."""
+    with line_to(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0})) as (simulation, line, session):
+        stopper = Stopper(line, Journal())
+        stopper.stop([session])
+        await wait_for(lambda: bool(stopper.reports) and stopper.reports[1].phase is Phase.FAILED)
+        assert {word for _, word in writes(line)} == {0}
+        assert simulation.drive(1).motor.frequency == 0
+
+
+def test_a_value_of_no_chart_decides_nothing() -> None:
+    profile = library.load("atv71")
+    assert chart_in_force(profile, {"CHCF": 0x0300}) is None
+    found = chart_in_force(profile, {"CHCF": 3})
+    assert found is not None
+    assert found.id == "io"
+    assert stop_in_any(profile, {"CHCF": 0x0300}) == stop_in_any(profile, {})
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_stop_word_that_arrives_swapped_runs_no_motor(family: str) -> None:
+    """A gateway that swaps what is written too: each stop word, at rest."""
+    with line_to(DriveSpec(family, 1), HEALTHY) as (simulation, line, session):
+        words = {
+            (session.profile[order.parameter or chart.command].address, word & 0xFFFF)
+            for chart in session.profile.data.charts
+            for order in chart.orders
+            if order.id in ("stop", "quick-stop", "freewheel", "emergency-stop")
+            for word in order.words
+        }
+        for address, word in sorted(words):
+            await line.write(1, address, [swapped_word(word)], multiple=None)
+            await asyncio.sleep(0.3)
+            assert simulation.drive(1).motor.frequency == 0, f"16#{word:04X}"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("state", ["rest", "running", "fault"])
+async def test_healthy_drive_shows_no_swapped_word(family: str, state: str) -> None:
+    spec = DriveSpec(family, 1, run_hz=20.0 if state == "running" else 0.0)
+    with line_to(spec, HEALTHY) as (simulation, _, session):
+        if state == "fault":
+            codes = session.profile.data.faults.codes
+            simulation.drive(1).provoke(next((one.raw for one in codes if one.raw), 1))
+        if state == "running":
+            await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+        await check(session)
+        reader = Reader(session)
+        every = readable_codes(session.profile)
+        for at in range(0, len(every), 20):
+            await reader.read(every[at : at + 20])
+        shown = session.byte_order._seen
+        assert len(shown) >= 4
+        assert [code for code, (swapped, _) in shown.items() if swapped] == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_value_in_its_documented_range_is_never_one_swapped(family: str) -> None:
+    profile = library.load(family)
+    judged = 0
+    for one in profile.parameters:
+        if word_count(one) != 1 or is_field(one):
+            continue
+        low, high = raw_range(one)
+        if is_enumeration(one):
+            raws = set(profile.names(one))
+        else:
+            raws = {
+                low,
+                high,
+                (low + high) // 2,
+                one.factory or low,
+                *range(low, min(high, low + 300)),
+            }
+        for raw in raws:
+            to_words(one, raw)
+            judged += 1
+            assert only_swapped(profile, one, raw) is not True, f"{one.code} {raw}"
+    assert judged > 100
+
+
+def test_words_that_are_as_good_both_ways_say_nothing() -> None:
+    profile = library.load("atv71")
+    baud = profile["TBR"]
+    assert only_swapped(profile, baud, 32) is False
+    assert only_swapped(profile, baud, 32 << 8) is True
+    assert only_swapped(profile, baud, 0x0101) is None
+    assert only_swapped(profile, baud, 0x4242) is None
+    assert only_swapped(profile, profile["THD"], 0x8000) is None, "no value"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_family_has_settings_that_show_the_order(family: str) -> None:
+    assert len(telling_codes(library.load(family))) >= 5
+
+
+async def test_three_odd_words_of_a_healthy_drive_change_nothing() -> None:
+    sets = {"TBR": 32 << 8, "TFO": 3 << 8, "TTO": 100 << 8}
+    with line_to(DriveSpec("atv71", 2, sets=sets), HEALTHY) as (_, _, session):
+        await check(session)
+        assert sum(swapped for swapped, _ in session.byte_order._seen.values()) == 3
+        assert not session.byte_order.text

@@ -1,0 +1,70 @@
+"""Whether the bytes of words arrive swapped, by what a profile documents. Pure functions."""
+
+from __future__ import annotations
+
+from .profile.profile import Profile, is_verified
+from .profile.schema import Parameter, Quantity
+from .values import from_words, is_enumeration, is_field, raw_range, word_count
+
+USUAL_SETTINGS: tuple[Quantity, ...] = (
+    "line_address",
+    "high_speed",
+    "max_frequency",
+    "rated_frequency",
+)
+"""Settings that have a narrow range on every family, and are hardly ever 0."""
+
+ENOUGH = 5
+"""Settings that are read to see the order."""
+
+
+def swapped_word(word: int) -> int:
+    """A word with its two bytes the other way round."""
+    return (word >> 8 | word << 8) & 0xFFFF
+
+
+def only_swapped(profile: Profile, parameter: Parameter, raw: int) -> bool | None:
+    """True if a raw value makes sense only with its bytes swapped, False if only as it came.
+
+    None if both make sense, or neither, or if no manual says what makes sense.
+    """
+    if not _has_limits(profile, parameter):
+        return None
+    word = raw & 0xFFFF
+    if profile.data.reading.unknown_word in (word, swapped_word(word)):
+        return None  # the drive has no value for it
+    came = _makes_sense(profile, parameter, word)
+    return None if came == _makes_sense(profile, parameter, swapped_word(word)) else not came
+
+
+def telling_codes(profile: Profile) -> tuple[str, ...]:
+    """Settings of which nearly every value shows how its bytes arrive: those of the line first."""
+    roles: dict[str, str] = {}
+    for setting in profile.data.link.settings:
+        roles.setdefault(setting.role, setting.parameter)  # of the first port: others may lack
+    first = (profile.get(code) for code in roles.values())
+    more = (profile.quantity(quantity) for quantity in USUAL_SETTINGS)
+    found = [one.code for one in (*first, *more) if one is not None and _has_limits(profile, one)]
+    return tuple(dict.fromkeys(found))[:ENOUGH]
+
+
+def _has_limits(profile: Profile, parameter: Parameter) -> bool:
+    """True if a manual names the values that a whole word can have."""
+    if word_count(parameter) != 1 or is_field(parameter) or parameter.bits:
+        return False
+    if not is_verified(parameter) or parameter.access == "w":
+        return False
+    if is_enumeration(parameter):
+        return bool(profile.names(parameter))
+    grounds = parameter.limit_grounds
+    if grounds is not None and grounds.confidence in ("analogy", "unverified"):
+        return False
+    return parameter.min is not None and parameter.max is not None
+
+
+def _makes_sense(profile: Profile, parameter: Parameter, word: int) -> bool:
+    raw, names = from_words(parameter, [word]), profile.names(parameter)
+    if is_enumeration(parameter):
+        return raw in names
+    low, high = raw_range(parameter)
+    return low <= raw <= high or raw in names
