@@ -143,7 +143,7 @@ async def test_line_that_was_lost_is_checked_again_before_a_command() -> None:
         given = GivenCommands(session)
         access = CommandAccess(session, Journal(), given, Permit(session.work, session.work.stops))
         with pytest.raises(BytesSwapped):
-            await access.chart("forward")
+            await access.read(["RFR"])
         assert not session.arming.armed
         with pytest.raises(BytesSwapped):
             await RetryingReader(session).ask(["ACC"])
