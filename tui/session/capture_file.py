@@ -7,8 +7,11 @@ import os
 from pathlib import Path
 
 import tui
+from tui.bus.api import Frame
 from tui.wire.capture.forms import ModbusTcpForm, Packet, PacketForm, RtuForm
 from tui.wire.capture.pcapng import interface_block, packet_block, section_block
+from tui.wire.frames import is_whole
+from tui.wire.pdu import MBAP_BYTES, pdu_of
 
 
 class CaptureFile:
@@ -29,6 +32,16 @@ class CaptureFile:
         except OSError:
             self._file.close()
             raise
+
+    def add_seen(self, frame: Frame, wall: float, *, tcp: bool) -> None:
+        """Add a frame of a line, which is Modbus `tcp` or RTU; or its bytes if they form none."""
+        pdu = pdu_of(frame.data, tcp=tcp)
+        whole = len(frame.data) > MBAP_BYTES if tcp else is_whole(frame.data)
+        if pdu is None or not whole:
+            self.add_noise(frame.data, wall)
+            return
+        body = bytes([pdu.function]) + pdu.body
+        self.add_frame(pdu.device, body, wall, request=frame.direction == "out")
 
     def add_frame(self, device: int, pdu: bytes, wall: float, *, request: bool) -> None:
         """Add a whole frame; `wall` is its time in seconds since 1970."""

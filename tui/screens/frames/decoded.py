@@ -11,26 +11,15 @@ from tui.drive.profile.profile import Profile
 from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
 from tui.session.listening.words import FUNCTION_NAMES
+from tui.wire.pdu import Pdu, pdu_of
 
 READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE = 3, 4, 6, 16, 23
 EXCEPTION_BIT = 0x80
-MBAP_BYTES = 7
-"""Bytes before the function code on Modbus TCP."""
-SHORTEST_PDU = 2
 CODES_TOLD = 3
 """Parameters of a request that are named; the others are counted."""
 
 ProfileOf = Callable[[int], Profile | None]
 RawsOf = Callable[[int], Mapping[str, int]]
-
-
-@dataclass(frozen=True, slots=True)
-class Pdu:
-    """Device, function and what stands behind it."""
-
-    device: int
-    function: int
-    body: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +30,6 @@ class Asked:
     function: int
     address: int
     count: int
-
-
-def pdu_of(data: bytes, *, tcp: bool) -> Pdu | None:
-    """The parts of a frame; None of bytes that form none."""
-    if tcp:
-        return Pdu(data[6], data[7], data[8:]) if len(data) > MBAP_BYTES else None
-    return Pdu(data[0], data[1], data[2:-2]) if len(data) >= SHORTEST_PDU + 2 else None
 
 
 def decoded(

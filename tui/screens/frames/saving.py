@@ -10,9 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from tui.bus.api import Frame
 from tui.session.capture_file import CaptureFile
 from tui.session.paths import state_folder
-from tui.wire.frames import is_whole
-
-from .decoded import MBAP_BYTES, pdu_of
 
 if TYPE_CHECKING:
     from ..app_port import Panel
@@ -84,17 +81,7 @@ def save_frames(path: Path, kept: KeptFrames) -> int:
     file = CaptureFile(path, kept.line, raw=raw)
     try:
         for frame in kept.frames:
-            _add(file, frame, kept.since_epoch + frame.time, tcp=kept.tcp)
+            file.add_seen(frame, kept.since_epoch + frame.time, tcp=kept.tcp)
     finally:
         file.close()
     return file.packets
-
-
-def _add(file: CaptureFile, frame: Frame, wall: float, *, tcp: bool) -> None:
-    pdu = pdu_of(frame.data, tcp=tcp)
-    whole = len(frame.data) > MBAP_BYTES if tcp else is_whole(frame.data)
-    if pdu is None or not whole:
-        file.add_noise(frame.data, wall)
-        return
-    body = bytes([pdu.function]) + pdu.body
-    file.add_frame(pdu.device, body, wall, request=frame.direction == "out")
