@@ -68,6 +68,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
     "a write that is refused": (5, ("write", *DRIVE, "BIR=1", "--arm"), "WriteTold"),
     "a backup": (0, ("backup", *DRIVE, "FOLDER/new.toml"), "BackupTold"),
     "a report": (0, ("report", *DRIVE, "FOLDER/new.md"), "ReportTold"),
+    "a bundle": (0, ("bundle", DRIVE[0], "--output", "FOLDER/new.zip"), "BundleDocument"),
     "a plan": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--dry-run", *DRIVE[1:]),
                "RestoreTold"),
     "a restoring": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--arm", *DRIVE[1:]),

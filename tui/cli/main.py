@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "backup": ("backup", "Write the settings of a drive to a file."),
     "block": ("block", "Show or change a drive's blocks or scanner."),
+    "bundle": ("bundle", "Collect all about a line in one file."),
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
     "counters": ("counters", "Count the frames to a drive, and ask for its own counts."),
     "demo": ("panel", "Open the panel on five simulated drives that run."),

@@ -8,16 +8,18 @@ import sys
 import threading
 import time
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 
 import msgspec
 
-from tui.bus.line import Line
+from tui.bus.line import Line, timing_of
 from tui.bus.link import parse_link
 from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER
 from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
 from tui.bus.share.keeping import KeeperOrder
+from tui.bus.share.line_past import FRAMES_KEPT
 from tui.bus.share.messages import VERSION
 from tui.bus.share.sharing import KEEPER_STARTS
 from tui.session.connect.share_place import this_program
@@ -48,8 +50,10 @@ class Keeper:
         """True once a signal has ordered the end."""
         alarm = partial(signal.setitimer, signal.ITIMER_REAL)
         keeping = Keeping(lock, order.before, self._ended.set, self.cares, alarm)
+        link = parse_link(order.line)
         self._line = Line(
-            parse_link(order.line),
+            link,
+            timing=replace(timing_of(link), trace_length=FRAMES_KEPT),
             place=order.place,
             program=this_program(KEEPER),
             share=partial(KeeperShare, keeping),

@@ -15,6 +15,7 @@ from ..link import label
 from ..schedule.inside import LineInside
 from .attached import Client
 from .line_clients import LOOK_HEAD, look_answer
+from .line_past import PAST_HEAD, send_past
 from .messages import (
     LENGTH,
     VERSION,
@@ -84,6 +85,10 @@ class Greeting:
             if head == LOOK_HEAD and not self._is_stranger(writer):
                 shares = self._inside.around.tally.use.shares
                 writer.write(look_answer(self._inside.facts.programs, shares))
+                return None
+            if head == PAST_HEAD and not self._is_stranger(writer):
+                frames = self._inside.around.trace.frames()
+                await send_past(writer, frames, self._inside.facts.notes.all)
                 return None
             message = await next_message(reader, head)
         if isinstance(message, Pulse):

@@ -32,6 +32,7 @@ from .of_drives import (
 )
 from .of_listening import HeardExchangeTold, HeardSummaryTold
 from .of_others import (
+    BundleDocument,
     CheckTold,
     InputsTold,
     JournalTold,
@@ -69,6 +70,7 @@ DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     ServeReady,
     PublishReady,
     JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold, WhyTold, CountersTold,
+    BundleDocument,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""
 

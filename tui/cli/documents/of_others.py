@@ -220,3 +220,18 @@ class JournalTold(DocumentTold, kw_only=True):
     journal: str
     entries: list[JournalEntryTold]
     damaged: list[DamagedLineTold]
+
+
+class BundleDocument(DocumentTold, kw_only=True):
+    """`bundle`: the file, what is in it, and why other files are not."""
+
+    command: Literal["bundle"]
+    line: str
+    file: str
+    bytes: int
+    files: list[str]
+    missing: dict[str, str]
+    """Reasons by the name of the file."""
+    omitted: dict[str, int]
+    """Names and passwords that were replaced: places by kind."""
+    messages: list[str]

@@ -80,13 +80,15 @@ def refuse_existing(file: Path, *, force: bool) -> None:
         raise Failure(f"{file} is there already. Use another name, or --force.", USAGE)
 
 
-def write_down(file: Path, text: str, *, force: bool = False) -> None:
+def write_down(
+    file: Path, content: str | bytes, *, force: bool = False, private: bool = False
+) -> None:
     """Write a file whole or not at all; raises Failure with status 2 where that cannot be."""
     from tui.drive.settings.parameter_set import SetError
     from tui.drive.settings.set_file import write_file
 
     try:
-        write_file(file, text, force=force)
+        write_file(file, content, force=force, private=private)
     except SetError as error:
         raise Failure(str(error), USAGE) from error
 

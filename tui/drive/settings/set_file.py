@@ -11,6 +11,8 @@ from ..small_file import read_small_text
 from .parameter_set import ParameterSet, SetError
 from .set_reading import load_set
 
+USUAL_FILE_MODE, PRIVATE_FILE_MODE = 0o666, 0o600
+
 
 class FileThere(SetError):
     """A file of this name exists and was not to be overwritten."""
@@ -33,18 +35,23 @@ def read_set(path: Path, name: str = "") -> ParameterSet:
     return load_set(text, name, library.load)
 
 
-def write_file(path: Path, text: str, *, force: bool = False) -> None:
-    """Write a text to a file so that it is there whole, on the disk, or as it was before.
+def write_file(
+    path: Path, content: str | bytes, *, force: bool = False, private: bool = False
+) -> None:
+    """Write a file so that it is there whole, on the disk, or as it was before.
 
-    Raises FileThere where the file exists and `force` is not given, SetError where the folder
-    does not take it.
+    A `private` file is for its owner alone. Raises FileThere where the file exists and `force` is
+    not given, SetError where the folder does not take it.
     """
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    mode = PRIVATE_FILE_MODE if private else USUAL_FILE_MODE
     if not force and path.exists():
         raise FileThere(f"{path} is there already. Use another name, or --force to replace it.")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with part.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+        with os.fdopen(os.open(part, flags, mode), "wb") as file:
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         _put(part, path, force=force)

@@ -1,0 +1,92 @@
+"""Parts of a bundle fail alone: by an error, by time, by a disk that hangs."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import threading
+import zipfile
+
+import pytest
+
+from tui.session.bundle.archive import archive
+from tui.session.bundle.parts import Missing, Part, PartFile, collect_parts, in_own_thread
+from tui.session.bundle.redaction import Names, Redaction
+
+
+async def good() -> PartFile:
+    return PartFile("of jdoe", "half of it", more={"b.json": {"by": "jdoe"}})
+
+
+async def missing() -> PartFile:
+    raise Missing("jdoe has it")
+
+
+async def broken() -> PartFile:
+    raise ZeroDivisionError("by zero")
+
+
+async def endless() -> PartFile:
+    await asyncio.sleep(3600)
+    raise AssertionError
+
+
+PARTS = (
+    Part("x/a.txt", "A text.", good),
+    Part("missing", "", missing),
+    Part("broken", "", broken),
+    Part("endless", "", endless, limit=0.01),
+    Part("z.txt", "The last.", good),
+)
+
+
+async def test_failed_part_ends_no_other() -> None:
+    steps: list[tuple[int, int, str]] = []
+    results = await collect_parts(PARTS, lambda *step: steps.append(step))
+    assert [one.missing for one in results] == [
+        "", "jdoe has it", "by zero", "It took longer than 0.01 s.", "",
+    ]  # fmt: skip
+    assert [one.file is not None for one in results] == [True, False, False, False, True]
+    assert steps[0] == (0, 5, "x/a.txt")
+    assert steps[-1] == (5, 5, "")
+
+
+async def test_cancellation_ends_the_collection() -> None:
+    work = asyncio.create_task(collect_parts([Part("endless", "", endless)]))
+    await asyncio.sleep(0)
+    work.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await work
+
+
+async def test_blocked_thread_does_not_hold_the_program() -> None:
+    free = threading.Event()
+
+    async def blocked() -> PartFile:
+        await in_own_thread(free.wait)
+        raise AssertionError
+
+    (result,) = await collect_parts([Part("disk", "", blocked, limit=0.01)])
+    assert result.missing == "It took longer than 0.01 s."
+    free.set()
+    with pytest.raises(ZeroDivisionError):
+        await in_own_thread(lambda: 1 // 0)
+
+
+async def test_readme_names_files_reasons_and_what_was_omitted() -> None:
+    made = archive(await collect_parts(PARTS), Redaction(Names(users=frozenset({"jdoe"}))), "stem")
+    with zipfile.ZipFile(io.BytesIO(made.data)) as opened:
+        assert opened.testzip() is None
+        texts = {name: opened.read(name).decode() for name in opened.namelist()}
+        assert all(one.external_attr >> 16 == 0o600 for one in opened.infolist())
+    readme = texts["stem/README.txt"]
+    assert not any("jdoe" in text for text in texts.values())
+    assert texts["stem/x/a.txt"] == "of [user]"
+    assert '"by": "[user]"' in texts["stem/x/b.json"]
+    assert "A text." in readme
+    assert "half of it" in readme
+    assert "missing, because:\n    [user] has it\n" in readme
+    assert "broken, because:\n    by zero\n" in readme
+    assert "user names: 4 places" in readme
+    assert made.omitted == {"user names": 4}
+    assert set(made.missing) == {"missing", "broken", "endless"}

@@ -1,0 +1,1 @@
+"""One file about a line for a colleague or a manufacturer, without names and passwords."""

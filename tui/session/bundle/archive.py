@@ -1,0 +1,148 @@
+"""The zip of a bundle: its files without names and passwords, and a README about each."""
+
+from __future__ import annotations
+
+import io
+import json
+import textwrap
+import time
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import tui
+
+from .parts import Content, PartResult
+from .redaction import OMITTED_KINDS, Redaction
+
+README_NAME = "README.txt"
+README_WIDTH = 90
+PRIVATE_MODE = 0o600
+NEVER_IN_BUNDLE = (
+    "Never in it: passwords and keys of brokers, other files of this computer, values of other"
+    " programs."
+)
+KEPT_IN_BUNDLE = (
+    "Kept: IP addresses, serial numbers of adapters and drives, and the names in the drives."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """A finished bundle."""
+
+    data: bytes
+    """The zip."""
+    files: tuple[str, ...]
+    missing: dict[str, str]
+    """Why a file is not in it, by its name."""
+    omitted: dict[str, int]
+    """How often something was omitted, by its kind."""
+
+
+def archive(results: Sequence[PartResult], redaction: Redaction, stem: str) -> Bundle:
+    """The bundle of what was collected; `stem` is its folder in the zip."""
+    dynamic = [one.missing for one in results]
+    dynamic += [one.file.note for one in results if one.file is not None]
+    for content in (*dynamic, *(one for name, one in _files(results) if _reveals(name))):
+        redaction.learn(content)
+    fixed = {one.part.name for one in results}
+    files = {
+        name if name in fixed else redaction.clean(name): _bytes(redaction.clean(content))
+        for name, content in _files(results)
+    }
+    omitted = {OMITTED_KINDS[by]: count for by, count in sorted(redaction.counts.items())}
+    missing = {one.part.name: redaction.clean(one.missing) for one in results if one.file is None}
+    sizes = {name: len(data) for name, data in files.items()}
+    head = _head(results, redaction, sizes)
+    readme = "\n".join([*head, *_omitted_lines(omitted), ""])
+    files = {README_NAME: readme.encode(), **files}
+    return Bundle(_zipped(files, stem), tuple(files), missing, omitted)
+
+
+def _reveals(name: str) -> bool:
+    """True for a file whose texts may reveal names: profiles are texts of everyone."""
+    return not name.startswith("profiles/")
+
+
+def _files(results: Sequence[PartResult]) -> Iterator[tuple[str, Content]]:
+    for one in results:
+        if one.file is not None:
+            yield one.part.name, one.file.content
+            folder = one.part.name.rpartition("/")[0]
+            for name, content in one.file.more.items():
+                yield f"{folder}/{name}".lstrip("/"), content
+
+
+def _bytes(content: Content) -> bytes:
+    if isinstance(content, bytes):
+        return content
+    if isinstance(content, str):
+        return content.encode("utf-8", "replace")
+    text = json.dumps(content, ensure_ascii=False, indent=2, default=str)
+    return f"{text}\n".encode("utf-8", "replace")
+
+
+def _head(
+    results: Sequence[PartResult], redaction: Redaction, sizes: dict[str, int]
+) -> Iterator[str]:
+    now = datetime.now().astimezone()
+    yield f"Bundle of Drive Panel {tui.__version__}, {now:%Y-%m-%d %H:%M:%S %z}"
+    yield ""
+    yield "Made by `drivepanel bundle`, or by the panel. Nothing was written to any drive."
+    yield ""
+    yield "Files"
+    yield "-----"
+    described = set()
+    for one in results:
+        if one.file is None:
+            continue
+        described.add(one.part.name)
+        yield f"{one.part.name} ({sizes[one.part.name]} bytes)"
+        yield from _indented(one.part.about)
+        yield from _indented(redaction.clean(one.file.note))
+    for name in sizes:
+        if name not in described:
+            yield f"{name} ({sizes[name]} bytes)"
+    yield ""
+    yield "Could not get"
+    yield "-------------"
+    lacking = [one for one in results if one.file is None]
+    for one in lacking:
+        yield f"{one.part.name}, because:"
+        yield from _indented(redaction.clean(one.missing))
+    if not lacking:
+        yield "Nothing: all files are here."
+    yield ""
+
+
+def _indented(text: str) -> Iterator[str]:
+    """A text broken at words, but for commands."""
+    for line in text.splitlines():
+        parts = [line] if line.startswith("tshark ") else textwrap.wrap(line, README_WIDTH)
+        yield from (f"    {part}" for part in parts)
+
+
+def _omitted_lines(omitted: dict[str, int]) -> Iterator[str]:
+    yield "Omitted"
+    yield "-------"
+    for kind in OMITTED_KINDS.values():
+        count = omitted.get(kind, 0)
+        yield f"{kind}: {count} {'place' if count == 1 else 'places'}"
+    by = ", ".join(f"{sign} for {kind}" for sign, kind in OMITTED_KINDS.items())
+    yield ""
+    yield from textwrap.wrap(f"In their places: {by}.", README_WIDTH)
+    yield from textwrap.wrap(NEVER_IN_BUNDLE, README_WIDTH)
+    yield from textwrap.wrap(KEPT_IN_BUNDLE, README_WIDTH)
+
+
+def _zipped(files: dict[str, bytes], stem: str) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as made:
+        for name, data in files.items():
+            about = zipfile.ZipInfo(f"{stem}/{name}", time.localtime()[:6])
+            about.external_attr = PRIVATE_MODE << 16
+            about.compress_type = zipfile.ZIP_DEFLATED
+            made.writestr(about, data)
+    return out.getvalue()

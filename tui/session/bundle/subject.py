@@ -1,0 +1,105 @@
+"""The line that a bundle is about, as far as it could be opened, and its drives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from tui.bus.errors import LineError
+
+from ..connect.line_key import SIMULATED_PREFIX
+from .parts import Missing
+from .redaction import is_address
+
+if TYPE_CHECKING:
+    from tui.bus.link import Link
+
+    from ..connect.open_line import OpenLine
+    from ..counters.watch import CountersNow
+    from ..diagnosis.diagnosis import Diagnosis
+    from ..drive import DriveSession
+    from ..events import Event
+
+ONE_DAY = timedelta(days=1)
+"""The age of the oldest journal entries and messages in a bundle."""
+NOT_OPEN = "The line is not open."
+
+OpensDrive = Callable[[int], Awaitable["DriveSession"]]
+
+
+class DriveDocuments(NamedTuple):
+    """How the commands `why` and `counters` write their JSON; `None` is a drive without session."""
+
+    why: Callable[[str, int, DriveSession | None, Diagnosis], dict[str, Any]]
+    counters: Callable[[str, DriveSession, CountersNow, Mapping[str, int]], dict[str, Any]]
+
+
+@dataclass(eq=False)
+class BundleSubject:
+    """The line, its drives, and what only the caller can provide."""
+
+    text: str
+    """The LINE as it was typed."""
+    link: Link | None
+    """None for simulated drives on a line that is not open."""
+    opened: OpenLine | None
+    trouble: LineError | None
+    """The reason why it is not open."""
+    devices: Sequence[int]
+    open_drive: OpensDrive
+    """Gives the session with a drive, identified; raises LineError, DriveError, Missing."""
+    documents: DriveDocuments
+    events: Sequence[Event] | None = None
+    """The messages of the panel; None if there is no panel."""
+    screens: Mapping[str, str] | None = None
+    """The screens of the panel as text, by name; None if there is no panel."""
+    since: datetime = field(default_factory=lambda: datetime.now().astimezone() - ONE_DAY)
+    _sessions: dict[int, DriveSession | Exception] = field(default_factory=dict)
+
+    async def session(self, device: int) -> DriveSession:
+        """The session with a drive; a failure is kept, so that it is not requested again."""
+        if self.opened is None:
+            raise Missing(f"{NOT_OPEN} {self.trouble or ''}".strip())
+        known = self._sessions.get(device)
+        if known is None:
+            try:
+                known = await self.open_drive(device)
+            except Exception as error:
+                known = error
+            self._sessions[device] = known
+        if isinstance(known, Exception):
+            raise Missing(str(known) or type(known).__name__)
+        return known
+
+    def known_session(self, device: int) -> DriveSession | None:
+        """The same, if it was requested before."""
+        known = self._sessions.get(device)
+        return None if isinstance(known, Exception) else known
+
+    @property
+    def sessions(self) -> list[DriveSession]:
+        """The sessions with the drives that were identified."""
+        found = (self.known_session(device) for device in self.devices)
+        return [one for one in found if one is not None]
+
+
+def bundle_name(link: Link | None, when: datetime) -> str:
+    """The name of a bundle without its ending: line and time, but no host name."""
+    return f"drivepanel-{_line_part(link)}-{when:%Y%m%d-%H%M%S}"
+
+
+def _line_part(link: Link | None) -> str:
+    from tui.bus.link import RtuTcpLink, SerialLink
+
+    if link is None:
+        return SIMULATED_PREFIX.rstrip(":")
+    if isinstance(link, SerialLink):
+        text = PurePath(link.path.replace("\\", "/")).name
+    else:
+        kind = "rtu-tcp" if isinstance(link, RtuTcpLink) else "tcp"
+        text = f"{kind}-{link.host if is_address(link.host) else ''}"
+    return re.sub(r"[^A-Za-z0-9.]+", "-", text).strip("-.") or "line"

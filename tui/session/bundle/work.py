@@ -1,0 +1,44 @@
+"""Making a bundle: all its parts in their order, then the zip."""
+
+from __future__ import annotations
+
+from tui.bus.program import Program
+
+from .archive import Bundle, archive
+from .drive_parts import drive_parts
+from .line_parts import line_parts, record_parts
+from .parts import Part, PartProgress, collect_parts, in_own_thread
+from .past_parts import past_parts
+from .redaction import Redaction, local_names
+from .subject import BundleSubject
+
+
+async def make_bundle(
+    subject: BundleSubject, stem: str, progress: PartProgress | None = None
+) -> Bundle:
+    """Collect the parts of a bundle and pack them; `stem` is its folder in the zip.
+
+    No part ends it: what cannot be collected is in `Bundle.missing`. Raises nothing but a
+    cancellation.
+    """
+    drives = [part for device in subject.devices for part in drive_parts(subject, device)]
+    # frames after the drives, so that they contain what those parts have requested
+    parts: list[Part] = [
+        *line_parts(subject), *drives, *past_parts(subject), *record_parts(subject)
+    ]  # fmt: skip
+    results = await collect_parts(parts, progress)
+
+    def pack() -> Bundle:
+        redaction = Redaction(local_names(one.user for one in _programs(subject)))
+        redaction.learn(subject.text)
+        return archive(results, redaction, stem)
+
+    return await in_own_thread(pack)
+
+
+def _programs(subject: BundleSubject) -> tuple[Program, ...]:
+    """The programs on the line, whose users are named in messages."""
+    if subject.opened is None:
+        return ()
+    facts = subject.opened.line.facts
+    return (*facts.programs, *facts.departed)
