@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.driver import Driver
 from textual.reactive import Reactive
@@ -32,6 +32,9 @@ from .screens.lookout import FRAME_LOOK, Lookout
 from .screens.open_lines import LineOpening
 from .screens.places import Places
 
+if TYPE_CHECKING:
+    from tui.session.bundle.subject import DriveDocuments
+
 LONGEST_CAUSE = 120
 """Characters that an error takes on the terminal; the log has all of it."""
 
@@ -42,7 +45,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
     `leave_running` motors are not stopped when the panel ends without being asked. With `mouse` the
     terminal reports its mouse. `abilities` is what the terminal can show. `on_shown` is
-    called after the first picture.
+    called after the first picture. `drive_documents` gives the JSON of commands for a bundle.
     """
 
     TITLE = "Drive Panel"
@@ -64,6 +67,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         bell: bool = True,
         abilities: Abilities = EVERYTHING,
         on_shown: Callable[[], None] | None = None,
+        drive_documents: Callable[[], DriveDocuments] | None = None,
     ) -> None:
         super().__init__()
         self.fit_terminal(abilities, slow=low_bandwidth)
@@ -81,6 +85,8 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         self._start = start
         self._device = device
         self._on_shown = on_shown
+        if drive_documents is not None:
+            self.drive_documents = drive_documents
         self.leave_running = self.settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
 

@@ -101,7 +101,7 @@ def test_ctrl_c_leaves_no_file(tmp_path: Path) -> None:
         with subprocess.Popen([*DRIVEPANEL, *words], stderr=subprocess.PIPE, text=True) as program:
             wait_until(lambda: bool(silence.requests), "the drive is requested")
             program.send_signal(signal.SIGINT)
-            _, said = program.communicate(timeout=PATIENCE)
-    assert program.returncode == 130, said
-    assert "Traceback" not in said
+            _, output = program.communicate(timeout=PATIENCE)
+    assert program.returncode == 130, output
+    assert "Traceback" not in output
     assert [one.name for one in tmp_path.iterdir() if "zip" in one.name] == []

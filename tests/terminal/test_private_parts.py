@@ -179,6 +179,16 @@ def _updates_of_the_compositor() -> bool:
     )
 
 
+def _screens_have_strips() -> bool:
+    from textual._compositor import Compositor
+    from textual.screen import Screen
+
+    returns = inspect.signature(Compositor.render_strips).return_annotation
+    return returns == "list[Strip]" and "self._compositor = Compositor()" in inspect.getsource(
+        Screen.__init__
+    )
+
+
 def _updates_go_through_display() -> bool:
     from textual.app import App
     from textual.screen import Screen
@@ -378,6 +388,12 @@ PARTS = [
         "lean.py",
         "strips_of: what the compositor hands over",
         _updates_of_the_compositor,
+    ),
+    Part(
+        "Screen._compositor.render_strips",
+        "lean.py",
+        "screen_text: a screen as it was drawn last",
+        _screens_have_strips,
     ),
     Part(
         "App._display",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from .shared.signals import BY_SIGNAL, ending_by_signal, never_suspended
 
 if TYPE_CHECKING:
+    from tui.session.bundle.subject import DriveDocuments
     from tui.session.connect.open_line import OpenLine
 
 STOP, LEAVE_RUNNING = "stop", "leave-running"
@@ -61,6 +62,7 @@ def open_panel(
         bell=bell,
         abilities=fewer_colours(abilities) if low_bandwidth else abilities,
         on_shown=collect_garbage,
+        drive_documents=_drive_documents,
     )
 
     def tell(text: str) -> None:
@@ -70,6 +72,13 @@ def open_panel(
     with never_suspended(tell), ending_by_signal(app, stop=on_hangup == STOP) as came:
         app.run()
     return BY_SIGNAL + came[0] if came else app.return_code or 0
+
+
+def _drive_documents() -> DriveDocuments:
+    """How commands write their JSON about a drive; they are imported for it."""
+    from .shared.drive_documents import drive_documents
+
+    return drive_documents()
 
 
 def _come_to_the_front() -> None:

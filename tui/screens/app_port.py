@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.terminal.lean_app import LeanApp
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from textual.widget import AwaitMount
 
     from tui.drive.profile.schema import OrderId
+    from tui.session.bundle.subject import DriveDocuments
     from tui.session.clock import Clock
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
@@ -48,6 +50,8 @@ class Panel(LeanApp):
     """Keys shown after a message: the message, the screen on which they work, the sentence."""
     hearing: str = ""
     """The line that is listened to, as it was typed: nothing is sent there, no stop either."""
+    drive_documents: Callable[[], DriveDocuments]
+    """How commands write their JSON about a drive; imported when it is needed."""
     unreached: tuple[str, float]
     """The last text about drives that a stop of all does not reach, and its monotonic time."""
     chosen: DriveConsole | None

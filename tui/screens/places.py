@@ -157,6 +157,12 @@ class Places(Panel):
 
         ask_why(self)
 
+    def action_bundle(self) -> None:
+        """Collect all about a line in one file."""
+        from .bundle import ask_bundle
+
+        ask_bundle(self)
+
     async def action_hear(self) -> None:
         """Listen to a line on which another master asks."""
         from .hear import LISTENS_ALREADY, NO_LINE, chosen_line, hear

@@ -9,11 +9,13 @@ terminal is the difference at the moment at which the terminal can take it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from rich.cells import get_character_cell_size
 from rich.color import ColorSystem
 from rich.console import RenderableType
 from textual._compositor import ChopsUpdate, LayoutUpdate
+from textual.screen import Screen
 from textual.strip import Strip
 
 from tui.drive.plain import commands
@@ -119,6 +121,12 @@ def different(
         else:
             found.append((start, place + 1))
     return found
+
+
+def screen_text(screen: Screen[Any]) -> str:
+    """A screen as text, a line for each of its rows, as it was drawn last."""
+    rows = (strip.text.rstrip() for strip in screen._compositor.render_strips())
+    return "\n".join([*rows, ""])
 
 
 def strips_of(update: RenderableType | None) -> list[Placed] | None:

@@ -26,6 +26,7 @@ from ..shared.sets import refuse_existing, write_down
 if TYPE_CHECKING:
     from tui.bus.errors import LineError
     from tui.bus.link import Link
+    from tui.drive.profile.profile import Profile
     from tui.session.bundle.archive import Bundle
     from tui.session.bundle.parts import PartProgress
     from tui.session.bundle.subject import BundleSubject
@@ -140,11 +141,16 @@ def _subject(
     link: Link | None,
     trouble: LineError | None = None,
 ) -> BundleSubject:
+    from tui.drive.profile import library
     from tui.session.bundle.parts import Missing
     from tui.session.bundle.subject import BundleSubject
     from tui.session.diagnosis.asking import profile_remembered
 
     from ..shared.drive_documents import drive_documents
+
+    def expected(device: int) -> Profile | None:
+        named = library.load(target.profile_id) if target.profile_id is not None else None
+        return named or (profile_remembered(link, device) if link is not None else None)
 
     async def open_drive(device: int) -> DriveSession:
         assert opened is not None
@@ -152,11 +158,10 @@ def _subject(
         try:
             return await connect_drive(opened, one)
         except click.UsageError as error:
-            before = await asyncio.to_thread(profile_remembered, opened.line.link, device)
-            profile = target.profile_id or (before.id if before is not None else None)
+            profile = await asyncio.to_thread(expected, device)
             if profile is None:
                 raise Missing(error.format_message()) from None
-            return await connect_drive(opened, one._replace(profile_id=profile))
+            return await connect_drive(opened, one._replace(profile_id=profile.id))
 
     return BundleSubject(
         text=target.line_text,
@@ -166,6 +171,7 @@ def _subject(
         devices=devices,
         open_drive=open_drive,
         documents=drive_documents(),
+        expected_profile=expected,
     )
 
 

@@ -63,6 +63,7 @@ SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks
 WHY = "Why no answer? Tell what fails at a drive that is silent, and what to look at next."
 HEAR = "Listen to a line on which another master asks; the panel sends nothing there, asks."
 ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
+BUNDLE = "Bundle for a colleague: all about the line in one file."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
 PLACES: tuple[tuple[str, str, str], ...] = (
@@ -162,6 +163,7 @@ ACTIONS: tuple[Action, ...] = (
     of_app("eeprom", "S", "", EEPROM),
     of_app("command_palette", "ctrl+p", "all", "Find any action by its words."),
     of_app("help", "?,f1", "help", "Show every key."),
+    of_app("bundle", "", "", BUNDLE),
     of_app("accept_line", "", "", ACCEPT),
     of_app("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
     of_app("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from tui.bus.errors import LineError
-from tui.drive.profile.profile import Profile
 from tui.drive.settings.parameter_set import ParameterSet, dump_set
 
 from ..counters.watch import CounterWatch
-from ..diagnosis.asking import profile_remembered, sight_of_drive, sight_of_port
+from ..diagnosis.asking import sight_of_drive, sight_of_port
 from ..diagnosis.diagnosis import Diagnosis, diagnosed
 from ..journal import Journal
 from ..journal_reading import entries_of
@@ -81,7 +80,7 @@ class _Drive:
         subject, device = self._subject, self._device
         if subject.link is None:
             raise Missing(f"{NOT_OPEN} {subject.trouble or ''}".strip())
-        profile = await self._profile()
+        profile = await in_own_thread(lambda: subject.expected_profile(device))
         if subject.opened is None:
             link, trouble = subject.link, subject.trouble
             seen = await in_own_thread(lambda: sight_of_port(link, device, trouble))
@@ -91,15 +90,6 @@ class _Drive:
         return diagnosed(
             await sight_of_drive(subject.opened.line, device, profile, changed=changed)
         )
-
-    async def _profile(self) -> Profile | None:
-        subject, device = self._subject, self._device
-        session = subject.known_session(device)
-        if session is not None:
-            return session.profile
-        link = subject.link
-        assert link is not None
-        return await in_own_thread(lambda: profile_remembered(link, device))
 
     async def counters(self) -> PartFile:
         """Both sides of the counts."""

@@ -23,7 +23,6 @@ from tui.drive.small_file import open_regular, read_small_text
 
 from ..connect.known_lines import line_name, load_memory
 from ..connect.share_place import owners
-from ..diagnosis.asking import profile_remembered
 from ..journal import Entry, Journal
 from ..journal_reading import DamagedLine, completed, read_journal, selected
 from ..logs import log_file
@@ -202,14 +201,11 @@ def _profiles_file(subject: BundleSubject) -> PartFile:
 
 
 def _profiles_used(subject: BundleSubject) -> set[str]:
-    """Ids of the profiles of the drives, of those that do not answer as remembered."""
+    """Ids of the profiles of the drives, also of those that do not answer."""
     used = {one.family.id for one in subject.sessions}
-    if subject.link is not None:
-        known = {one.device for one in subject.sessions}
-        silent = (device for device in subject.devices if device not in known)
-        before = (profile_remembered(subject.link, device) for device in silent)
-        used |= {one.id for one in before if one is not None}
-    return used
+    silent = set(subject.devices) - {one.device for one in subject.sessions}
+    expected = (subject.expected_profile(device) for device in silent)
+    return {*used, *(one.id for one in expected if one is not None)}
 
 
 def _log_file() -> PartFile:

@@ -17,6 +17,7 @@ from .redaction import is_address
 
 if TYPE_CHECKING:
     from tui.bus.link import Link
+    from tui.drive.profile.profile import Profile
 
     from ..connect.open_line import OpenLine
     from ..counters.watch import CountersNow
@@ -53,6 +54,8 @@ class BundleSubject:
     open_drive: OpensDrive
     """Gives the session with a drive, identified; raises LineError, DriveError, Missing."""
     documents: DriveDocuments
+    expected_profile: Callable[[int], Profile | None]
+    """The profile of a drive as far as it is known without a request; may read files."""
     events: Sequence[Event] | None = None
     """The messages of the panel; None if there is no panel."""
     screens: Mapping[str, str] | None = None
