@@ -9,9 +9,16 @@ import zipfile
 
 import pytest
 
+from tui.bus.api import LineState, LineStatus
+from tui.bus.fake import FakeLine
+from tui.bus.link import SerialLink
 from tui.session.bundle.archive import archive
+from tui.session.bundle.drive_parts import drive_parts
 from tui.session.bundle.parts import Missing, Part, PartFile, collect_parts, in_own_thread
 from tui.session.bundle.redaction import Names, Redaction
+from tui.session.bundle.subject import BundleSubject, DriveDocuments
+from tui.session.connect.open_line import OpenLine
+from tui.session.drive import DriveSession
 
 
 async def good() -> PartFile:
@@ -90,3 +97,27 @@ async def test_readme_names_files_reasons_and_what_was_omitted() -> None:
     assert "user names: 4 places" in readme
     assert made.omitted == {"user names": 4}
     assert set(made.missing) == {"missing", "broken", "endless"}
+
+
+async def test_nothing_is_sent_to_a_drive_if_its_diagnosis_sends_nothing() -> None:
+    line = FakeLine({2: {}}, link=SerialLink("/dev/nosuch"))
+    line.state = LineState(LineStatus.LOST, "The adapter is gone.", 0.0)
+
+    async def opened(_: int) -> DriveSession:
+        raise AssertionError("the drive is requested")
+
+    subject = BundleSubject(
+        text="/dev/nosuch",
+        link=line.link,
+        opened=OpenLine("/dev/nosuch", line),
+        trouble=None,
+        devices=(2,),
+        open_drive=opened,
+        documents=DriveDocuments(lambda *_: {"why": True}, lambda *_: {}),
+        expected_profile=lambda _: None,
+    )
+    why, *others = await collect_parts([*drive_parts(subject, 2)])
+    assert why.file is not None
+    assert why.file.content == {"why": True}
+    assert len(others) == 3
+    assert all("Nothing was sent to the drive." in one.missing for one in others)

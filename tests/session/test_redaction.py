@@ -61,6 +61,16 @@ def test_name_revealed_by_one_text_is_removed_from_all() -> None:
         assert not any(planted in text for text in texts)
 
 
+def test_secret_is_found_in_other_spellings() -> None:
+    texts = cleaned("mqtt://me:p%40s%22s@10.0.0.9", 'p@s"s', 'in JSON p@s\\"s', "p%40s%22s again")
+    assert texts[1:] == [SECRET, f"in JSON {SECRET}", f"{SECRET} again"]
+
+
+def test_named_user_and_host_are_removed_from_all() -> None:
+    texts = cleaned("Broker(host='gw', user='erna', x='y')", "erna at gw, y")
+    assert texts[1] == f"{USER} at {HOST}, y"
+
+
 def test_plain_word_after_password_is_not_taken_for_a_secret() -> None:
     assert cleaned("password=None", "none of them; None")[1] == "none of them; None"
 

@@ -66,7 +66,7 @@ def ask_bundle(app: Panel) -> None:
 
         if answer:
             path = Path(answer).expanduser()
-            app.push_screen(BundleScreen(path, partial(_made, subject(), path.stem)))
+            app.push_screen(BundleScreen(path, partial(_made, subject(), stem)))
 
     app.push_screen(dialog, answered)
 

@@ -12,6 +12,7 @@ from tui.drive.settings.parameter_set import ParameterSet, dump_set
 from ..counters.watch import CounterWatch
 from ..diagnosis.asking import sight_of_drive, sight_of_port
 from ..diagnosis.diagnosis import Diagnosis, diagnosed
+from ..drive import DriveSession
 from ..journal import Journal
 from ..journal_reading import entries_of
 from ..read.upload import Upload
@@ -63,11 +64,15 @@ class _Drive:
         self._subject = subject
         self._device = device
         self._read: ParameterSet | None = None
+        self._withheld = ""
+        """Why nothing is sent to the drive: what the diagnosis says before its first request."""
 
     async def why(self) -> PartFile:
         """The diagnosis."""
         subject = self._subject
         found = await self._diagnosis()
+        if subject.opened is not None and not found.sight.heard.asked:
+            self._withheld = f"Nothing was sent to the drive. {found.text}"
         session = None
         if found.well:
             try:
@@ -91,9 +96,14 @@ class _Drive:
             await sight_of_drive(subject.opened.line, device, profile, changed=changed)
         )
 
+    async def _session(self) -> DriveSession:
+        if self._withheld:
+            raise Missing(self._withheld)
+        return await self._subject.session(self._device)
+
     async def counters(self) -> PartFile:
         """Both sides of the counts."""
-        session = await self._subject.session(self._device)
+        session = await self._session()
         watch = CounterWatch(session)
         await watch.look()
         answered = await watch.echo(ECHOES)
@@ -104,7 +114,7 @@ class _Drive:
 
     async def settings(self) -> PartFile:
         """All parameters; those that were not read in time are named."""
-        session = await self._subject.session(self._device)
+        session = await self._session()
         upload = Upload(session)
         why = ""
         try:
@@ -131,7 +141,7 @@ class _Drive:
 
     async def report(self) -> PartFile:
         """The report on what was read."""
-        session = await self._subject.session(self._device)
+        session = await self._session()
         values = self._values
 
         def text() -> str:

@@ -7,6 +7,7 @@ then `clean` each.
 from __future__ import annotations
 
 import ipaddress
+import json
 import os
 import re
 import socket
@@ -15,6 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import quote, unquote
 
 from tui.drive.small_file import read_small
 
@@ -51,6 +53,9 @@ _HEADER = re.compile(r"(\b(?:Basic|Bearer)\s+)([A-Za-z0-9+/=._~-]{8,})")
 _LINE_HOST = re.compile(
     r"\b(?:rtu-tcp|tcp|mqtts?):(?://)?(?:[^\s\"'<>]*@)?([A-Za-z0-9_][\w.-]*)", re.I
 )
+_NAMED = re.compile(
+    r"\b(user(?:name)?|login|host(?:name)?)[\"']?\s*[:=]\s*[\"']([^\"'\n]+)[\"']", re.I
+)
 _HOME_PATH = re.compile(r"(?:/home|/Users|[A-Za-z]:\\{1,2}Users)[/\\]{1,2}([^/\\\s\"':,;()\]]+)")
 
 
@@ -83,10 +88,14 @@ class Redaction:
             for match in _IN_URL.finditer(text):
                 user, _, password = match[2].partition(":")
                 self._users |= {user} if _is_own(user) else set()
-                self._secrets |= {password} if len(password) >= SHORTEST_SECRET else set()
+                found_in_url = {password, unquote(password)}
+                self._secrets |= {one for one in found_in_url if len(one) >= SHORTEST_SECRET}
             for pattern in (_ASSIGNED, _OPTION, _HEADER):
                 found = (match[2].strip("\"'") for match in pattern.finditer(text))
                 self._secrets |= {one for one in found if _is_secret(one)}
+            for kind, name in _NAMED.findall(text):
+                names = self._hosts if kind.casefold().startswith("host") else self._users
+                names |= {name} if _is_own(name) else set()
             for host in _LINE_HOST.findall(text):
                 self._hosts |= {one for one in (host, host.partition(".")[0]) if _is_own(one)}
             self._users |= {one for one in _HOME_PATH.findall(text) if _is_own(one)}
@@ -136,12 +145,21 @@ class Redaction:
         self._instead = {}
         for by, names in ((USER, self._users), (HOST, self._hosts), (HOME, self._homes)):
             self._instead |= {one.casefold(): by for one in names}
-        known = self._users | self._hosts | self._homes | self._secrets
+        secrets = {form for one in self._secrets for form in _forms(one)}
+        known = self._users | self._hosts | self._homes | secrets
         parts = [
-            rf"(?-i:{re.escape(one)})" if one in self._secrets else _part(one)
+            rf"(?-i:{re.escape(one)})" if one in secrets else _part(one)
             for one in sorted(known, key=len, reverse=True)
         ]
         return re.compile("|".join(parts) or r"(?!)", re.IGNORECASE)
+
+
+def _forms(secret: str) -> Iterator[str]:
+    """A secret as it is, and as JSON, Python and URLs write it."""
+    yield secret
+    yield json.dumps(secret)[1:-1]
+    yield repr(secret)[1:-1]
+    yield quote(secret, safe="")
 
 
 def _part(name: str) -> str:

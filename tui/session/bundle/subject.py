@@ -69,6 +69,8 @@ class BundleSubject:
             raise Missing(f"{NOT_OPEN} {self.trouble or ''}".strip())
         known = self._sessions.get(device)
         if known is None:
+            # kept until it is known: the caller may run out of time
+            self._sessions[device] = Missing("The drive was not identified in time.")
             try:
                 known = await self.open_drive(device)
             except Exception as error:

@@ -7,7 +7,7 @@ from tui.bus.program import Program
 from .archive import Bundle, archive
 from .drive_parts import drive_parts
 from .line_parts import line_parts, record_parts
-from .parts import Part, PartProgress, collect_parts, in_own_thread
+from .parts import PartProgress, collect_parts, in_own_thread
 from .past_parts import past_parts
 from .redaction import Redaction, local_names
 from .subject import BundleSubject
@@ -22,11 +22,10 @@ async def make_bundle(
     cancellation.
     """
     drives = [part for device in subject.devices for part in drive_parts(subject, device)]
-    # frames after the drives, so that they contain what those parts have requested
-    parts: list[Part] = [
-        *line_parts(subject), *drives, *past_parts(subject), *record_parts(subject)
-    ]  # fmt: skip
+    # after the drives, so that frames and counts contain what those parts have requested
+    parts = [*drives, *line_parts(subject), *past_parts(subject), *record_parts(subject)]
     results = await collect_parts(parts, progress)
+    results = [*results[len(drives) :], *results[: len(drives)]]
 
     def pack() -> Bundle:
         redaction = Redaction(local_names(one.user for one in _programs(subject)))
