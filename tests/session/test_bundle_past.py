@@ -8,13 +8,16 @@ import os
 import pytest
 
 from tests.bus.peer import PtyPeer, honest
+from tui.bus.api import Frame
+from tui.bus.fake import FakeLine
 from tui.bus.link import parse_link
 from tui.session.bundle.parts import PartResult, collect_parts
 from tui.session.bundle.past_parts import past_parts
 from tui.session.bundle.subject import BundleSubject, DriveDocuments
-from tui.session.connect.open_line import open_line
+from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.event_notes import EventNotes
 from tui.session.events import EventLog
+from tui.wire.frames import sealed
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
 
@@ -57,6 +60,20 @@ async def test_past_of_a_line_of_another_program_is_collected() -> None:
     assert messages is not None
     assert "alarm    drive 1: Drive 1 is late.\n" in str(messages.content)
     assert found["screens"].missing.startswith("Screens are in a bundle only")
+
+
+async def test_frames_from_before_the_bundle_are_not_displaced_by_it() -> None:
+    line = FakeLine({1: {}}, link=parse_link("/dev/nosuch"))
+    frames = [Frame(float(number), "out", sealed(bytes([1, 3, 0, number]))) for number in range(6)]
+    line.trace = tuple(frames[:4])
+    subject = subject_of("/dev/nosuch")
+    subject.opened = OpenLine("/dev/nosuch", line)
+    parts = [*past_parts(subject)]
+    line.trace = tuple(frames[2:])
+    found = {one.part.name: one for one in await collect_parts(parts)}
+    file = found["frames.raw.pcapng"].file
+    assert file is not None
+    assert file.note.startswith("6 frames")
 
 
 async def test_line_that_no_process_holds_has_no_past() -> None:

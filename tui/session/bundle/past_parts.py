@@ -78,6 +78,10 @@ class _Past:
     def __init__(self, subject: BundleSubject) -> None:
         self._subject = subject
         self._seen: LinePastSeen | None = None
+        self._before: tuple[Frame, ...] = ()
+        """Those of this program before the bundle: its own requests may displace them."""
+        if subject.opened is not None:
+            self._before = tuple(subject.opened.line.trace)
         self._note = ""
 
     async def _past(self) -> LinePastSeen:
@@ -98,7 +102,9 @@ class _Past:
                 self._note = f"The process that holds the line was not asked: {error}."
         if opened is None:
             raise Missing(self._note or NO_PROCESS)
-        return tuple(opened.line.trace), opened.line.facts.notes.all
+        frames = tuple(opened.line.trace)
+        older = (one for one in self._before if not frames or one.time < frames[0].time)
+        return (*older, *frames), opened.line.facts.notes.all
 
     async def frames_file(self, *, raw: bool) -> PartFile:
         """A capture of the frames."""
