@@ -19,6 +19,7 @@ from tui.bus.bounds import MOST_STOPPERS, STOPS_WRAP
 from tui.bus.limits import CAUTIOUS, Limits, Window
 from tui.bus.line import Line
 from tui.bus.model import DeviceCounters, DeviceState, LineCounters, LineState, LineStatus
+from tui.bus.poll_plan import PlannedRead, PollPlan
 from tui.bus.program import Program
 from tui.bus.share.failures import ErrorForm
 from tui.bus.share.messages import (
@@ -48,6 +49,7 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.share.place import Owner
+from tui.bus.share.poll_messages import Polled, PolledReply, Subscribe, Unsubscribe
 from tui.bus.shared_facts import SharedFacts
 from tui.bus.stop_counts import StopCounts
 
@@ -250,7 +252,13 @@ SAMPLES: tuple[AnyMessage, ...] = (
         LineState(LineStatus.CONNECTED, "", 1.0, 2.0), LineCounters(3, busy_seconds=1.0),
         {1: STATE}, {1: 0.5}, ("PortMissing", ErrorForm("gone", path="/dev/x", ports=("/dev/y",))),
         ((1.0, "out", b"\1\3", ""),),
-        {1: DeviceCounters(1, exceptions={2: 1})},
+        {1: DeviceCounters(1, exceptions={2: 1})}, 1.5,
+    ),
+    Subscribe(1, PollPlan(1, ((PlannedRead(1, 2),), (PlannedRead(5, 1, 4),)), 0.5, 5.0)),
+    Unsubscribe(1),
+    Polled(
+        1, 0, 5.0,
+        (PolledReply(b"\x03\x02\0\1", 5.0), PolledReply(b"", 0.0, ("NoAnswer", ErrorForm()))),
     ),
 )  # fmt: skip
 """One message of each kind; Goodbye aside, which ends an attachment in good order."""

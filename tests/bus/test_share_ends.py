@@ -28,7 +28,6 @@ from tui.bus.share.messages import (
     AnyMessage,
     Failed,
     Hello,
-    Message,
     Told,
     TurnedAway,
     packed,
@@ -41,7 +40,7 @@ from .conftest import NO_ECHO, Share
 from .peer import PtyPeer, Step, eventually, honest, reply
 from .sharing import QUICK, SharedLines, frozen, in_loop, other_program, place_in
 
-M = TypeVar("M", bound=Message)
+M = TypeVar("M", bound=AnyMessage)
 STRANGER = Program("stranger", "stranger", 1)
 SLOW_REGISTER = 77
 

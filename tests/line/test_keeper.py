@@ -31,6 +31,7 @@ from tui.drive.profile import library
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.snapshot import Snapshot
 from tui.simulator import DriveSpec, Simulation
 
 from .terminal import Terminal
@@ -343,6 +344,31 @@ def test_the_next_program_has_the_trend_of_one_that_was_killed() -> None:
             wait_until(lambda: monitor.trend[0].time < begun + 1.0, "the trend from before")
             # but for the last points before it was killed
             assert len([one for one in monitor.trend if one.time < begun + 4.0]) >= 10
+        finally:
+            opened.close()
+
+
+@pytest.mark.usefixtures("with_keepers")
+def test_the_next_keeper_polls_for_the_programs_of_a_killed_one() -> None:
+    with bench() as (_, line):
+        opened = open_line(line, wait=PATIENCE, program="panel")
+        try:
+            monitor = Monitor(DriveSession(opened.line, 1, library.load("atv71")))
+            times: list[float] = []
+
+            def note(snapshot: Snapshot) -> None:
+                if monitor._steady.came is not None and not snapshot.error:
+                    times.append(snapshot.readings["ETA"].time)
+
+            monitor.listen(note)
+            monitor.start(period=0.1)
+            wait_until(lambda: len(times) > 3, "cycles that the keeper has read")
+            first = keeper()
+            os.kill(first, signal.SIGKILL)
+            wait_until(lambda: not is_running(first), "it has ended")
+            ended = time.monotonic()
+            wait_until(lambda: times[-1] > ended, "a cycle of the next keeper")
+            assert keeper() != first
         finally:
             opened.close()
 

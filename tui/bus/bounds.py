@@ -21,6 +21,8 @@ MOST_CARE = 1 << 20
 """Bytes of the description with which the holder of a line can stop a device."""
 MOST_SHARE = 1000.0
 """The share of a line's time that polls of one device may request."""
+MOST_STRETCH = 1e6
+"""The factor by which the periods of polls may be lengthened."""
 
 DeviceId = Annotated[int, Meta(ge=0, le=MOST_DEVICES - 1)]
 """0 is a broadcast."""

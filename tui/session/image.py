@@ -82,6 +82,11 @@ class RegisterImage:
         """What is held of a register; None where it was never read, or is unknown by now."""
         return self._now.held.get(code)
 
+    def changed(self, code: str) -> float:
+        """When a register was last read or written; minus infinity if it never was."""
+        held = self._now.held.get(code)
+        return max(self._doubted.get(code, -math.inf), -math.inf if held is None else held.time)
+
     def age(self, code: str) -> float:
         """Seconds since a register's value was on the wire; infinite where it is not known."""
         held = self._now.held.get(code)

@@ -1,4 +1,7 @@
-"""The time of a line shared out among everything that asks again and again."""
+"""The time of a line shared out among everything that asks again and again.
+
+The holder of the line finds one factor for the periods of all programs; see PollsServed.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import threading
 from collections.abc import Hashable, Mapping
 
 from ..bounds import MOST_SHARE
+from .polls import PollCarrier
 
 SHARE = 0.9
 """Share of the line's time that regular polls may take; the rest is the operator's."""
@@ -23,6 +27,10 @@ class Pace:
         self._lock = threading.Lock()
         self.others: Mapping[int, float] = {}
         """Share of the line's time that other programs' polls wish for, by device."""
+        self.stretch = 1.0
+        """The factor by which the holder of the line lengthens the periods of all programs."""
+        self.carrier: PollCarrier | None = None
+        """Has polls carried out by the process that holds the line; None in that process."""
 
     @property
     def own(self) -> dict[int, float]:
@@ -38,7 +46,7 @@ class Pace:
         with self._lock:
             self._wishes[who] = device, seconds / period
         wished = sum(greatest(self.own, self.others).values())
-        return period * max(1.0, wished / SHARE)
+        return period * max(1.0, wished / SHARE, self.stretch)
 
     @property
     def busy(self) -> bool:

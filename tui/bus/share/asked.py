@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..errors import UNKNOWN_FATE, LineClosed, LineLost, NoAnswer, RequestRefused
+from ..limits import Limits
 from ..model import Priority
 from ..requests import BROADCAST
 from ..schedule.inside import LineInside
@@ -40,7 +41,7 @@ class RequestsAsked:
         if why := self._inside.dispatcher.forbidden(job):
             job.fail(RequestRefused(why))
             return
-        self._describe(request.device, job)
+        self.describe(request.device, job.limits)
         kind, fields = request_form(request)
         number = next(self._numbers)
         self._asked[number] = job
@@ -53,10 +54,11 @@ class RequestsAsked:
             )
         )  # fmt: skip
 
-    def _describe(self, device: int, job: Job) -> None:
-        if device != BROADCAST and self._described.get(device) is not job.limits:
-            self._described[device] = job.limits
-            self._tell(Describe(device, job.limits))
+    def describe(self, device: int, limits: Limits) -> None:
+        """Have the owner know what a device may be sent."""
+        if device != BROADCAST and self._described.get(device) is not limits:
+            self._described[device] = limits
+            self._tell(Describe(device, limits))
 
     def _withdrawn(self, number: int, cancelled: bool) -> None:
         """Called in any thread: nobody waits for the answer any more."""

@@ -76,11 +76,16 @@ class Client:
         transport = self.writer.transport
         if transport.is_closing():
             return
-        if transport.get_write_buffer_size() > MOST_UNREAD:
+        if self.unread > MOST_UNREAD:
             log.warning("%s reads nothing any more and is let go", self.program.text)
             transport.abort()
             return
         self.writer.write(packed(message))
+
+    @property
+    def unread(self) -> int:
+        """Bytes that wait until it reads on."""
+        return self.writer.transport.get_write_buffer_size()
 
     def due_stops(self, now: float) -> tuple[int, ...]:
         """Devices that it has stopped of late, and that have answered no word of it."""
@@ -176,7 +181,9 @@ class Client:
         plain = replace(counters, devices={})
         error = inside.error()
         failure = failure_told(error) if error is not None else None
-        return News(inside.state(), plain, changed, shares, failure, frames, counted)
+        return News(
+            inside.state(), plain, changed, shares, failure, frames, counted, inside.pace.stretch
+        )
 
 
 def stood_still(seconds: float) -> str:

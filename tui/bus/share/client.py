@@ -42,6 +42,8 @@ from .messages import (
 from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
+from .poll_messages import Polled
+from .polls_submitted import PollsSubmitted
 from .voices import ProgramVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)
@@ -66,6 +68,9 @@ class ShareClient:
         self._loop = asyncio.get_running_loop()
         self.writer: asyncio.StreamWriter | None = None
         self._asked = RequestsAsked(inside, self._tell)
+        self._polls = PollsSubmitted(
+            inside, self._tell, self._asked.describe, lambda: not self.frozen
+        )
         self._news = NewsHeard(inside, say)
         self._wish: tuple[dict[int, float], bool] = ({}, False)
         self._gone, self._told = False, ""
@@ -98,6 +103,8 @@ class ShareClient:
             closing = False
         finally:
             self._inside.facts.voice = None
+            self._inside.pace.carrier, self._inside.pace.stretch = None, 1.0
+            self._polls.lose_all()
             # what is said from here on would not be heard: a stop takes another way
             self.writer = None
             self._watching.close()
@@ -154,6 +161,7 @@ class ShareClient:
             self._news.note = f" It is open as {message.label}."
         self._gone, self.taken_in = message.gone, True
         self._heartbeat = Heartbeat(self._owner.socket, self._inside.facts.me.id)
+        self._inside.pace.carrier = self._polls
         self._claim()
 
     def _claim(self) -> None:
@@ -169,13 +177,13 @@ class ShareClient:
         while True:
             try:
                 message = await next_message(reader)
+                self._hear_life(message)
+                self._hear(message)
             except (EOFError, OSError):
                 return
             except NoMessage as error:
                 log.error("%s sent a malformed message: %s", self._owner.program.text, error)
                 return
-            self._hear_life(message)
-            self._hear(message)
 
     # Requests
 
@@ -220,6 +228,7 @@ class ShareClient:
             self._say(LineStatus.LOST, told, None)
         for job in self._inside.dispatcher.take_all():
             self._asked.send(job)
+        self._polls.lose_all()
         if remedy:
             self._asked.fail_all(told)
 
@@ -232,6 +241,8 @@ class ShareClient:
                 pass
             case Answer() | Failed():
                 self._asked.answered(message)
+            case Polled():
+                self._polls.hear(message)
             case News():
                 self._news.hear(message)
             case Facts():

@@ -15,6 +15,7 @@ from ..bounds import (
     MOST_DEVICES,
     MOST_FRAMES,
     MOST_PROGRAMS,
+    MOST_STRETCH,
     ByteString,
     CareBytes,
     DeviceId,
@@ -38,8 +39,9 @@ from ..notes import LineNote
 from ..program import Program
 from ..trace import FrameDirection
 from .failures import ErrorForm
+from .poll_messages import Polled, Subscribe, Unsubscribe
 
-VERSION = 6
+VERSION = 7
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; more is no message of ours."""
@@ -248,6 +250,8 @@ class News(Message, frozen=True):
     frames: Annotated[tuple[SeenFrame, ...], Meta(max_length=MOST_FRAMES)] = ()
     counted: Annotated[dict[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = {}
     """Counts of the devices whose counts have changed."""
+    stretch: Annotated[float, Meta(ge=1.0, le=MOST_STRETCH)] = 1.0
+    """The factor by which the periods of all polls are lengthened."""
 
 
 class Goodbye(Message, frozen=True):
@@ -260,7 +264,8 @@ class Goodbye(Message, frozen=True):
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
     | Alive | Pulse | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
-    | Facts | News | Goodbye | Armed | LineNote | KeepAlive
+    | Facts | News | Goodbye | Armed | LineNote | KeepAlive | Subscribe
+    | Unsubscribe | Polled
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

@@ -27,7 +27,7 @@ class NewsHeard:
         for device, state in news.devices.items():
             inside.devices.copy(device, state)
         inside.around.tally.copy(news.counters, news.counted)
-        inside.pace.others = news.shares
+        inside.pace.others, inside.pace.stretch = news.shares, news.stretch
         for time, direction, data, note in news.frames:
             inside.around.trace.append(
                 Frame(time, "out" if direction == "out" else "in", data, note)

@@ -34,6 +34,8 @@ from .messages import (
     next_message,
 )
 from .place import OwnerLock, SharePlace, has_ended
+from .poll_messages import Subscribe, Unsubscribe
+from .polls_served import PollsServed
 from .signs import SignsOfLife
 from .voices import ProgramVoice
 
@@ -53,6 +55,7 @@ class ShareServer:
         self._greeting = Greeting(inside, place.group, holder, self._stopped)
         self._listening = Listening(place, lock, inside.facts, label(inside.link), self._welcome)
         self._commanding = Commanding(inside.facts, self._clients, self._tell_facts)
+        self._polls = PollsServed(inside)
         self._signs = SignsOfLife(inside, self._all, self._tell_news)
         self._gone_before: set[str] = set()  # looked after
         self._handling: set[asyncio.Task[None]] = set()
@@ -74,6 +77,7 @@ class ShareServer:
         self._inside.facts.voice = None
         self._signs.close()
         self._coming_back.close()
+        self._polls.close()
         await self._listening.close()
         for client in list(self._clients.values()):
             with suppress(OSError, RuntimeError):
@@ -159,6 +163,7 @@ class ShareServer:
 
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
+        self._polls.end_all(client)
         self._stops_left += client.forget()
         if self._clients.get(client.program.id) is not client:
             return
@@ -214,9 +219,12 @@ class ShareServer:
                 client.limits[device] = limits
                 if self._inside.devices[device].limits is CAUTIOUS:
                     self._inside.devices.describe(device, limits)
+            case Subscribe():
+                self._polls.start(client, message)
+            case Unsubscribe(number=number):
+                self._polls.end(client, number)
             case PollWish(shares=shares, trace=trace):
                 client.shares, client.trace = shares, trace
-                self._inside.pace.others = self._wishes()
             case _:
                 self._hear_of_devices(client, message)
 
@@ -279,6 +287,7 @@ class ShareServer:
 
     def _tell_news(self) -> None:
         self._listening.keep()
+        self._polls.share_out(self._wishes())
         self.tell_state()
 
     def tell_state(self) -> None:

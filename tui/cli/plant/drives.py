@@ -230,7 +230,7 @@ class PlantDrive:
         monitor = Monitor(session)
         looks_on = Bystander(session, partial(self._sign, self.device), lambda: monitor.latest)
         looks_on.orphan = await asyncio.to_thread(_is_orphan, session)
-        monitor.held_back = looks_on.held_back
+        monitor.held_back, monitor.freely = looks_on.held_back, looks_on.freely
         leave = monitor.listen(partial(self._take, Cycles(session, codes), loop))
         self._good, learned = loop.time(), loop.time()
         monitor.start(codes, self._every)

@@ -15,6 +15,7 @@ from enum import StrEnum
 from tui.bus.api import Priority
 from tui.bus.errors import DeviceException
 from tui.bus.link import TcpLink, character_time, silence
+from tui.bus.poll_plan import USUAL_TURNAROUND
 from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, slot_target
 from tui.drive.blocks.wire_cost import span
 from tui.drive.profile.schema import Block, Parameter
@@ -23,7 +24,6 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from ..drive import DriveSession
-from ..read.kept_plans import USUAL_TURNAROUND
 from ..read.proof import SURE, SlotEvidence
 from ..read.retrying_reader import RetryingReader
 from ..read.verdict import SlotMatch

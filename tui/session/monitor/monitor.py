@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from tui.bus.api import Contact, LineWorker, Priority, contact_of
 from tui.bus.errors import LineClosed, LineError, LineLost
+from tui.bus.poll_plan import SHARED_AGE
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
 
@@ -24,6 +25,7 @@ from ..read.rotation import Rotation
 from ..reading import Quality, Reading
 from .rates import SLOW_FACTOR, Rates, rates_of
 from .snapshot import Snapshot, stale_after
+from .steady_cycles import SteadyCycles, SteadyPlan
 from .trend import Trend, TrendPoint
 from .trend_notes import TrendNotes
 
@@ -48,11 +50,6 @@ class NotAsked(DriveError):
     """A drive was left alone on purpose, and why."""
 
 
-SHARED_AGE = 0.5
-"""Age up to which a value that was read for another program is taken, as a share of the cycle:
-two monitors of one period then read each value once, however they lie to each other."""
-
-
 class Monitor:
     """Polls the monitoring set of one drive in a worker of the line's loop."""
 
@@ -65,7 +62,10 @@ class Monitor:
         """Target cycle time in seconds; read anew at each."""
         self.held_back: Callable[[], str] = lambda: ""
         """Asked before each cycle, in the line's thread: why the drive must not be asked now."""
+        self.freely: Callable[[], bool] = lambda: True
+        """Whether a cycle may be read before `held_back` is asked about it."""
         self.reader = Reader(session)
+        self._steady = SteadyCycles(session, self.reader)
         self.restarts = 0
         """How often watching failed by an error of its own, and was begun anew."""
         self._latest: Snapshot | None = None
@@ -174,7 +174,7 @@ class Monitor:
         cycle = failures = 0
         try:
             while True:
-                started = self.session.clock.monotonic()
+                started = self._steady.begun
                 cycle += 1
                 error, contact = "", CONTACT_MADE
                 period = self._period(rates)
@@ -187,9 +187,10 @@ class Monitor:
                     if why := self.held_back():
                         raise NotAsked(why)
                     seldom = (*rates.seldom, *self.session.followed)
-                    turn = due.turn(seldom, self.reader.groups)
+                    turn = self._steady.turn(due, seldom)
                     readings.update(await self._cycle(rates, readings, turn))
                 except (LineError, DriveError) as fault:
+                    self._steady.end()
                     error, contact = str(fault), contact_of(fault)
                     failures += 1
                     if contact == "swapped":
@@ -208,15 +209,27 @@ class Monitor:
                 self._publish(cycle, readings, rates, _span(begun, period), error, contact)
                 if not error:
                     await self._learn(cycle)
+                    if await self._goes_on(rates, due, started + period):
+                        continue
+                self._steady.end()
                 rest = started + period - self.session.clock.monotonic()
                 await self.session.clock.sleep(period if error else max(0.0, rest))
         finally:
+            self._steady.end()
             self.line.pace.release(self)
 
     def _none_good(self, codes: Sequence[str], error: str) -> dict[str, Reading]:
         """No value of these is to be shown, and why."""
         now = self.session.clock.monotonic()
         return {code: Reading.bad(self.profile[code], now, error) for code in codes}
+
+    async def _goes_on(self, rates: Rates, due: Rotation, at: float) -> bool:
+        """Wait for the next cycle from the line's holder; False if it is to be read from here."""
+        if due.owes or not self.freely():
+            return False
+        seldom = (*rates.seldom, *self.session.followed)
+        plan = SteadyPlan(rates.fast, seldom, max(self.period, SHORTEST_PERIOD))
+        return await self._steady.next(plan, due, at)
 
     def _period(self, rates: Rates) -> float:
         """The target cycle time, longer where the line cannot keep it for all."""
@@ -244,7 +257,7 @@ class Monitor:
         self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
     ) -> dict[str, Reading]:
         """All readings of one cycle; the state's details as soon as it changes."""
-        found = await self.reader.read((*rates.fast, *turn), priority=Priority.POLL)
+        found = await self._steady.read((*rates.fast, *turn))
         self._using = self.reader.using
         if set(rates.changing) <= set(turn):
             return found
@@ -263,7 +276,7 @@ class Monitor:
         error: str,
         contact: Contact,
     ) -> None:
-        now = self.session.clock.monotonic()
+        now = self._steady.ended(readings.values())
         aged = {
             code: reading.aged(now, stale_after(span, often=code in rates.fast))
             for code, reading in readings.items()

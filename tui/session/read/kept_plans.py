@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 
 from tui.bus.link import TcpLink, character_time, silence
-from tui.drive.read_plan import ReadPlan, WireTiming, plan_reads
+from tui.bus.poll_plan import USUAL_TURNAROUND, PlannedRead
+from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 
 from ..drive import DriveSession
 
-USUAL_TURNAROUND = 0.005
-"""Seconds that a drive takes to answer, until it is measured."""
 TURNAROUND_STEP = 0.001
 PLANS_KEPT = 64
 """Read plans that are remembered; sets of codes and turnarounds change without end."""
@@ -57,3 +56,16 @@ class KeptPlans:
         if isinstance(link, TcpLink):
             return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
         return WireTiming(character_time(link), silence(link), turnaround)
+
+
+def planned_read(request: ReadRequest) -> PlannedRead:
+    """A request as the process that holds the line repeats it."""
+    return PlannedRead(request.address, request.count, 4 if request.function == 4 else 3)
+
+
+def planned_reads(*plans: ReadPlan) -> tuple[PlannedRead, ...]:
+    """The requests of read plans in the order in which they are sent."""
+    found: list[ReadRequest] = []
+    for plan in plans:
+        found += [*plan.requests, *(check.request for check in plan.checks)]
+    return tuple(dict.fromkeys(planned_read(one) for one in found))

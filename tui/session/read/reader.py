@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer
+from tui.bus.poll_plan import PlannedRead, PolledTurn
 from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
@@ -17,7 +18,7 @@ from tui.drive.values import from_words, word_count
 from ..drive import DriveSession
 from ..reading import Origin, Reading
 from .decoding import Decoding, sources_of
-from .kept_plans import KeptPlans
+from .kept_plans import KeptPlans, planned_read, planned_reads
 from .presence import look_for_drive, meets_silence
 from .slots import Slots
 
@@ -41,6 +42,8 @@ class Reader:
     """Name of the block or scanner that the last poll read, if it read one."""
     max_age: float = 0.0
     """A poll takes what was read for another program up to so many seconds ago."""
+    polled: PolledTurn | None = None
+    """A poll takes the replies that the process which holds the line has read for it."""
     _met: set[str] = field(default_factory=set)
     """Unconfirmed words that this drive has answered."""
     _plans: KeptPlans = field(init=False)
@@ -95,6 +98,11 @@ class Reader:
         trusts = self._by_trust(wanted)
         requests = [request for trust in trusts for request in self._plans.plan(trust).requests]
         return [tuple(place.code for place in request.places) for request in requests]
+
+    def planned(self, codes: Iterable[str]) -> tuple[PlannedRead, ...]:
+        """The requests by which a poll reads these codes."""
+        sure, unsure = self._by_trust(frozenset(codes).difference(self.session.image.refused))
+        return planned_reads(self._plans.plan(sure, self.in_force), self._plans.plan(unsure))
 
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
@@ -233,7 +241,7 @@ class Reader:
         block = self._block_of(request)
         several = len(request.places) > 1 or block is not None
         try:
-            reply = await self.line.read(
+            reply = self._polled_reply(request, priority, since) or await self.line.read(
                 self.device,
                 request.address,
                 request.count,
@@ -260,9 +268,19 @@ class Reader:
         """The greatest age in seconds of what is taken in place of a read: nothing known before."""
         if priority < Priority.POLL or not self.max_age:
             return 0.0
-        held = (self.session.image.get(place.code) for place in request.places)
-        newest = max((one.time for one in held if one is not None), default=-math.inf)
-        return max(0.0, min(self.max_age, self.session.clock.monotonic() - max(newest, since)))
+        known = self._known_since(request, since)
+        return max(0.0, min(self.max_age, self.session.clock.monotonic() - known))
+
+    def _polled_reply(self, request: ReadRequest, priority: Priority, since: float) -> Reply | None:
+        """What was read for this poll already: nothing known before. Raises the line's errors."""
+        if self.polled is None or priority < Priority.POLL:
+            return None
+        return self.polled.take(planned_read(request), self._known_since(request, since))
+
+    def _known_since(self, request: ReadRequest, since: float) -> float:
+        """When what a request reads was last read or written, or `since` if that is later."""
+        image = self.session.image
+        return max((since, *(image.changed(place.code) for place in request.places)))
 
     def _block_of(self, request: ReadRequest) -> Block | None:
         """The block or scanner that a request reads; None where it asks parameters directly."""

@@ -33,8 +33,23 @@ class Rotation:
             self._turn = _joined(some) or self._owed
         else:
             self._cycle += 1
-            self._turn = _joined(groups(codes)[self._cycle % self._parts :: self._parts])
+            self._turn = self.turns(codes, groups)[self._cycle % self._parts]
         return self._turn
+
+    @property
+    def owes(self) -> bool:
+        """True while values are owed."""
+        return bool(self._owed)
+
+    def turns(self, codes: Iterable[str], groups: Groups) -> tuple[tuple[str, ...], ...]:
+        """The values of each of the cycles in which all of them have their turn."""
+        found = groups(codes)
+        return tuple(_joined(found[part :: self._parts]) for part in range(self._parts))
+
+    def set_turn(self, codes: tuple[str, ...]) -> tuple[str, ...]:
+        """These values have their turn, unless some are owed."""
+        self._turn = codes
+        return codes
 
     def came(self) -> None:
         """The values of this turn were read; of what is owed yet comes twice as much."""

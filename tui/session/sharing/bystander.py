@@ -53,6 +53,10 @@ class Bystander:
         self._now = now
         self._asked = now()
 
+    def freely(self) -> bool:
+        """Whether it may be asked at any time: nobody is known to have started its motor."""
+        return self._sign() is None and not self.orphan
+
     def held_back(self) -> str:
         """Why the drive must not be asked now, or nothing: then it counts as asked."""
         self.waits = not self._may_ask()

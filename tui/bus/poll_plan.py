@@ -1,0 +1,84 @@
+"""Reads of one device that the process which holds the line repeats for a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from .bounds import MonotonicTime, RegisterAddress
+from .errors import LineError
+from .model import Reply
+
+MOST_TURNS, MOST_READS = 16, 250
+"""Turns of a plan, and reads of one turn."""
+SHORTEST_PERIOD, LONGEST_PERIOD = 0.05, 60.0
+"""Bounds of a plan's period in seconds; what is read less often needs no plan."""
+SHARED_AGE = 0.5
+"""Age up to which a poll takes what was read for another program, as a share of the cycle: two
+programs of one period then read each value once, however their cycles lie to each other."""
+USUAL_TURNAROUND = 0.005
+"""Seconds that a device takes to answer, until it is measured."""
+
+
+class PlannedRead(msgspec.Struct, frozen=True, array_like=True):
+    """One read of registers by function 3, or of input registers by 4."""
+
+    address: RegisterAddress
+    count: Annotated[int, Meta(ge=1, le=125)]
+    function: Literal[3, 4] = 3
+
+
+PlannedTurn = Annotated[tuple[PlannedRead, ...], Meta(min_length=1, max_length=MOST_READS)]
+
+
+class PollPlan(msgspec.Struct, frozen=True):
+    """Cycles of reads of one device: a turn in each period, one turn after the other."""
+
+    device: Annotated[int, Meta(ge=1, le=255)]
+    turns: Annotated[tuple[PlannedTurn, ...], Meta(min_length=1, max_length=MOST_TURNS)]
+    period: Annotated[float, Meta(ge=SHORTEST_PERIOD, le=LONGEST_PERIOD)]
+    """Seconds from one cycle to the next; longer on a full line."""
+    begin: MonotonicTime
+    """When the first cycle begins."""
+
+    @property
+    def rates(self) -> dict[PlannedRead, float]:
+        """How often each read is sent in a second."""
+        each = 1.0 / (self.period * len(self.turns))
+        found: dict[PlannedRead, float] = {}
+        for turn in self.turns:
+            for read in turn:
+                found[read] = found.get(read, 0.0) + each
+        return found
+
+
+class PolledTurn:
+    """The replies of one cycle, each taken once."""
+
+    def __init__(
+        self, turn: int, begun: float, replies: Mapping[PlannedRead, Reply | LineError]
+    ) -> None:
+        self.turn, self.begun = turn, begun
+        self._left = dict(replies)
+        self._missed = False
+        times = (one.time for one in replies.values() if isinstance(one, Reply))
+        self.ended = max(times, default=begun)
+        """The time of the last reply."""
+
+    @property
+    def differs(self) -> bool:
+        """True if the reads that were wanted are not those of the plan."""
+        return self._missed or bool(self._left)
+
+    def take(self, read: PlannedRead, after: float) -> Reply | None:
+        """The reply to a read if it is newer than `after`; raises the error that came instead."""
+        if read not in self._left:
+            self._missed = True
+            return None
+        found = self._left.pop(read)
+        if isinstance(found, LineError):
+            raise found
+        return found if found.time > after else None

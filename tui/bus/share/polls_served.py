@@ -1,0 +1,202 @@
+"""The plans of all programs on a line, carried out by its owner."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..bounds import MOST_DEVICES, MOST_STRETCH
+from ..errors import DeviceException, LineError, RequestRefused
+from ..limits import CAUTIOUS
+from ..link import character_time, silence
+from ..model import Priority, Reply
+from ..poll_plan import SHARED_AGE, USUAL_TURNAROUND, PlannedRead
+from ..requests import read_request
+from ..schedule.inside import LineInside
+from ..schedule.pace import SHARE, greatest
+from ..schedule.queue import Job
+from .attached import Client
+from .failures import failure_told
+from .messages import NoMessage
+from .poll_messages import Polled, PolledReply, Subscribe
+from .polls_submitted import plan_refusal
+
+log = logging.getLogger(__name__)
+
+MOST_UNTAKEN = 1 << 16
+"""Bytes that a program may leave unread before nothing is polled for it."""
+MOST_PLANNED = 1 << 16
+"""Reads in all plans of one program."""
+SHARED_OUT_EVERY = 0.5
+"""Seconds from one look at all plans to the next."""
+CLOCK_STEP = 1e-6
+"""Seconds by which a reply is newer than another, at least."""
+READ_CHARACTERS = 13
+"""Characters of a read and its reply, beside the words."""
+
+
+@dataclass(eq=False, slots=True)
+class ServedPlan:
+    """One plan of one program."""
+
+    client: Client
+    message: Subscribe
+    rates: dict[PlannedRead, float]
+    """How often each of its reads is sent in a second."""
+    task: asyncio.Task[None] | None = None
+    read_at: dict[PlannedRead, float] = field(default_factory=dict)
+    """The time of the last reply to each read."""
+
+    @property
+    def size(self) -> int:
+        """Its reads, those of all turns."""
+        return sum(len(turn) for turn in self.message.plan.turns)
+
+
+class PollsServed:
+    """Carries plans out, each in a task of the line's loop, as polls of the program they are of."""
+
+    def __init__(self, inside: LineInside) -> None:
+        self._inside = inside
+        self._served: dict[Client, dict[int, ServedPlan]] = {}
+        self._shared_out = -math.inf
+
+    def start(self, client: Client, message: Subscribe) -> None:
+        """Carry a plan out from now on. Raises NoMessage."""
+        self.end(client, message.number)
+        served = self._served.setdefault(client, {})
+        plan, one = message.plan, ServedPlan(client, message, message.plan.rates)
+        if len(served) >= MOST_DEVICES:
+            raise NoMessage("too many plans")
+        limits = client.limits.get(plan.device, CAUTIOUS)
+        why = plan_refusal(plan, limits)
+        if one.size + sum(other.size for other in served.values()) > MOST_PLANNED:
+            why = why or f"Not polled: more than {MOST_PLANNED} reads."
+        if why:
+            failure = PolledReply(b"", 0.0, failure_told(RequestRefused(why)))
+            client.say(Polled(message.number, 0, self._inside.clock(), (failure,)))
+            return
+        served[message.number] = one
+        one.task = asyncio.get_running_loop().create_task(
+            self._work(one), name=f"polls of device {plan.device}"
+        )
+        one.task.add_done_callback(_note_error)
+
+    def end(self, client: Client, number: int) -> None:
+        """Poll for a plan no longer."""
+        one = self._served.get(client, {}).pop(number, None)
+        if one is not None and one.task is not None:
+            one.task.cancel()
+
+    def end_all(self, client: Client) -> None:
+        """A program has left."""
+        for number in list(self._served.get(client, {})):
+            self.end(client, number)
+        self._served.pop(client, None)
+
+    def close(self) -> None:
+        """Poll for nobody any more."""
+        for client in list(self._served):
+            self.end_all(client)
+
+    # The time of the line
+
+    def share_out(self, wishes: Mapping[int, float]) -> None:
+        """Find the factor for the periods of all polls; `wishes` are those of the programs.
+
+        To be called again and again; it is found anew once in a while.
+        """
+        pace, now = self._inside.pace, self._inside.clock()
+        if now - self._shared_out < SHARED_OUT_EVERY:
+            return
+        self._shared_out = now
+        pace.others = wishes
+        wished = sum(greatest(pace.own, pace.others, self._shares()).values())
+        pace.stretch = min(max(1.0, wished / SHARE), MOST_STRETCH)
+
+    def _shares(self) -> dict[int, float]:
+        """The share of the line's time that plans want, by device; the same read counts once."""
+        rates: dict[int, dict[PlannedRead, float]] = {}
+        for one in self._all():
+            known = rates.setdefault(one.message.plan.device, {})
+            for read, rate in one.rates.items():
+                known[read] = max(rate, known.get(read, 0.0))
+        return {device: self._share(device, reads) for device, reads in rates.items()}
+
+    def _all(self) -> list[ServedPlan]:
+        return [one for plans in self._served.values() for one in plans.values()]
+
+    def _share(self, device: int, rates: Mapping[PlannedRead, float]) -> float:
+        """The share of the time that reads of a device take on the wire, without repeats."""
+        link = self._inside.link
+        measured = self._inside.devices.state(device).usual_turnaround
+        quiet, turnaround = silence(link), USUAL_TURNAROUND if measured is None else measured
+        character, waits = character_time(link), max(turnaround, quiet) + quiet
+        return sum(
+            ((READ_CHARACTERS + 2 * read.count) * character + waits) * rate
+            for read, rate in rates.items()
+        )
+
+    # Reading
+
+    async def _work(self, one: ServedPlan) -> None:
+        clock, plan = self._inside.clock, one.message.plan
+        due, turn = min(plan.begin, clock() + plan.period), 0
+        while True:
+            await asyncio.sleep(max(0.0, due - clock()))
+            begun = clock()
+            if one.client.unread <= MOST_UNTAKEN:
+                replies = await self._cycle(one, turn)
+                one.client.say(Polled(one.message.number, turn, begun, replies))
+                turn = (turn + 1) % len(plan.turns)
+            due = begun + plan.period * self._inside.pace.stretch
+
+    async def _cycle(self, one: ServedPlan, turn: int) -> tuple[PolledReply, ...]:
+        """The replies of one cycle; a device that is silent is not asked for the rest of it."""
+        found: list[PolledReply] = []
+        for read in one.message.plan.turns[turn]:
+            try:
+                reply = await self._read(one, read)
+            except LineError as error:
+                found.append(PolledReply(b"", 0.0, failure_told(error)))
+                if not isinstance(error, DeviceException):
+                    break
+            else:
+                one.read_at[read] = reply.time
+                found.append(PolledReply(reply.pdu, reply.time))
+        return tuple(found)
+
+    async def _read(self, one: ServedPlan, read: PlannedRead) -> Reply:
+        """One read, as a single poll of the program. Raises the line's errors."""
+        device, now = one.message.plan.device, self._inside.clock()
+        request = read_request(device, read.address, read.count, read.function)
+        limits = one.client.limits.get(device, CAUTIOUS)
+        job = Job(request, Priority.POLL, limits)
+        job.program, job.asked = one.client.program.id, now
+        period = one.message.plan.period * self._inside.pace.stretch
+        # nothing that this program has been given already
+        since = now - one.read_at.get(read, 0.0) - CLOCK_STEP
+        job.max_age = max(0.0, min(period * SHARED_AGE, since))
+        self._inside.submit(job)
+        await _ended(job)
+        return job.answer.result()
+
+
+def _note_error(task: asyncio.Task[None]) -> None:
+    """An internal error has ended a plan; its program reads by itself after a while."""
+    if not task.cancelled() and (error := task.exception()) is not None:
+        log.error("%s ended by an error", task.get_name(), exc_info=error)
+
+
+async def _ended(job: Job) -> None:
+    """Wait for the answer to a job, which is set in this loop; withdraw it if cancelled."""
+    ended = asyncio.Event()
+    job.answer.add_done_callback(lambda _: ended.set())
+    try:
+        await ended.wait()
+    except asyncio.CancelledError:
+        job.answer.cancel()
+        raise
