@@ -16,6 +16,7 @@ from tui.bus.keep_alive import KeepAlive
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.strangers_asked import StrangersAsked
 from tui.session.read.presence import UNKNOWN_TIMEOUT
 
 from .fakes import OneDrive, parameter, profile_of
@@ -145,6 +146,16 @@ async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
     assert kept.watch.warnings() == []
     assert kept.watch.left_alone() == {}
     await until(lambda: kept_alive(kept.line) == [])
+
+
+async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None:
+    line = HeardLine(20)
+    strangers = StrangersAsked(line)
+    strangers.keep(7)
+    await until(lambda: kept_alive(line) != [])
+    assert [(one.device, one.timeout) for one in kept_alive(line)] == [(7, UNKNOWN_TIMEOUT)]
+    strangers.stop()
+    assert kept_alive(line) == []
 
 
 async def test_drive_is_kept_alive_while_its_timeout_is_learned(
