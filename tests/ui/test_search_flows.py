@@ -16,7 +16,7 @@ from tui.screens.monitor.screen import MonitorScreen
 from tui.session.connect.identify import DriveIdentity, ScanResult
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.paths import recent_lines
-from tui.simulator import DriveSpec, Simulation
+from tui.simulator import DriveSpec, FaultRates, Simulation
 
 from .test_flows import shown, until
 
@@ -27,9 +27,11 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @asynccontextmanager
-async def panel(*specs: DriveSpec) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]:
+async def panel(
+    *specs: DriveSpec, faults: FaultRates | None = None
+) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]:
     """The panel on a line of which it is not known who is there."""
-    simulation = Simulation(list(specs))
+    simulation = Simulation(list(specs), faults=faults)
     simulation.start()
     text = rtu_tcp(simulation)
 
@@ -145,3 +147,12 @@ async def test_drive_whose_identification_comes_damaged_keeps_its_stop_keys() ->
         await app.connection._take(other)
         assert fleet.found[9].console is None
         assert "It came damaged. The address is taken." in said(app)
+
+
+async def test_swapped_bytes_are_shown_at_the_connection_and_on_monitor() -> None:
+    async with panel(DriveSpec("atv71", 1), faults=FaultRates(swapped=1.0)) as (app, pilot):
+        await until(pilot, lambda: any("arrive swapped" in text for text in said(app)))
+        await until(pilot, lambda: 1 in app.connection.found)
+        await pilot.press("enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        await until(pilot, lambda: "BYTES SWAPPED" in shown(app, "said"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from tui.bus.errors import BytesSwapped
 from tui.drive.byte_order import only_swapped
@@ -28,6 +28,8 @@ class ByteOrder:
         self._seen: dict[str, tuple[bool, float]] = {}
         self._against: tuple[str, ...] = ()
         """Codes that showed swapped bytes, while words arrive so."""
+        self.on_swapped: Callable[[str], object] = str
+        """Called with the text once words begin to arrive swapped."""
         self._tested = self._was_away = False
 
     @property
@@ -76,5 +78,8 @@ class ByteOrder:
             self._seen = {c: s for c, s in every.items() if now - s[1] <= REMEMBERED}
             against = sorted(code for code, (swapped, _) in self._seen.items() if swapped)
             others = len(self._seen) - len(against)
-            if len(against) >= REGISTERS and len(against) >= MAJORITY * others:
+            begins = not self._against and len(against) >= max(REGISTERS, MAJORITY * others)
+            if begins:
                 self._against = tuple(against)
+        if begins:
+            self.on_swapped(self.text)

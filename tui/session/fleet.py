@@ -150,6 +150,7 @@ class Fleet:
         session.guessed = guessed
         session.starts = self.starts
         session.work.on_tell = partial(self._note_outcome, session.device)
+        session.byte_order.on_swapped = partial(self.events.add, "failed", device=session.device)
         console = DriveConsole(session, self.journal)
         said = identity or session.known_identity
         self._put(FoundDrive(said, console))

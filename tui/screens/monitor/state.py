@@ -68,6 +68,9 @@ def _head(view: View, width: int) -> tuple[Text, list[Text]]:
     if snapshot is None:
         waits = "waiting for values" if view.line.status is LineStatus.CONNECTED else "connecting"
         return Text(waits, ALARM), []
+    if snapshot.contact == "swapped":
+        why = "in each word: check the byte order of the gateway or converter"
+        return Text("BYTES SWAPPED", ALARM), [Text(line, PLAIN) for line in wrapped(why, width, 4)]
     if view.lost:
         return _lost(view, "NOT HEARD", width)
     if view.stop is not None and snapshot.state.kind != "fault":
