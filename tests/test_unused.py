@@ -28,7 +28,7 @@ HOOKS = {
     "connection_made", "data_received", "connection_lost", "feed_data", "format_commands",
     "format_completion", "source_template", "highlight", "enqueue", "handleError", "emit",
     "run_input_thread", "WithMouse", "Drawing", "restarts", "redrawn", "watchdog",
-    "panic", "_fatal_error", "_sigcont_application",
+    "panic", "_fatal_error", "_sigcont_application", "createLock",
 }  # fmt: skip
 """Names by which libraries call what is here, and what is kept for tests to look at."""
 

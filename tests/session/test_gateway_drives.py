@@ -8,7 +8,7 @@ from tui.bus.requests import Identify
 from tui.session.gateway.drives import GatewayDrives
 
 
-async def test_drive_identified_while_line_was_lost_is_asked_again() -> None:
+async def test_drive_identified_while_line_was_lost_is_identified_again() -> None:
     line = FakeLine({1: {}})
     noted: list[int] = []
 
@@ -22,8 +22,8 @@ async def test_drive_identified_while_line_was_lost_is_asked_again() -> None:
     drives = GatewayDrives(line, lose_line, {1: "atv71"})
     session = await drives.found(1)
     assert session is drives.known(1)
-    asked = line.requests.count(Identify(1))
-    assert asked == 2, "another drive may answer since"
+    count = line.requests.count(Identify(1))
+    assert count == 2, "another drive may answer since"
     assert await drives.found(1) is session
-    assert line.requests.count(Identify(1)) == asked
+    assert line.requests.count(Identify(1)) == count
     drives.close()

@@ -182,7 +182,7 @@ def line_of(port: str) -> fakes.StillLine:
     return line
 
 
-async def test_nothing_is_asked_above_a_picture_that_monitor_replaces(adapters: Adapters) -> None:
+async def test_question_waits_for_monitor_to_replace_first_picture(adapters: Adapters) -> None:
     async with lost_with_adapter_changed(adapters) as pilot:
         app = pilot.app
         assert isinstance(app, DrivePanelApp)
@@ -194,7 +194,7 @@ async def test_nothing_is_asked_above_a_picture_that_monitor_replaces(adapters: 
         assert isinstance(app.screen, Confirm)
 
 
-async def test_a_question_that_monitor_has_replaced_is_asked_again(adapters: Adapters) -> None:
+async def test_question_that_monitor_has_replaced_comes_again(adapters: Adapters) -> None:
     async with lost_with_adapter_changed(adapters) as pilot:
         app = pilot.app
         assert isinstance(app, DrivePanelApp)
@@ -214,7 +214,7 @@ async def test_a_question_that_monitor_has_replaced_is_asked_again(adapters: Ada
         assert isinstance(app.screen, MonitorScreen), "it was answered"
 
 
-async def test_a_question_below_another_screen_is_asked_again_once(adapters: Adapters) -> None:
+async def test_question_below_another_screen_comes_again_once(adapters: Adapters) -> None:
     async with lost_with_adapter_changed(adapters) as pilot:
         app = pilot.app
         assert isinstance(app, DrivePanelApp)

@@ -68,10 +68,12 @@ class LineCheck(Panel):
 
     def _ask_again_if_hidden(self) -> None:
         """A screen may have replaced the question, or cover it; nobody has answered it then."""
-        asked = self._line_question
-        if asked is None or asked.is_answered or asked is self.screen or self.screen.is_modal:
+        question = self._line_question
+        if question is None or question.is_answered or question is self.screen:
             return
-        asked.void()  # nothing is asked twice by a way back to it
+        if self.screen.is_modal:
+            return
+        question.void()  # nothing is asked twice by a way back to it
         self._asked_of, self._line_question = (), None
 
     def _look_again(self, known: KnownLine) -> None:

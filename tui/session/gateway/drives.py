@@ -86,9 +86,9 @@ class GatewayDrives:
         """Ask a device that answers who it is, beside what else is done; not again and again."""
         sure = self.known(device) is not None and self._is_sure(device)
         if not sure and device not in self._tasks:
-            losses, asked = self._asked.get(device, (-1, 0.0))
+            losses, since = self._asked.get(device, (-1, 0.0))
             now = asyncio.get_running_loop().time()
-            if losses != self._losses or now - asked >= WHO_AGAIN_AFTER:
+            if losses != self._losses or now - since >= WHO_AGAIN_AFTER:
                 self._begin(device)
 
     async def found(self, device: int) -> DriveSession | None:
