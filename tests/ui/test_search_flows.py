@@ -155,4 +155,4 @@ async def test_swapped_bytes_are_shown_at_the_connection_and_on_monitor() -> Non
         await until(pilot, lambda: 1 in app.connection.found)
         await pilot.press("enter")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
-        await until(pilot, lambda: "BYTES SWAPPED" in shown(app, "said"))
+        await until(pilot, lambda: "BYTES SWAPPED" in shown(app, "state"))
