@@ -96,7 +96,8 @@ class Recorded:
 
     def feed(self, data: bytes, now: float) -> None:
         """Take bytes that have just come in."""
-        if len(data) > self._place:
+        # an RTU frame at a Modbus TCP server is no request there
+        if len(data) > self._place and (self._place == 1 or data[2:4] == bytes(2)):
             self._functions.append(data[self._place])
         self._conversation.feed(data, now)
 

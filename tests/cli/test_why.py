@@ -24,7 +24,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here"
 
 def test_a_drive_that_answers() -> None:
     with tcp_line("atv71@2") as line:
-        assert run(0, "why", line, "-d", "2").startswith("Address 2 answers: 5 of 5 requests")
+        assert run(0, "why", line, "-d", "2").startswith("Address 2 answers: 205 of 205 requests")
         told = json.loads(run(0, "why", line, "-d", "2", "--json"))
     assert (told["rung"], told["answers"], told["next"]) == ("answers", True, [])
     assert (told["profile"], told["seen"]["answered"]) == ("atv71", 5)
@@ -113,6 +113,6 @@ def test_beside_a_program_that_owns_the_line(tmp_path: Path) -> None:
         owner = [*DRIVEPANEL, "watch", peer.path, "-p", "atv71", "--every", "0.2", "ETA"]
         with served(owner, ready="ETA"):
             told = json.loads(run(0, "why", peer.path, "-p", "atv71", "--json"))
-            assert (told["rung"], told["seen"]["answered"] >= 5) == ("answers", True)
+            assert (told["rung"], told["seen"]["answered"] >= 5) == ("answers", True), told
             told = json.loads(run(3, "why", peer.path, "-p", "atv71", "-d", "3", "--json"))
             assert told["rung"] == "silence"

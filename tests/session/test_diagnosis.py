@@ -53,7 +53,9 @@ from tui.drive.profile.profile import Profile
 from tui.session.connect.known_line import KnownLine
 from tui.session.diagnosis.asking import sight_of_drive, sight_of_port
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.gateway_probe import Works
 from tui.session.diagnosis.heard import Heard, heard_by_errors
+from tui.session.diagnosis.measure import Measure
 from tui.session.diagnosis.rungs import LADDER
 from tui.session.diagnosis.sight import AdapterSeen, Sight
 from tui.wire.frames import frame
@@ -560,6 +562,15 @@ def test_a_format_that_the_family_has_not() -> None:
 
 ASKED = Sight(LINK, 2, PROFILE, port=PortSeen(PORT))
 EXAMPLES = {
+    "other-master": replace(ASKED, overheard="Another master asks drives on this line. Address 2."),
+    "wrong-protocol": replace(ASKED, works=Works("rtu-tcp:gateway:4001")),
+    "other-unit": replace(ASKED, works=Works("", 255)),
+    "behind": replace(ASKED, measure=Measure(asked=9, behind=3)),
+    "two-drives": replace(ASKED, measure=Measure(asked=9, answered=9, second=3)),
+    "swapped": replace(ASKED, measure=Measure(asked=9, answered=9, swapped=3)),
+    "lost": replace(ASKED, measure=Measure(asked=9, answered=8, lost=1)),
+    "duplicated": replace(ASKED, measure=Measure(asked=9, answered=9, duplicated=1)),
+    "idle-close": replace(ASKED, measure=Measure(asked=9, answered=9), idle_closed=True),
     "renumbered": replace(ASKED, adapter=AdapterSeen("/dev/serial/by-id/a", "/dev/ttyUSB1")),
     "changed": replace(ASKED, changed="It was a pump.", heard=Heard(asked=5, answered=5)),
     "no-port": replace(ASKED, trouble=PortMissing(PORT)),
@@ -592,6 +603,13 @@ def test_what_is_seen_leads_to_its_rung(rung: str) -> None:
 
 def test_every_rung_has_an_example() -> None:
     assert {rung.id for rung in LADDER} | {"answers", "not-open"} == set(EXAMPLES)
+
+
+@pytest.mark.parametrize(("lost", "certainty"), [(1, "possible"), (2, "likely"), (5, "certain")])
+def test_certainty_grows_with_what_was_seen(lost: int, certainty: str) -> None:
+    found = of(replace(ASKED, measure=Measure(asked=200, answered=200 - lost, lost=lost)))
+    assert found.certainty == certainty
+    assert bool(found.others) is (certainty != "certain")
 
 
 FEW = st.integers(0, 3)

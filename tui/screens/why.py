@@ -56,8 +56,9 @@ def _open_drive(app: Panel) -> WhyTarget | None:
 
 async def _looked(target: WhyTarget) -> Diagnosis:
     """What is seen, and which rung of the ladder fails."""
-    from tui.session.diagnosis.asking import profile_remembered, sight_of_drive, sight_of_port
+    from tui.session.diagnosis.asking import profile_remembered, sight_of_port
     from tui.session.diagnosis.diagnosis import diagnosed
+    from tui.session.diagnosis.examining import examine_line
 
     opened = target.opened
     link = opened.line.link if opened is not None else parse_link(target.text)
@@ -70,7 +71,7 @@ async def _looked(target: WhyTarget) -> Diagnosis:
     answer = [one for one in target.neighbours if line.device_state(one).answers]
     changed = opened.known.text if opened.known is not None else ""
     return diagnosed(
-        await sight_of_drive(line, target.device, profile, changed=changed, neighbours=answer)
+        await examine_line(line, target.device, profile, changed=changed, answering=answer)
     )
 
 

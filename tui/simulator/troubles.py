@@ -89,7 +89,7 @@ class FaultRates:
 
 @dataclass(frozen=True, slots=True)
 class Habits:
-    """What a sick line does all the time; at 0, None and infinity it does not."""
+    """Habits of a sick line; at 0, None and infinity it has none."""
 
     behind: int = 0
     lost_every: int = 0
@@ -107,8 +107,8 @@ def troubles_of(values: Mapping[str, float]) -> tuple[FaultRates, Habits]:
         least, most = VALUE_LIMITS[unit]
         fits = least <= value <= most
         if not fits or (unit in (REPLIES, UNIT) and value != int(value)):
-            told = f"{kind} takes {least:g} to {most:g} ({unit})"
-            raise SimulatorError(f"'{kind}={value:g}': write KIND=VALUE; {told}.")
+            takes = f"{kind} takes {least:g} to {most:g} ({unit})"
+            raise SimulatorError(f"'{kind}={value:g}': write KIND=VALUE; {takes}.")
     rates = {k: v for k, v in values.items() if TROUBLES[k].unit == SHARE}
     habits = {k: v if TROUBLES[k].unit == SECONDS else int(v) for k, v in values.items()}
     return (

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from tui.session.diagnosis.diagnosis import Diagnosis
 
 
+SICK_COUNTS = ("lost", "damaged", "late", "duplicated", "foreign", "behind", "second")
+
+
 @click.command()
 @line_argument
 @settings_options
@@ -35,7 +38,9 @@ if TYPE_CHECKING:
 def why(target: Target, read_only: bool, as_json: bool) -> None:
     """Tell why a drive does not answer: what fails, in a sentence, and what to look at next.
 
-    Looks at the port and its adapter, then asks the drive a few times. Nothing is written, and no
+    Looks at the port and its adapter. Listens before it sends: it sends nothing while another
+    master is heard. Then it reads the drive up to 200 times. A silent gateway is also tried by
+    the other protocol, and by the units 255 and 0. Nothing is written, and no
     other baud or format is tried. With -p, or a drive that was here before, what the manual of its
     family says of address, settings, pins and wires stands behind it. Ends with 0 where the drive
     answers and nothing is wrong, else with 3.
@@ -63,13 +68,14 @@ async def _asked(
     opened: OpenLine, target: Target, named: Profile | None
 ) -> tuple[Diagnosis, dict[str, Any]]:
     """The diagnosis of a drive on an open line, and how a document about it begins."""
-    from tui.session.diagnosis.asking import profile_remembered, sight_of_drive
+    from tui.session.diagnosis.asking import profile_remembered
     from tui.session.diagnosis.diagnosis import diagnosed
+    from tui.session.diagnosis.examining import examine_line
 
     line, device = opened.line, target.device
     profile = named or await asyncio.to_thread(profile_remembered, line.link, device)
     changed = opened.known.text if opened.known is not None else ""
-    found = diagnosed(await sight_of_drive(line, device, profile, changed=changed))
+    found = diagnosed(await examine_line(line, device, profile, changed=changed))
     about = await _looked_after(opened, target, profile) if found.sight.heard.answered else {}
     return found, about
 
@@ -135,6 +141,10 @@ def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool
         print_json({**drive, **about, **why_json(found)})
         return
     say(found.text)
+    if found.certainty != "certain":
+        say(f"This is {found.certainty}. It could also be:")
+        for other in found.others:
+            say(f"  - {other}", indent=4)
     if found.steps:
         say("Look at next:")
     for step in found.steps:
@@ -148,8 +158,11 @@ def why_json(found: Diagnosis) -> dict[str, Any]:
     return {
         "rung": found.rung,
         "answers": found.well,
+        "certainty": found.certainty,
+        "others": list(found.others),
         "text": found.text,
         "next": list(found.steps),
+        "measured": _measured_json(found),
         "seen": {
             "asked": heard.asked,
             "answered": heard.answered,
@@ -166,4 +179,16 @@ def why_json(found: Diagnosis) -> dict[str, Any]:
             "turnaround_ms": round(late * 1000, 1) if late is not None else None,
             "latency_timer_ms": sight.port.latency if sight.port is not None else None,
         },
+    }
+
+
+def _measured_json(found: Diagnosis) -> dict[str, Any] | None:
+    """The counts of the short reads; None where there were none."""
+    measure = found.sight.measure
+    if measure is None:
+        return None
+    counts = ("asked", "answered", *SICK_COUNTS)
+    return {
+        **{name: getattr(measure, name) for name in counts},
+        "seconds": round(measure.seconds, 2),
     }

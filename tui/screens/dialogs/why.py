@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 WHY_WIDTH, BESIDE_WHY = 76, 6
 """Columns of the dialog at most, and those of its border, its margin and its scroll bar."""
 SENTENCE_ROWS = 12
-LOOKING = "Looking at the port, and asking the drive a few times ..."
+LOOKING = "Listening to the line, then reading the drive for some seconds ..."
 BULLET = "· "
 WHY_KEYS = hint(("Esc", "closes"), ("N", "asks again"), ("Up, Down", "scroll"))
 
@@ -106,9 +106,15 @@ def reason_lines(found: Diagnosis | None, width: int) -> Iterator[Text]:
         return
     style = RUNNING if found.well else ALARM
     yield from (Text(part, style) for part in wrapped(found.text, width, SENTENCE_ROWS))
+    if found.others:
+        yield from _listed(f"This is {found.certainty}; it could also be", found.others, width)
     if found.steps:
-        yield Text("")
-        yield Text("Look at next", STRONG)
-    for step in found.steps:
+        yield from _listed("Look at next", found.steps, width)
+
+
+def _listed(head: str, items: Iterable[str], width: int) -> Iterator[Text]:
+    yield Text("")
+    yield Text(head, STRONG)
+    for step in items:
         for number, part in enumerate(wrapped(step, width - len(BULLET), SENTENCE_ROWS)):
             yield Text("  " if number else BULLET, FAINT).append(part, PLAIN)

@@ -79,7 +79,7 @@ async def sight_of_drive(
         return replace(seen, trouble=LineLost(line.state.reason or "The line is not open yet."))
     if profile is not None:
         line.describe(device, limits_of(profile))
-    before, last = _errors_counted(line), _last(line.trace)
+    before, last = _errors_counted(line), last_time(line.trace)
     try:
         outcomes = await _outcomes(line, device, profile)
     except RequestRefused as error:
@@ -152,7 +152,8 @@ async def _heard(
         await REAL_CLOCK.sleep(FRAMES_COME_WITHIN / 10)
 
 
-def _last(frames: Sequence[Frame]) -> float:
+def last_time(frames: Sequence[Frame]) -> float:
+    """The time after which a frame is new."""
     return max((frame.time for frame in frames), default=-math.inf)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from .rungs import LADDER
+from .sick import CERTAIN
 from .sight import Sight
 
 ANSWERS = "answers"
@@ -23,6 +24,10 @@ class Diagnosis:
     text: str
     steps: tuple[str, ...]
     sight: Sight
+    certainty: str = CERTAIN
+    """Certainty of the verdict: `certain`, `likely` or `possible`."""
+    others: tuple[str, ...] = field(default=())
+    """Other possible causes."""
 
     @property
     def well(self) -> bool:
@@ -34,10 +39,17 @@ def diagnosed(sight: Sight) -> Diagnosis:
     """The first rung of the ladder that fails."""
     for rung in LADDER:
         if rung.fails(sight):
-            return Diagnosis(rung.id, rung.says(sight), tuple(rung.steps(sight)), sight)
+            sure = rung.certainty(sight)
+            others = () if sure == CERTAIN else rung.others
+            return Diagnosis(
+                rung.id, rung.says(sight), tuple(rung.steps(sight)), sight, sure, others
+            )
     heard = sight.heard
     if not heard.asked:
         return Diagnosis(UNOPENED, NOTHING_SEEN, (OPEN_IT,), sight)
     after = f", {sight.turnaround * 1000:.0f} ms after each request" if sight.turnaround else ""
-    text = f"Address {sight.device} answers: {heard.answered} of {heard.asked} requests{after}."
+    measure = sight.measure
+    asked = heard.asked + (measure.asked if measure is not None else 0)
+    answered = heard.answered + (measure.answered if measure is not None else 0)
+    text = f"Address {sight.device} answers: {answered} of {asked} requests{after}."
     return Diagnosis(ANSWERS, text, (), sight)

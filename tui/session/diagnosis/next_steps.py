@@ -197,3 +197,65 @@ def ask_otherwise(sight: Sight) -> Iterator[str]:
 def _any(names: tuple[str, ...]) -> str:
     """Names of which one is right."""
     return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]
+
+
+def one_master(sight: Sight) -> Iterator[str]:
+    """Another master on the line."""
+    if details := sight.overheard.partition(". ")[2]:
+        yield f"It asks {details[:1].lower()}{details[1:]}"
+    yield "Stop the other master, or join it: a line has one. drivepanel listen shows what it asks."
+
+
+def open_what_works(sight: Sight) -> Iterator[str]:
+    """A gateway that speaks another protocol."""
+    assert sight.works is not None
+    yield f"Close the line and open {sight.works.line}, or set the gateway to Modbus TCP."
+
+
+def set_unit(sight: Sight) -> Iterator[str]:
+    """A gateway that answers one unit only."""
+    yield f"In the gateway, pass the unit on to the serial side: address {sight.device}."
+    yield "A gateway that cannot do so reaches one drive only, and Drive Panel cannot use it."
+
+
+def restart_converter(_sight: Sight) -> Iterator[str]:
+    """A converter that is one reply behind."""
+    yield "Do not use this line: each value shown may be that of another register."
+    yield "Restart the converter; set its receive timeout longer than the drive takes to reply."
+
+
+def part_drives(sight: Sight) -> Iterator[str]:
+    """Two drives at one address."""
+    yield f"Switch one of the drives at address {sight.device} off, and give the other its own."
+
+
+def swap_bytes(_sight: Sight) -> Iterator[str]:
+    """Bytes that are swapped on the way."""
+    yield "Send no command and no setting: in the gateway, switch the swapping of bytes off."
+
+
+def keep_connection(_sight: Sight) -> Iterator[str]:
+    """A gateway that closes idle connections."""
+    yield "Set the idle timeout of the gateway longer, or switch it off."
+
+
+def find_losses(_sight: Sight) -> Iterator[str]:
+    """Replies that do not come."""
+    yield "Check the wires, their ends and the supply of the drive. Write ,timeout=2 after LINE."
+    yield "Other work of the drive or gateway, or another master, makes it miss requests too."
+
+
+def end_copies(_sight: Sight) -> Iterator[str]:
+    """Replies that come twice."""
+    yield "Check adapter, repeater and gateway: one of them sends each frame again."
+    yield "Switch the drive off and run why again: a reply shows a second drive at its address."
+
+
+SICK_STEPS = {
+    "late": wait_longer,
+    "lost": find_losses,
+    "checksum": end_damage,
+    "duplicated": end_copies,
+    "other-address": find_second_master,
+}
+"""Next steps by the verdict on many reads."""

@@ -5,33 +5,20 @@ Pure: all is told from what was seen. The first rung whose test holds is the one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-
 from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from tui.bus.limits import STANDARD_EXCEPTIONS
 
 from . import next_steps as steps
 from .garbled import speed_told
+from .rung import Rung, first_sentence
+from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS
 from .sight import Sight
 
-Steps = Callable[[Sight], Iterable[str]]
 GATEWAY_CODES = {10: "0A, it has no way to the drive", 11: "0B, the drive did not answer it"}
 HELD_BACK = 8
 """Milliseconds from which an adapter's latency is worth a word."""
 SEEN_OF_IT = 0.75
 """Share of that time that the answers must be late by, to say that it is the adapter's."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rung:
-    """One thing that may be wrong."""
-
-    id: str
-    fails: Callable[[Sight], bool]
-    says: Callable[[Sight], str]
-    """One sentence."""
-    steps: Steps
 
 
 def _not_there(sight: Sight) -> bool:
@@ -67,7 +54,7 @@ def _says_busy(sight: Sight) -> str:
         by = sight.trouble.holder or (port.holder if port else "") or "another program"
         return f"{sight.path} is in use by {by}."
     if isinstance(sight.trouble, NotShared) or port is None or sight.owner_frozen:
-        return _sentence(str(sight.trouble))
+        return first_sentence(str(sight.trouble))
     if port.others:
         return f"{port.others} has {sight.path} open too, and takes what the drive answers."
     return f"{sight.path} is in use by {port.holder}."
@@ -181,35 +168,32 @@ def _says_refused(sight: Sight) -> str:
     return f"The drive is there, and refuses what is asked with exception {code}{why}."
 
 
-def _sentence(text: str) -> str:
-    """The first sentence of a text."""
-    return text.partition(". ")[0].rstrip(".") + "."
-
-
 LADDER: tuple[Rung, ...] = (
     Rung("renumbered", _renumbered, _says_renumbered, steps.find_adapter),
     Rung(
         "changed",
         lambda s: bool(s.changed) and bool(s.heard.answered),
-        lambda s: _sentence(s.changed),
+        lambda s: first_sentence(s.changed),
         steps.accept_change,
     ),
     Rung("no-port", _not_there, lambda s: f"There is no port {s.path}.", steps.plug_in),
     Rung("no-permission", _forbidden, _says_forbidden, steps.get_permission),
+    *GATEWAY_RUNGS,
     Rung("busy", _busy, _says_busy, steps.free_port),
     Rung(
         "port-refused",
         lambda s: isinstance(s.trouble, PortRefused),
-        lambda s: _sentence(str(s.trouble)),
+        lambda s: first_sentence(str(s.trouble)),
         steps.other_port,
     ),
     Rung(
         "line-lost",
         lambda s: s.trouble is not None,
-        lambda s: _sentence(str(s.trouble)),
+        lambda s: first_sentence(str(s.trouble)),
         steps.reach_line,
     ),
-    Rung("withheld", lambda s: bool(s.withheld), lambda s: _sentence(s.withheld), steps.wait),
+    Rung("withheld", lambda s: bool(s.withheld), lambda s: first_sentence(s.withheld), steps.wait),
+    *SICK_RUNGS,
     Rung("slow-adapter", _slow_adapter, _says_slow, steps.hurry_adapter),
     Rung("wrong-settings", _garbled, _says_garbled, steps.mend_settings),
     Rung("silence", _silent, _says_silent, steps.end_silence),

@@ -10,7 +10,9 @@ from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.port_seen import PortSeen
 from tui.drive.profile.profile import Profile
 
+from .gateway_probe import Works
 from .heard import Heard
+from .measure import Measure
 
 NO_ERRORS = PortErrors(0, 0, 0, 0)
 NOT_ASKED = Heard()
@@ -49,6 +51,14 @@ class Sight:
     """What the port counted while the drive was asked."""
     turnaround: float | None = None
     """The usual time from the end of a request to the start of its answer."""
+    overheard: str = ""
+    """Another master on the line, in a sentence; empty where none was heard."""
+    measure: Measure | None = None
+    """Shares of sick frames among many reads; None where the drive was not read so often."""
+    works: Works | None = None
+    """The request that a silent gateway answers."""
+    idle_closed: bool = False
+    """True if the connection was closed as nothing was sent."""
     neighbours: tuple[int, ...] = ()
     """Other addresses of this line that answer."""
 

@@ -38,7 +38,7 @@ class FaultPlan:
         self._twins = 0
 
     def reaches(self) -> bool:
-        """Whether the next request reaches the drives."""
+        """True if the next request reaches the drives."""
         self._requests += 1
         return not self.habits.lost_every or self._requests % self.habits.lost_every != 0
 
@@ -130,7 +130,7 @@ class FaultPlan:
         return [(0.0, seal(body))]
 
     def _overlaps(self) -> bool:
-        """Whether two drives at one address talk at once: every other time."""
+        """True if two drives at one address talk at once: every other time."""
         self._twins += 1
         return bool(self._twins % 2)
 

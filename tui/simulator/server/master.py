@@ -16,7 +16,7 @@ class PollingMaster:
     def __init__(self, line: SimulatedLine, period: float) -> None:
         self._line = line
         self._period = period
-        self._asked = 0
+        self._polls = 0
         self.due: float | None = 0.0 if period and line.drives else None
         """When it asks next, on a monotonic clock."""
 
@@ -25,8 +25,8 @@ class PollingMaster:
         if self.due is None or now < self.due:
             return []
         self.due = now + self._period
-        drive = self._line.drives[self._asked % len(self._line.drives)]
-        self._asked += 1
+        drive = self._line.drives[self._polls % len(self._line.drives)]
+        self._polls += 1
         status = drive.profile.quantity("status_word")
         place = status.address if status is not None else 0
         request = seal(bytes([drive.address, READ, *place.to_bytes(2, "big"), 0, 1]))

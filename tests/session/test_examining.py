@@ -1,0 +1,139 @@
+"""A whole examination: listening, the counts of many reads, and the other ways of a gateway."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+import pytest
+
+from tui.bus.line import Line
+from tui.bus.link import parse_link
+from tui.bus.trace import Frame
+from tui.drive.profile import library
+from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.examining import examine_line
+from tui.session.diagnosis.measure import Measure, measure_of
+from tui.simulator import DriveSpec, Simulation, troubles_of
+from tui.wire.frames import frame
+
+ASKED = frame(2, bytes.fromhex("030C810001"))
+REPLY = frame(2, bytes.fromhex("03020637"))
+OTHER = frame(2, bytes.fromhex("03020636"))
+WIDE = frame(2, bytes.fromhex("030C810002"))
+STRAY = "late or repeated, device 2"
+Step = bytes | tuple[bytes, str]
+
+
+def counted(steps: Sequence[Step]) -> Measure:
+    """The counts of frames 10 ms apart; requests are those of the two reads."""
+    frames = []
+    for at, step in enumerate(steps):
+        data, note = step if isinstance(step, tuple) else (step, "")
+        way = "out" if data in (ASKED, WIDE) else "in"
+        frames.append(Frame(at / 100, way, data, note))  # type: ignore[arg-type]
+    return measure_of(frames, 2)
+
+
+@pytest.mark.parametrize(
+    ("steps", "worst", "counts"),
+    [
+        ([ASKED, REPLY, ASKED, REPLY], "", {"asked": 2, "answered": 2}),
+        ([ASKED, ASKED, REPLY], "lost", {"lost": 1, "answered": 1}),
+        ([ASKED, (REPLY[:4], "damaged"), ASKED, REPLY], "damaged", {"damaged": 1, "lost": 0}),
+        ([ASKED, (b"\x00", "noise"), REPLY], "damaged", {"damaged": 1, "answered": 1}),
+        ([ASKED, (REPLY, STRAY), ASKED, REPLY], "late", {"late": 1, "lost": 0}),
+        ([ASKED, REPLY, (REPLY, STRAY)], "duplicated", {"duplicated": 1}),
+        ([ASKED, frame(7, REPLY[1:-2])], "foreign", {"foreign": 1, "lost": 0}),
+        ([ASKED, REPLY, (OTHER, STRAY)], "", {"second": 1, "duplicated": 0}),
+        ([ASKED, WIDE, (REPLY, "not the reply")], "lost", {"behind": 1}),
+    ],
+)
+def test_frames_are_counted_by_their_trouble(
+    steps: list[Step], worst: str, counts: Mapping[str, int]
+) -> None:
+    found = counted(steps)
+    assert found.worst == worst
+    assert {kind: found.count(kind) for kind in counts} == counts
+
+
+def test_two_drives_are_distinguished_from_a_value_that_changes() -> None:
+    assert not counted([ASKED, REPLY, ASKED, OTHER, ASKED, OTHER]).two_drives
+    assert counted([ASKED, REPLY, (OTHER, STRAY), ASKED, REPLY, (OTHER, STRAY)]).two_drives
+    broken = (REPLY[:5], "noise")
+    turns: list[Step] = [ASKED, broken, REPLY, ASKED, broken, OTHER, ASKED, REPLY, ASKED, OTHER]
+    assert counted(turns).two_drives
+
+
+def test_a_missing_reply_of_a_slow_drive_is_late() -> None:
+    frames = [Frame(0, "out", ASKED), Frame(0.6, "in", REPLY), Frame(1, "out", ASKED)]
+    assert (measure_of(frames, 2).late, measure_of(frames, 2).lost) == (1, 0)
+
+
+@contextmanager
+def opened(troubles: Mapping[str, float], scheme: str, served: str = "") -> Iterator[Line]:
+    """A line to an Altivar 71 at address 2 with these troubles."""
+    rates, habits = troubles_of(troubles)
+    drive = DriveSpec("atv71", 2)
+    with Simulation([drive], faults=rates, habits=habits) as simulation:
+        tcp = (served or scheme) == "tcp"
+        host, port = simulation.serve_tcp() if tcp else simulation.serve_rtu_tcp()
+        line = Line(parse_link(f"{scheme}:{host}:{port}"))
+        line.open(wait=5)
+        try:
+            yield line
+        finally:
+            line.close()
+
+
+async def found_on(line: Line, family: str | None = "atv71", reads: int = 80) -> Diagnosis:
+    profile = library.load(family) if family else None
+    return diagnosed(await examine_line(line, 2, profile, reads=reads))
+
+
+async def test_nothing_is_sent_while_another_master_is_heard() -> None:
+    with opened({"master": 0.1}, "rtu-tcp") as line:
+        found = await found_on(line)
+        assert found.rung == "other-master"
+        assert line.counters.requests == 0
+        assert any("address 2" in step for step in found.steps)
+
+
+async def test_swapped_bytes_are_found_and_straight_ones_are_not() -> None:
+    with opened({"swapped": 1}, "tcp") as line:
+        assert (await found_on(line)).rung == "swapped"
+    with opened({}, "tcp") as line:
+        well = await found_on(line, None)
+        assert well.well
+        assert well.sight.measure is not None
+        assert well.sight.measure.straight > 3
+
+
+@pytest.mark.parametrize(("scheme", "served"), [("tcp", "rtu-tcp"), ("rtu-tcp", "tcp")])
+async def test_the_other_protocol_is_tried(scheme: str, served: str) -> None:
+    with opened({}, scheme, served) as line:
+        found = await found_on(line)
+        assert found.rung == "wrong-protocol"
+        assert f"{served}:127.0.0.1" in found.text
+
+
+@pytest.mark.parametrize("unit", [255, 0])
+async def test_the_only_unit_of_a_gateway_is_found(unit: int) -> None:
+    with opened({"only-unit": unit}, "tcp") as line:
+        found = await found_on(line)
+    assert (found.rung, f"unit {unit}," in found.text) == ("other-unit", True)
+
+
+async def test_an_idle_timeout_is_found() -> None:
+    with opened({"idle-close": 1}, "tcp") as line:
+        assert (await found_on(line)).rung == "idle-close"
+
+
+async def test_each_second_request_lost_is_not_well() -> None:
+    with opened({"lost-every": 2}, "rtu-tcp") as line:
+        assert (await found_on(line, reads=12)).rung == "lost"
+
+
+async def test_a_line_one_behind_is_named() -> None:
+    with opened({"behind": 1}, "rtu-tcp") as line:
+        assert (await found_on(line, None, 12)).rung == "behind"

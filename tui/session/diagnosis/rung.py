@@ -1,0 +1,30 @@
+"""One cause on the ladder of a diagnosis: its test, its sentence, its steps, its certainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from .sick import CERTAIN
+from .sight import Sight
+
+Steps = Callable[[Sight], Iterable[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One thing that may be wrong."""
+
+    id: str
+    fails: Callable[[Sight], bool]
+    says: Callable[[Sight], str]
+    """One sentence."""
+    steps: Steps
+    certainty: Callable[[Sight], str] = lambda _: CERTAIN
+    others: tuple[str, ...] = ()
+    """Other possible causes, if the verdict is not certain."""
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of a text."""
+    return text.partition(". ")[0].rstrip(".") + "."

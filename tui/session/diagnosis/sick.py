@@ -1,0 +1,103 @@
+"""Verdicts from the shares of sick frames: how each is told, and how sure it is; pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .measure import Measure
+from .sight import Sight
+
+CERTAIN, LIKELY, POSSIBLE = "certain", "likely", "possible"
+SURE_FROM, LIKELY_FROM = 5, 2
+"""Sick frames from which a verdict is certain, and likely."""
+SWAPPED_FROM = 3
+"""Values that must make sense with swapped bytes alone."""
+
+
+def sureness(count: int) -> str:
+    """The certainty that so many sick frames give a verdict."""
+    return CERTAIN if count >= SURE_FROM else LIKELY if count >= LIKELY_FROM else POSSIBLE
+
+
+@dataclass(frozen=True, slots=True)
+class SickFrames:
+    """One way in which frames are sick, as the verdict that it leads to."""
+
+    kind: str
+    rung: str
+    text: str
+    others: tuple[str, ...]
+
+    def fails(self, sight: Sight) -> bool:
+        """True if most sick frames are of this kind."""
+        return sight.measure is not None and sight.measure.worst == self.kind
+
+    def certainty(self, sight: Sight) -> str:
+        """Certainty of the verdict."""
+        assert sight.measure is not None
+        return sureness(sight.measure.count(self.kind))
+
+
+SICK_FRAMES = (
+    SickFrames(
+        "late", "late", "replies did not come in time",
+        ("Something on the way doubles the replies.",),
+    ),
+    SickFrames(
+        "lost", "lost", "requests got no reply",
+        ("The replies come much later.", "Another master disturbs the requests."),
+    ),
+    SickFrames(
+        "damaged", "checksum", "replies came damaged: the checksum does not fit",
+        ("Two drives have this address.", "Another master is on the line."),
+    ),
+    SickFrames(
+        "duplicated", "duplicated", "replies came twice",
+        ("Two drives with the same values have this address.",),
+    ),
+    SickFrames(
+        "foreign", "other-address", "replies carried another address",
+        ("Another master asks other drives.",),
+    ),
+)  # fmt: skip
+
+
+def says_sick(kind: SickFrames, sight: Sight) -> str:
+    """The verdict with its share, and the others beside it."""
+    measure = _measure(sight)
+    count = measure.count(kind.kind)
+    beside = [
+        f"{measure.count(one.kind)} {one.kind}"
+        for one in SICK_FRAMES
+        if one is not kind and measure.count(one.kind)
+    ]
+    more = f"; also {', '.join(beside)}" if beside else ""
+    return f"{count} of {measure.asked} {kind.text}, in {measure.seconds:.1f} s{more}."
+
+
+def says_two_drives(sight: Sight) -> str:
+    """The verdict of two drives at one address."""
+    measure = _measure(sight)
+    return (
+        f"Two drives have address {sight.device}: {measure.asked} requests got"
+        f" {measure.second} second replies with other values and {measure.damaged} damaged ones."
+    )
+
+
+def swapped(sight: Sight) -> bool:
+    """True if values make sense with swapped bytes alone."""
+    measure = sight.measure
+    return measure is not None and measure.swapped >= SWAPPED_FROM and not measure.straight
+
+
+def says_swapped(sight: Sight) -> str:
+    """The verdict of swapped bytes."""
+    return (
+        f"The bytes of each word are swapped: {_measure(sight).swapped} settings make sense only"
+        " with their bytes changed over."
+    )
+
+
+def _measure(sight: Sight) -> Measure:
+    assert sight.measure is not None
+    return sight.measure

@@ -1,0 +1,94 @@
+"""The causes that show in many reads, and those of a gateway."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from . import next_steps as steps
+from .gateway_probe import Works
+from .measure import Measure
+from .rung import Rung, first_sentence
+from .sick import LIKELY, SICK_FRAMES, says_sick, says_swapped, says_two_drives, sureness, swapped
+from .sight import Sight
+
+
+def _measure(sight: Sight) -> Measure:
+    assert sight.measure is not None
+    return sight.measure
+
+
+def _works(sight: Sight) -> Works:
+    assert sight.works is not None
+    return sight.works
+
+
+GATEWAY_RUNGS = (
+    Rung(
+        "other-master",
+        lambda s: bool(s.overheard),
+        lambda s: first_sentence(s.overheard),
+        steps.one_master,
+    ),
+    Rung(
+        "wrong-protocol",
+        lambda s: s.works is not None and bool(s.works.line),
+        lambda s: f"The gateway does not speak the protocol of this line: {_works(s).line} works.",
+        steps.open_what_works,
+    ),
+    Rung(
+        "other-unit",
+        lambda s: s.works is not None and s.works.unit is not None,
+        lambda s: f"The gateway answers unit {_works(s).unit}, and not address {s.device}.",
+        steps.set_unit,
+    ),
+)
+"""Found without a reply on the line itself."""
+SICK_RUNGS: tuple[Rung, ...] = (
+    Rung(
+        "behind",
+        lambda s: s.measure is not None and s.measure.behind > 1,
+        lambda s: (
+            f"Replies are one behind: {_measure(s).behind} of {_measure(s).asked} requests got the"
+            " reply to the request before."
+        ),
+        steps.restart_converter,
+        lambda s: sureness(_measure(s).behind),
+        ("Another master asks the same drive.",),
+    ),
+    Rung(
+        "two-drives",
+        lambda s: s.measure is not None and s.measure.two_drives,
+        says_two_drives,
+        steps.part_drives,
+        lambda s: sureness(_measure(s).turns + _measure(s).second),
+        ("Another master writes to the drive, and its frames collide.",),
+    ),
+    Rung(
+        "swapped",
+        swapped,
+        says_swapped,
+        steps.swap_bytes,
+        lambda s: sureness(_measure(s).swapped),
+        ("The drive is of another family than its profile.",),
+    ),
+    *(
+        Rung(
+            kind.rung,
+            kind.fails,
+            partial(says_sick, kind),
+            steps.SICK_STEPS[kind.rung],
+            kind.certainty,
+            kind.others,
+        )
+        for kind in SICK_FRAMES
+    ),
+    Rung(
+        "idle-close",
+        lambda s: s.idle_closed,
+        lambda s: "The gateway closes a connection on which nothing is sent for some seconds.",
+        steps.keep_connection,
+        lambda _: LIKELY,
+        ("Its network was cut at that moment.", "It serves one client, and another one came."),
+    ),
+)
+"""The first that applies is the verdict."""
