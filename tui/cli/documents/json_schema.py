@@ -28,7 +28,6 @@ from .of_drives import (
     ScanUnclearTold,
     StatusTold,
     StopTold,
-    WhyTold,
 )
 from .of_listening import HeardExchangeTold, HeardSummaryTold
 from .of_others import (
@@ -60,6 +59,7 @@ from .of_settings import (
     TeachChangeTold,
     WriteTold,
 )
+from .why_document import WhyTold
 
 DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, HoldTold, ProveTold,

@@ -118,7 +118,10 @@ def _whole(
         found.foreign += 1
         now.sick = True
     elif frame.note.startswith(LATE_NOTE) or now.replies:
-        _stray(found, _owner(body, now, before), body)
+        if before is not None and before.replies and _is_copy(body, now, before):
+            found.duplicated += 1
+        else:
+            _stray(found, _owner(body, now, before), body)
     elif may_answer(body, now.request):
         now.replies.append(body)
         now.delay = frame.time - now.began
@@ -126,6 +129,12 @@ def _whole(
     else:
         now.sick = True
         found.behind += before is not None and may_answer(body, before.request)
+
+
+def _is_copy(body: bytes, now: _Exchange, before: _Exchange) -> bool:
+    """True if a frame, or the one that was taken for the reply, repeats the reply before."""
+    taken = now.request != before.request and now.replies[:1] == before.replies[:1]
+    return body == before.replies[0] or taken
 
 
 def _owner(body: bytes, now: _Exchange, before: _Exchange | None) -> _Exchange:

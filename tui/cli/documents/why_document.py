@@ -1,0 +1,42 @@
+"""The document of `why`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from .of_drives import OfDriveTold
+from .parts import HeardTold
+
+
+class MeasureTold(msgspec.Struct, forbid_unknown_fields=True):
+    """Counts of the short reads of a drive that `why` makes; shares are those of `asked`."""
+
+    asked: int
+    answered: int
+    lost: int
+    damaged: int
+    late: int
+    duplicated: int
+    foreign: int
+    behind: int
+    second: int
+    """Second replies to one request, with other values."""
+    seconds: float
+
+
+class WhyTold(OfDriveTold, kw_only=True):
+    """`why`: the rung that fails, `answers` where none does, in a sentence; what to do next."""
+
+    command: Literal["why"]
+    rung: str
+    answers: bool
+    """Whether the drive answers and nothing is wrong: status 0, else 3."""
+    certainty: Literal["certain", "likely", "possible"]
+    others: list[str]
+    """What else it could be; empty if it is certain."""
+    text: str
+    next: list[str]
+    seen: HeardTold
+    measured: MeasureTold | None
