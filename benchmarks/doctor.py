@@ -1,6 +1,6 @@
 """Verdicts of `drivepanel why` on sick lines: right or not, and what they cost the line.
 
-    python -m benchmarks.doctor [--only NAME]
+    python -m benchmarks.doctor [--only NAME] [--seed N ...]
 
 Twenty troubles and two lines that are well. Each is a simulated Altivar 71 behind a trouble of
 `drivepanel simulate --line-fault`; a person would find it by hours of work. For each, the verdict
@@ -30,6 +30,7 @@ from tests.programs import DRIVEPANEL
 from tui.simulator import ClientSettings, DriveSpec, Simulation, troubles_of
 from tui.simulator.server.conversation import Conversation, TcpConversation
 from tui.simulator.server.endpoints import TcpEndpoint
+from tui.simulator.server.frames import is_sealed
 
 DEVICE = 2
 READS = frozenset({1, 2, 3, 4, 7, 8, 11, 12, 17, 43})
@@ -96,8 +97,9 @@ class Recorded:
 
     def feed(self, data: bytes, now: float) -> None:
         """Take bytes that have just come in."""
-        # an RTU frame at a Modbus TCP server is no request there
-        if len(data) > self._place and (self._place == 1 or data[2:4] == bytes(2)):
+        # a frame of the other protocol is no request there
+        whole = is_sealed(data) if self._place == 1 else data[2:4] == bytes(2)
+        if len(data) > self._place and whole:
             self._functions.append(data[self._place])
         self._conversation.feed(data, now)
 
@@ -160,11 +162,11 @@ class Result:
         return not self.right and self.certainty != UNSURE
 
 
-def examine(case: Case, folder: Path) -> Result:
+def examine(case: Case, folder: Path, seed: int) -> Result:
     """Have one line diagnosed by a process, as a person at a shell would."""
     rates, habits = troubles_of(case.troubles)
     drive = DriveSpec("atv71", DEVICE, sets={"RFR": 425})
-    simulation = RecordedLine([drive], faults=rates, habits=habits, seed=5)
+    simulation = RecordedLine([drive], faults=rates, habits=habits, seed=seed)
     simulation.functions = []
     with simulation:
         served = case.served or case.scheme
@@ -207,19 +209,26 @@ def table_of(results: list[Result]) -> Table:
 
 
 def main() -> None:
-    """Examine all lines, print the table and the figures."""
+    """Examine all lines with each seed, print the tables and the figures."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--only", default="", help="only troubles with this in their name")
-    only = parser.parse_args().only
+    parser.add_argument("--seed", type=int, nargs="+", default=[5, 6, 7], help="one run for each")
+    options = parser.parse_args()
+    for seed in options.seed:
+        print(json.dumps({"seed": seed, **run(options.only, seed)}))
+
+
+def run(only: str, seed: int) -> dict[str, Any]:
+    """Examine all lines once and print the table; returns the figures."""
     results = []
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         for case in (*CASES, *WELL):
             if only in case.name:
-                results.append(examine(case, Path(folder)))
+                results.append(examine(case, Path(folder), seed))
                 print(".", end="", file=sys.stderr, flush=True)
     Console(width=120).print(table_of(results))
     sick = [one for one in results if one.case in CASES]
-    figures = {
+    return {
         "troubles": len(sick),
         "right": sum(one.right for one in sick),
         "false_alarms": sum(not one.right for one in results if one.case in WELL),
@@ -229,7 +238,6 @@ def main() -> None:
         "writes": sum(one.writes for one in results),
         "verdicts": {one.case.name: one.verdict for one in results},
     }
-    print(json.dumps(figures))
 
 
 if __name__ == "__main__":

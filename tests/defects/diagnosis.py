@@ -36,8 +36,8 @@ DEFECTS = (
     Defect(
         "families-own-exception-taken-for-a-gateways",
         "tui/session/diagnosis/rungs.py",
-        "if code in GATEWAY_CODES and code not in own]",
-        "if code in own]",
+        "if code in codes]",
+        "if code not in codes]",
         "A gateway that does not reach the drive is looked for in the drive.",
         (f"{LADDER}::test_a_gateway_answers_in_the_drives_place",),
     ),

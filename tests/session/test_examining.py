@@ -21,16 +21,29 @@ ASKED = frame(2, bytes.fromhex("030C810001"))
 REPLY = frame(2, bytes.fromhex("03020637"))
 OTHER = frame(2, bytes.fromhex("03020636"))
 WIDE = frame(2, bytes.fromhex("030C810002"))
+LONG = frame(2, bytes.fromhex("030406370001"))
+ECHO = frame(2, bytes.fromhex("080000A537"))
+OLD = "not the reply"
 STRAY = "late or repeated, device 2"
 Step = bytes | tuple[bytes, str]
 
 
+def read_of(address: int) -> bytes:
+    """A read of one word."""
+    return frame(2, bytes([3, 0, address, 0, 1]))
+
+
+def _asks(data: bytes) -> bool:
+    return data == ECHO or (len(data) == len(ASKED) and data[4:5] == b"\0" and data[5] < 3)
+
+
 def counted(steps: Sequence[Step]) -> Measure:
-    """The counts of frames 10 ms apart; requests are those of the two reads."""
-    frames = []
+    """The counts of frames 10 ms apart; an echo by function 8 is sent, and then received."""
+    frames, sent = [], b""
     for at, step in enumerate(steps):
         data, note = step if isinstance(step, tuple) else (step, "")
-        way = "out" if data in (ASKED, WIDE) else "in"
+        way = "out" if _asks(data) and (data != ECHO or sent != ECHO) and not note else "in"
+        sent = data if way == "out" else b""
         frames.append(Frame(at / 100, way, data, note))  # type: ignore[arg-type]
     return measure_of(frames, 2)
 
@@ -46,7 +59,7 @@ def counted(steps: Sequence[Step]) -> Measure:
         ([ASKED, REPLY, (REPLY, STRAY)], "duplicated", {"duplicated": 1}),
         ([ASKED, frame(7, REPLY[1:-2])], "foreign", {"foreign": 1, "lost": 0}),
         ([ASKED, REPLY, (OTHER, STRAY)], "", {"second": 1, "duplicated": 0}),
-        ([ASKED, WIDE, (REPLY, "not the reply")], "lost", {"behind": 1}),
+        ([ASKED, WIDE, (REPLY, OLD)], "", {"behind": 1}),
     ],
 )
 def test_frames_are_counted_by_their_trouble(
@@ -60,9 +73,65 @@ def test_frames_are_counted_by_their_trouble(
 def test_two_drives_are_distinguished_from_a_value_that_changes() -> None:
     assert not counted([ASKED, REPLY, ASKED, OTHER, ASKED, OTHER]).two_drives
     assert counted([ASKED, REPLY, (OTHER, STRAY), ASKED, REPLY, (OTHER, STRAY)]).two_drives
-    broken = (REPLY[:5], "noise")
-    turns: list[Step] = [ASKED, broken, REPLY, ASKED, broken, OTHER, ASKED, REPLY, ASKED, OTHER]
-    assert counted(turns).two_drives
+    turned = Measure(damaged=2, turns=2)
+    assert turned.two_drives
+    assert not Measure(turns=2).two_drives
+
+
+def test_a_copy_during_the_next_request_is_no_second_drive() -> None:
+    """Taken for the reply to another setting, it leaves that one's own reply over."""
+    first, second = read_of(1), read_of(2)
+    values = {first: REPLY, second: OTHER}
+    steps: list[Step] = []
+    for request in (first, second) * 3:
+        steps += [request, values[request]]
+    steps[3:4] = [REPLY, (OTHER, STRAY)]
+    found = counted(steps)
+    found.decide(counted([first, REPLY, (REPLY, STRAY), second, OTHER, (OTHER, STRAY)]))
+    assert (found.two_drives, found.worst) == (False, "duplicated")
+    found.decide(counted([first, REPLY, (OTHER, STRAY), first, REPLY, (OTHER, STRAY)]))
+    assert found.two_drives
+
+
+@pytest.mark.parametrize(
+    ("steps", "counts"),
+    [
+        # each request gets the reply to the one before, and its repeat its own
+        (
+            [ASKED, REPLY, WIDE, (REPLY, OLD), WIDE, LONG, ECHO, (LONG, OLD),
+             ECHO, ECHO, ASKED, (ECHO, OLD), ASKED, REPLY],
+            {"behind": 3, "duplicated": 0},
+        ),
+        # a copy that comes during the next request, whose own reply follows
+        ([ASKED, REPLY, WIDE, (REPLY, OLD), LONG], {"behind": 0, "duplicated": 1}),
+        # the second drive's reply comes then, and the own one collides
+        (
+            [ASKED, REPLY, WIDE, (OTHER, OLD), (LONG[:5], "noise")],
+            {"behind": 0, "second": 1},
+        ),
+        # a reply that comes during the next request after a time
+        ([ASKED, *[b"\0"] * 20, WIDE, (REPLY, OLD), LONG], {"behind": 0}),
+    ],
+)  # fmt: skip
+def test_an_older_reply_is_counted_by_what_else_came(
+    steps: list[Step], counts: Mapping[str, int]
+) -> None:
+    found = counted(steps)
+    assert {kind: found.count(kind) for kind in counts} == counts
+    assert found.one_behind == (found.behind > 1)
+
+
+def test_replies_of_other_polled_drives_are_not_foreign() -> None:
+    other = frame(7, ASKED[1:-2])
+    assert counted([ASKED, frame(7, REPLY[1:-2])]).foreign == 1
+    assert counted([other, frame(7, REPLY[1:-2]), ASKED, frame(7, REPLY[1:-2])]).foreign == 0
+
+
+def test_a_gateway_that_misses_the_drive_is_counted() -> None:
+    refused = frame(2, bytes([0x83, 11]))
+    frames = [Frame(0, "out", ASKED), Frame(0.1, "in", refused)]
+    assert measure_of(frames, 2, unreached={10, 11}).worst == "unreached"
+    assert measure_of(frames, 2).answered == 1
 
 
 def test_a_missing_reply_of_a_slow_drive_is_late() -> None:

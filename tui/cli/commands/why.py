@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from tui.session.diagnosis.diagnosis import Diagnosis
 
 
-SICK_COUNTS = ("lost", "damaged", "late", "duplicated", "foreign", "behind", "second")
+SICK_COUNTS = (
+    "lost", "damaged", "late", "duplicated", "foreign", "unreached", "behind", "second",
+)  # fmt: skip
 
 
 @click.command()
@@ -36,14 +38,14 @@ SICK_COUNTS = ("lost", "damaged", "late", "duplicated", "foreign", "behind", "se
 @json_option
 @told
 def why(target: Target, read_only: bool, as_json: bool) -> None:
-    """Tell why a drive does not answer: what fails, in a sentence, and what to look at next.
+    """Diagnose why a drive does not answer: the cause in a sentence, and the next steps.
 
     Looks at the port and its adapter. Listens before it sends: it sends nothing while another
-    master is heard. Then it reads the drive up to 200 times. A silent gateway is also tried by
-    the other protocol, and by the units 255 and 0. Nothing is written, and no
-    other baud or format is tried. With -p, or a drive that was here before, what the manual of its
-    family says of address, settings, pins and wires stands behind it. Ends with 0 where the drive
-    answers and nothing is wrong, else with 3.
+    master is heard. Then it reads the drive up to 200 times. It takes 5 to 15 s, and up to 30 s
+    on a sick line. A gateway on which nothing answers is also tried by the other protocol, and by
+    the units 255 and 0. Nothing is written, and no other baud or format is tried. With -p, or a
+    drive that was here before, the steps include what the manual of its family says of address,
+    settings, pins and wires. Ends with 0 if the drive answers and nothing is wrong, else with 3.
     """
     from tui.bus.errors import LineError, LinkSyntaxError
     from tui.drive.profile import library
@@ -76,37 +78,49 @@ async def _asked(
     profile = named or await asyncio.to_thread(profile_remembered, line.link, device)
     changed = opened.known.text if opened.known is not None else ""
     found = diagnosed(await examine_line(line, device, profile, changed=changed))
-    about = await _looked_after(opened, target, profile) if found.sight.heard.answered else {}
+    about = (
+        await _looked_after(opened, target, profile, found) if found.sight.heard.answered else {}
+    )
     return found, about
 
 
 async def _looked_after(
-    opened: OpenLine, target: Target, profile: Profile | None
+    opened: OpenLine, target: Target, profile: Profile | None, found: Diagnosis
 ) -> dict[str, Any]:
-    """Have it told what the drive does that was asked and is asked no more."""
+    """Have it told what the drive does that was asked and is asked no more.
+
+    On a sick line it is asked once, at the end.
+    """
     from tui.drive.profile import library
     from tui.session.drive import DriveSession
+    from tui.session.timeout_told import Timeout
 
     from ..shared.left_alone import look_after
     from ..shared.output import drive_json
 
     identity: DriveIdentity | None = None
     if profile is None:
-        identity = await _identity(opened, target.device)
+        identity = await _identity(opened, target.device, found.sight.identity)
         if identity is None or identity.profile is None:
             return {}
         profile = await asyncio.to_thread(library.load, identity.profile)
     session = DriveSession(opened.line, target.device, profile, identity)
-    await look_after(opened, session, target.line_text).learn()
+    farewell = look_after(opened, session, target.line_text)
+    if found.well:
+        await farewell.learn()
+    else:
+        session.timeout = Timeout(known=False)
     return drive_json(target.line_text, session)
 
 
-async def _identity(opened: OpenLine, device: int) -> DriveIdentity | None:
+async def _identity(
+    opened: OpenLine, device: int, found: DriveIdentity | None
+) -> DriveIdentity | None:
     from tui.bus.errors import LineError
     from tui.session.connect.identify import identify_drive
 
     try:
-        found = await identify_drive(opened.line, device)
+        found = found or await identify_drive(opened.line, device)
     except LineError:
         return None
     mind_the_drive(opened, device, found)
@@ -141,12 +155,14 @@ def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool
         print_json({**drive, **about, **why_json(found)})
         return
     say(found.text)
+    if (measure := found.sight.measure) is not None:
+        say(f"Sent {measure.asked} short reads in {measure.seconds:.1f} s; nothing was written.")
     if found.certainty != "certain":
         say(f"This is {found.certainty}. It could also be:")
         for other in found.others:
             say(f"  - {other}", indent=4)
     if found.steps:
-        say("Look at next:")
+        say("Next steps:")
     for step in found.steps:
         say(f"  - {step}", indent=4)
 

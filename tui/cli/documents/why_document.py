@@ -10,7 +10,7 @@ from .of_drives import OfDriveTold
 from .parts import HeardTold
 
 
-class MeasureTold(msgspec.Struct, forbid_unknown_fields=True):
+class MeasuredReads(msgspec.Struct, forbid_unknown_fields=True):
     """Counts of the short reads of a drive that `why` makes; shares are those of `asked`."""
 
     asked: int
@@ -20,6 +20,8 @@ class MeasureTold(msgspec.Struct, forbid_unknown_fields=True):
     late: int
     duplicated: int
     foreign: int
+    unreached: int
+    """Refusals of a gateway that did not reach the drive: exceptions 0A and 0B."""
     behind: int
     second: int
     """Second replies to one request, with other values."""
@@ -39,4 +41,4 @@ class WhyTold(OfDriveTold, kw_only=True):
     text: str
     next: list[str]
     seen: HeardTold
-    measured: MeasureTold | None
+    measured: MeasuredReads | None

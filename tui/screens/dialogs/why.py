@@ -30,9 +30,9 @@ log = logging.getLogger(__name__)
 WHY_WIDTH, BESIDE_WHY = 76, 6
 """Columns of the dialog at most, and those of its border, its margin and its scroll bar."""
 SENTENCE_ROWS = 12
-LOOKING = "Listening to the line, then reading the drive for some seconds ..."
+LOOKING = "Listening, then reading the drive: 5 to 15 s, up to 30 s on a sick line ..."
 BULLET = "· "
-WHY_KEYS = hint(("Esc", "closes"), ("N", "asks again"), ("Up, Down", "scroll"))
+WHY_KEYS = hint(("Esc", "Close"), ("N", "Repeat"), ("Up, Down", "Scroll"))
 
 LooksWhy = Callable[[], Awaitable["Diagnosis"]]
 
@@ -107,9 +107,9 @@ def reason_lines(found: Diagnosis | None, width: int) -> Iterator[Text]:
     style = RUNNING if found.well else ALARM
     yield from (Text(part, style) for part in wrapped(found.text, width, SENTENCE_ROWS))
     if found.others:
-        yield from _listed(f"This is {found.certainty}; it could also be", found.others, width)
+        yield from _listed(f"This is {found.certainty}. It could also be:", found.others, width)
     if found.steps:
-        yield from _listed("Look at next", found.steps, width)
+        yield from _listed("Next steps", found.steps, width)
 
 
 def _listed(head: str, items: Iterable[str], width: int) -> Iterator[Text]:

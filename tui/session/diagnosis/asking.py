@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 
 from tui.bus.api import Frame, LineStatus, ModbusLine, Priority
-from tui.bus.errors import ExchangeError, LineError, LineLost, RequestRefused
+from tui.bus.errors import ExchangeError, LineError, LineLost, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
@@ -29,13 +29,15 @@ from ..connect.limits import limits_of
 from .heard import Heard, heard_by_errors, heard_of
 from .sight import SAME_ADAPTER, AdapterSeen, Sight
 
-ASKED = 5
-"""Reads of a drive that answers: enough to see one damaged answer in five."""
+ASKED = 3
+"""Reads of a drive that answers, up to one that it does not."""
 ASKED_IN_VAIN = 2
 """Reads of one that does not."""
 SERIAL = "serial:"
 FRAMES_COME_WITHIN = 0.5
-"""Seconds in which the program that owns a shared line has told its frames."""
+"""Seconds in which the keeper of a line has sent its frames."""
+LATE_WITHIN = 1.0
+"""Seconds in which a reply comes to the last request of those that got none in time."""
 Asks = Callable[[], Awaitable[object]]
 
 
@@ -104,7 +106,8 @@ async def _outcomes(
     for question in questions[:ASKED_IN_VAIN]:
         outcomes.append(await _outcome(question))
         if outcomes[-1] is None:
-            outcomes += [await _outcome(question) for _ in range(ASKED - len(outcomes))]
+            while len(outcomes) < ASKED and outcomes[-1] is None:
+                outcomes.append(await _outcome(question))
             break
     return outcomes
 
@@ -141,15 +144,13 @@ async def _heard(
 ) -> Heard:
     """What came back, by the frames; by the ends of the requests where no frames are told."""
     tcp = isinstance(line.link, TcpLink)
-    limit = REAL_CLOCK.monotonic() + (FRAMES_COME_WITHIN if _attached(line) else 0.0)
-    while True:
-        frames = [frame for frame in line.trace if frame.time > last]
-        heard = heard_of(frames, device, tcp=tcp)
-        if heard.asked >= len(outcomes):
-            return heard
-        if REAL_CLOCK.monotonic() >= limit:
-            return heard_by_errors(outcomes, device)
-        await REAL_CLOCK.sleep(FRAMES_COME_WITHIN / 10)
+    if all(isinstance(outcome, NoAnswer) for outcome in outcomes):
+        await REAL_CLOCK.sleep(LATE_WITHIN)
+    if _attached(line):
+        # replies come later than their requests
+        await REAL_CLOCK.sleep(FRAMES_COME_WITHIN)
+    heard = heard_of((frame for frame in line.trace if frame.time > last), device, tcp=tcp)
+    return heard if heard.asked >= len(outcomes) else heard_by_errors(outcomes, device)
 
 
 def last_time(frames: Sequence[Frame]) -> float:

@@ -49,7 +49,7 @@ def diagnosed(sight: Sight) -> Diagnosis:
         return Diagnosis(UNOPENED, NOTHING_SEEN, (OPEN_IT,), sight)
     after = f", {sight.turnaround * 1000:.0f} ms after each request" if sight.turnaround else ""
     measure = sight.measure
-    asked = heard.asked + (measure.asked if measure is not None else 0)
+    sent = heard.asked + (measure.asked if measure is not None else 0)
     answered = heard.answered + (measure.answered if measure is not None else 0)
-    text = f"Address {sight.device} answers: {answered} of {asked} requests{after}."
+    text = f"Address {sight.device} answers: {answered} of {sent} requests{after}."
     return Diagnosis(ANSWERS, text, (), sight)

@@ -1,6 +1,6 @@
 """Other ways to reach a silent gateway: as another protocol, or for another unit.
 
-Each try has a connection of its own and asks for one register, by function 3.
+Each try asks for one register, by function 3.
 """
 
 from __future__ import annotations
@@ -10,7 +10,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+from tui.bus.api import ModbusLine, Priority
+from tui.bus.errors import DeviceException, LineError
 from tui.bus.link import RtuTcpLink, TcpLink
+from tui.drive.profile.profile import Profile
 from tui.wire.frames import frame, is_whole
 
 from .heard import REFUSED, TCP_HEAD
@@ -19,9 +22,10 @@ WITHIN = 1.0
 """Seconds for the connection, and for the reply."""
 ANY_REGISTER = bytes.fromhex("030C810001")
 """A read whose RTU frame is not a message of Modbus TCP: its protocol would not be 0."""
-GATEWAY_REFUSALS = (10, 11)
-LONE_UNITS = (255, 0)
-"""Units by which Modbus TCP reaches the only drive of a gateway."""
+GATEWAY_CODES = {10: "0A, it has no way to the drive", 11: "0B, the drive did not answer it"}
+GATEWAY_REFUSALS = frozenset(GATEWAY_CODES)
+ANY_UNIT, NO_UNIT = 255, 0
+"""Units by which Modbus TCP reaches the only drive of a gateway; the line has no requests to 0."""
 TRANSACTION = 0x4450
 
 
@@ -51,16 +55,46 @@ def _answers_tcp(data: bytes, unit: int) -> bool:
     return right and not (refused and data[TCP_HEAD + 2] in GATEWAY_REFUSALS)
 
 
-async def probed(link: TcpLink | RtuTcpLink, device: int) -> Works | None:
-    """Find a request that a silent gateway answers; None for nothing."""
+def gateway_codes(profile: Profile | None) -> frozenset[int]:
+    """Exceptions of a gateway that did not reach the drive, unless the family has them too."""
+    own = {one.code for one in profile.data.exceptions} if profile is not None else set()
+    return GATEWAY_REFUSALS - own
+
+
+async def probed(line: ModbusLine, device: int, *, beside: bool = True) -> Works | None:
+    """Find a request that a silent gateway answers; None for nothing.
+
+    First by the line itself. A connection beside it might end the one of the line, as many
+    gateways take one client. So that is tried only if the line never brought a reply, if no
+    other program uses it, and not without `beside`.
+    """
+    link = line.link
+    assert isinstance(link, TcpLink | RtuTcpLink)
+    if isinstance(link, TcpLink) and await _reads(line, ANY_UNIT):
+        return Works("", ANY_UNIT)
+    counters = line.counters
+    if not beside or counters.replies or counters.exceptions or line.facts.others:
+        return None
     place = f"{link.host}:{link.port}"
     rtu = (frame(device, ANY_REGISTER), device, _answers_rtu, Works(f"rtu-tcp:{place}"))
     own = (_message(device), device, _answers_tcp, Works(f"tcp:{place}"))
-    units = [(_message(unit), unit, _answers_tcp, Works("", unit)) for unit in LONE_UNITS]
-    for request, unit, answers, works in [rtu, *units] if isinstance(link, TcpLink) else [own]:
-        if await _answered(link, request, lambda data, a=answers, u=unit: a(data, u)):  # type: ignore[misc]
+    unit = (_message(NO_UNIT), NO_UNIT, _answers_tcp, Works("", NO_UNIT))
+    for request, named, answers, works in [rtu, unit] if isinstance(link, TcpLink) else [own]:
+        if await _answered(link, request, lambda data, a=answers, u=named: a(data, u)):  # type: ignore[misc]
             return works
     return None
+
+
+async def _reads(line: ModbusLine, unit: int) -> bool:
+    """True if a unit answers on the line, by a value or a refusal of its own."""
+    address = int.from_bytes(ANY_REGISTER[1:3], "big")
+    try:
+        await line.read(unit, address, 1, priority=Priority.OPERATOR_READ, within=WITHIN)
+    except DeviceException as error:
+        return error.code not in GATEWAY_REFUSALS
+    except LineError:
+        return False
+    return True
 
 
 async def _answered(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
@@ -11,12 +11,19 @@ from tui.wire.frames import is_whole
 
 from .heard import LATE_NOTE, REFUSED, REGISTER_READS, TCP_HEAD, due_bytes
 
-SICK_KINDS = ("late", "lost", "damaged", "duplicated", "foreign")
+SICK_KINDS = ("late", "lost", "damaged", "duplicated", "foreign", "unreached")
 DAMAGED_NOTE = "damaged"
 TURNS = 2
-"""Second replies, or returns of a value to an earlier one, that show two drives."""
+"""Second replies, or returns of a setting to an earlier value, that show two drives."""
 SLOW_REPLIES = 0.25
 """Usual delay of the replies, in s, from which a missing one is taken for a late one."""
+RECENT = 6
+"""Requests back to which a frame may belong that came when none was due."""
+PROMPT = 0.15
+"""Seconds after a request within which a line that is one behind sends its older reply."""
+DIAGNOSE = 8
+TRANSACTION_BYTES = 2
+"""Bytes of Modbus TCP that name the request of a reply."""
 
 
 @dataclass(slots=True)
@@ -30,12 +37,14 @@ class Measure:
     late: int = 0
     duplicated: int = 0
     foreign: int = 0
+    unreached: int = 0
+    """Refusals of a gateway that did not reach the drive."""
     behind: int = 0
     """Replies that fit the request before, and not their own."""
     second: int = 0
     """Second replies to one request, with another content."""
     turns: int = 0
-    """Times that the reply to one request returned to an earlier content."""
+    """Times that a setting returned to an earlier value."""
     seconds: float = 0.0
     swapped: int = 0
     """Values that make sense with their bytes swapped, and not as they are."""
@@ -58,101 +67,135 @@ class Measure:
         """True if two drives reply in turn, each with values of its own."""
         return self.second >= TURNS or (self.turns >= TURNS and self.damaged >= TURNS)
 
+    @property
+    def one_behind(self) -> bool:
+        """True if requests get the reply to the one before; a repeated one gets its own."""
+        return self.behind > 1 and self.behind > self.late and self.behind * 3 >= self.asked
+
+    def decide(self, paused: Measure) -> None:
+        """Settle from reads with pauses if surplus replies are copies or a second drive's.
+
+        Without a pause, a copy may come during the next request and be taken for its reply.
+        """
+        if paused.second >= TURNS:
+            self.second = paused.second
+        else:
+            self.duplicated, self.second = self.duplicated + self.second, 0
+
 
 @dataclass(slots=True)
 class _Exchange:
     request: bytes
     began: float
+    transaction: bytes = b""
     replies: list[bytes] = field(default_factory=list)
     delay: float = 0.0
     """From the request to the first reply, in s."""
     sick: bool = False
     """True if it brought something, though no reply."""
+    damaged: bool = False
+    older: str = ""
+    """The kind of a reply to the request before that came at once, unless all are one behind."""
 
 
 def measure_of(
-    frames: Iterable[Frame], device: int, seconds: float = 0.0, *, tcp: bool = False
+    frames: Iterable[Frame],
+    device: int,
+    seconds: float = 0.0,
+    *,
+    tcp: bool = False,
+    echoes: bool = False,
+    unreached: Collection[int] = (),
 ) -> Measure:
-    """The counts of the requests to a device among these frames, oldest first."""
+    """The counts of the requests to a device among these frames, oldest first.
+
+    With `echoes` the adapter repeats what is sent, so that no echo by function 8 is judged.
+    `unreached` are the exceptions by which a gateway says that it did not reach the drive.
+    """
+    frames = list(frames)
+    polled = {_body(one, tcp)[:1] for one in frames if one.direction == "out"}
     found, exchanges, ours = Measure(seconds=seconds), list[_Exchange](), False
-    contents: dict[bytes, list[bytes]] = {}
     for frame in frames:
-        body = frame.data[TCP_HEAD:] if tcp else frame.data
+        body = _body(frame, tcp)
         if frame.direction == "out":
-            ours = body[:1] == bytes([device])
+            ours = body[:1] == bytes([device]) and not (echoes and body[1] == DIAGNOSE)
             if ours:
-                exchanges.append(_Exchange(body if tcp else body[:-2], frame.time))
-        elif ours and frame.data != exchanges[-1].request:
-            if not tcp and not is_whole(body):
-                _loose(found, exchanges[-1], frame)
-            elif tcp or body[:-2] != exchanges[-1].request:
-                _whole(found, exchanges, body if tcp else body[:-2], frame, contents)
+                exchanges.append(_Exchange(body, frame.time, frame.data[: TRANSACTION_BYTES * tcp]))
+        elif not ours or _is_echo(frame, body, exchanges[-1]):
+            continue
+        elif not tcp and not is_whole(frame.data):
+            _loose(found, exchanges[-1], frame)
+        elif body[0] == device and body[1] & REFUSED and body[2] in unreached:
+            found.unreached += 1
+            exchanges[-1].sick = True
+        elif body[0] == device:
+            _whole(found, exchanges[-RECENT:], body, frame)
+        elif body[:1] not in polled:
+            found.foreign += 1
+            exchanges[-1].sick = True
     for one in exchanges:
-        found.asked += 1
-        found.answered += bool(one.replies)
-        found.lost += not one.replies and not one.sick
+        _end(found, one)
     delays = [one.delay for one in exchanges if one.replies]
     if delays and median(delays) >= SLOW_REPLIES:
-        found.late, found.lost = found.late + found.lost, 0
-    found.turns = sum(_turns(one) for one in contents.values())
+        # a surplus reply answers an earlier request there
+        found.late += found.lost + found.duplicated + found.second
+        found.lost = found.duplicated = found.second = 0
     return found
+
+
+def _end(found: Measure, one: _Exchange) -> None:
+    """Count an exchange that is over."""
+    found.asked += 1
+    found.answered += bool(one.replies)
+    found.lost += not one.replies and not one.sick
+    if one.older and (one.replies or one.damaged or one.older == "second"):
+        setattr(found, one.older, found.count(one.older) + 1)
+    elif one.older:
+        found.behind += 1
+
+
+def _body(frame: Frame, tcp: bool) -> bytes:
+    """Address, function and data."""
+    return frame.data[TCP_HEAD:] if tcp else frame.data[:-2]
+
+
+def _is_echo(frame: Frame, body: bytes, exchange: _Exchange) -> bool:
+    return body == exchange.request and body[1:2] != bytes([DIAGNOSE])
 
 
 def _loose(found: Measure, exchange: _Exchange, frame: Frame) -> None:
     """Bytes that form no frame: one damaged reply each."""
     found.damaged += 1
+    exchange.damaged = True
     if frame.note == DAMAGED_NOTE or not exchange.replies:
         exchange.sick = True
 
 
-def _whole(
-    found: Measure,
-    exchanges: Sequence[_Exchange],
-    body: bytes,
-    frame: Frame,
-    contents: dict[bytes, list[bytes]],
-) -> None:
-    now = exchanges[-1]
-    before = exchanges[-2] if len(exchanges) > 1 else None
-    if body[0] != now.request[0]:
-        found.foreign += 1
-        now.sick = True
-    elif frame.note.startswith(LATE_NOTE) or now.replies:
-        if before is not None and before.replies and _is_copy(body, now, before):
-            found.duplicated += 1
-        else:
-            _stray(found, _owner(body, now, before), body)
-    elif may_answer(body, now.request):
+def _whole(found: Measure, recent: Sequence[_Exchange], body: bytes, frame: Frame) -> None:
+    """A whole frame of the drive: the reply, or a surplus one of the last requests."""
+    now, before = recent[-1], recent[-2] if len(recent) > 1 else None
+    due = not now.replies and not frame.note.startswith(LATE_NOTE)
+    if due and may_answer(body, now.request):
         now.replies.append(body)
         now.delay = frame.time - now.began
-        contents.setdefault(now.request, []).append(body)
-    else:
-        now.sick = True
-        found.behind += before is not None and may_answer(body, before.request)
-
-
-def _is_copy(body: bytes, now: _Exchange, before: _Exchange) -> bool:
-    """True if a frame, or the one that was taken for the reply, repeats the reply before."""
-    taken = now.request != before.request and now.replies[:1] == before.replies[:1]
-    return body == before.replies[0] or taken
-
-
-def _owner(body: bytes, now: _Exchange, before: _Exchange | None) -> _Exchange:
-    """The request to which a frame belongs that came when none was due."""
-    if before is None or now.replies:
-        return now
-    older = body == before.replies[0] if before.replies else not before.sick
-    return before if older else now
-
-
-def _stray(found: Measure, to: _Exchange, body: bytes) -> None:
-    """A whole frame when none was due: late if its request has no reply, else a second one."""
-    if not to.replies:
+        return
+    now.sick = now.sick or due
+    prompt = due and frame.time - now.began < PROMPT
+    if prompt and before is not None and may_answer(body, before.request):
+        known = "duplicated" if body in before.replies else "second"
+        now.older = known if before.replies else "late"
+        before.sick = True
+        return
+    if now.transaction:
+        recent = [one for one in recent if one.transaction == frame.data[:TRANSACTION_BYTES]]
+    fits = [one for one in reversed(recent) if may_answer(body, one.request)]
+    missing = [one for one in fits if not one.replies and not one.sick]
+    if missing:
         found.late += 1
-        to.sick = True
-    elif body == to.replies[0]:
+        missing[0].sick = True
+    elif any(body in one.replies for one in fits):
         found.duplicated += 1
-    else:
+    elif fits:
         found.second += 1
 
 
@@ -160,14 +203,7 @@ def may_answer(body: bytes, request: bytes) -> bool:
     """True if a frame may be the reply to a request, by its function and length."""
     if body[1] == request[1] | REFUSED:
         return True
+    if request[1] == DIAGNOSE:
+        return body == request
     long = request[1] in REGISTER_READS and len(body) != due_bytes(request) - 2
     return body[1] == request[1] and not long
-
-
-def _turns(bodies: Sequence[bytes]) -> int:
-    """The number of times that an earlier content came again."""
-    return sum(
-        body != bodies[at - 1] and body in bodies[: at - 1]
-        for at, body in enumerate(bodies)
-        if at > 1
-    )

@@ -257,5 +257,6 @@ SICK_STEPS = {
     "checksum": end_damage,
     "duplicated": end_copies,
     "other-address": find_second_master,
+    "gateway": ask_gateway,
 }
 """Next steps by the verdict on many reads."""

@@ -10,11 +10,11 @@ from tui.bus.limits import STANDARD_EXCEPTIONS
 
 from . import next_steps as steps
 from .garbled import speed_told
+from .gateway_probe import GATEWAY_CODES, gateway_codes
 from .rung import Rung, first_sentence
 from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS
 from .sight import Sight
 
-GATEWAY_CODES = {10: "0A, it has no way to the drive", 11: "0B, the drive did not answer it"}
 HELD_BACK = 8
 """Milliseconds from which an adapter's latency is worth a word."""
 SEEN_OF_IT = 0.75
@@ -152,8 +152,8 @@ def _says_damaged(sight: Sight) -> str:
 
 def _gateway_codes(sight: Sight) -> list[int]:
     """Codes of a gateway, unless the family means something of its own by them."""
-    own = {e.code for e in sight.profile.data.exceptions} if sight.profile is not None else set()
-    return [code for code in sight.heard.exceptions if code in GATEWAY_CODES and code not in own]
+    codes = gateway_codes(sight.profile)
+    return [code for code in sight.heard.exceptions if code in codes]
 
 
 def _refused(sight: Sight) -> bool:

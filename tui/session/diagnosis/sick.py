@@ -59,6 +59,10 @@ SICK_FRAMES = (
         "foreign", "other-address", "replies carried another address",
         ("Another master asks other drives.",),
     ),
+    SickFrames(
+        "unreached", "gateway", "requests got exception 0A or 0B: the gateway missed the drive",
+        ("The drive does not hear each request.", "Two drives have this address."),
+    ),
 )  # fmt: skip
 
 
@@ -72,7 +76,7 @@ def says_sick(kind: SickFrames, sight: Sight) -> str:
         if one is not kind and measure.count(one.kind)
     ]
     more = f"; also {', '.join(beside)}" if beside else ""
-    return f"{count} of {measure.asked} {kind.text}, in {measure.seconds:.1f} s{more}."
+    return f"In {measure.seconds:.1f} s, {count} of {measure.asked} {kind.text}{more}."
 
 
 def says_two_drives(sight: Sight) -> str:

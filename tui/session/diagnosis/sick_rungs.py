@@ -8,7 +8,16 @@ from . import next_steps as steps
 from .gateway_probe import Works
 from .measure import Measure
 from .rung import Rung, first_sentence
-from .sick import LIKELY, SICK_FRAMES, says_sick, says_swapped, says_two_drives, sureness, swapped
+from .sick import (
+    LIKELY,
+    POSSIBLE,
+    SICK_FRAMES,
+    says_sick,
+    says_swapped,
+    says_two_drives,
+    sureness,
+    swapped,
+)
 from .sight import Sight
 
 
@@ -46,14 +55,14 @@ GATEWAY_RUNGS = (
 SICK_RUNGS: tuple[Rung, ...] = (
     Rung(
         "behind",
-        lambda s: s.measure is not None and s.measure.behind > 1,
+        lambda s: s.measure is not None and s.measure.one_behind,
         lambda s: (
             f"Replies are one behind: {_measure(s).behind} of {_measure(s).asked} requests got the"
             " reply to the request before."
         ),
         steps.restart_converter,
-        lambda s: sureness(_measure(s).behind),
-        ("Another master asks the same drive.",),
+        lambda s: POSSIBLE if _measure(s).late else sureness(_measure(s).behind),
+        ("Another master asks the same drive.", "The replies come much later."),
     ),
     Rung(
         "two-drives",

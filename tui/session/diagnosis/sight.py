@@ -10,6 +10,7 @@ from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.port_seen import PortSeen
 from tui.drive.profile.profile import Profile
 
+from ..connect.identify import DriveIdentity
 from .gateway_probe import Works
 from .heard import Heard
 from .measure import Measure
@@ -38,6 +39,8 @@ class Sight:
     link: Link
     device: int
     profile: Profile | None = None
+    identity: DriveIdentity | None = None
+    """Identity of a drive without a known profile; None if it was not read."""
     trouble: LineError | None = None
     """Why the line cannot be used, where it cannot."""
     port: PortSeen | None = None

@@ -1,0 +1,216 @@
+"""Many short reads of one drive, of several shapes, so that each reply shows its request.
+
+A line holds a request back while the late reply to a lost one could be taken for its own. So the
+shapes take turns: another length or function need not wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf
+from secrets import randbelow
+
+from tui.bus.api import LineStatus, ModbusLine, Priority
+from tui.bus.errors import DeviceException, ExchangeError, LineError, RequestRefused
+from tui.bus.expectation import IDENTIFY
+from tui.bus.trace import Frame
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
+from tui.drive.values import raw_range, word_count
+
+from ..clock import REAL_CLOCK
+from ..connect.identify import status_words_without_identification
+from .heard import TCP_HEAD
+
+FRAMES_AT_ONCE = 50
+"""Reads after which their frames are taken: a line keeps the last ones only."""
+CHECKED = 30
+"""Parameters of each shape whose values are looked at."""
+SMALL = 0x0FFF
+"""The greatest raw value of a parameter that shows whether its bytes are swapped."""
+LONGEST_READ = 4
+"""Words of the longest short read."""
+PATIENCE, SLOWER = 0.3, 4.0
+"""Least wait for a reply in s, and the wait as a multiple of the quickest reply."""
+AFTER_A_MISS = 0.5
+"""Seconds without a request after a missing reply: one that is late comes then."""
+MISSES_IN_A_ROW = 6
+"""Misses in a row that show the trouble; more would cost time only."""
+DIAGNOSE, ECHO = 8, 0
+REGISTERS = 3
+
+ReadOnce = Callable[[], Awaitable[None]]
+
+
+@dataclass(slots=True)
+class _Shape:
+    """Requests with replies of one form; `missed` is when one got no reply, in s."""
+
+    asks: Sequence[ReadOnce]
+    times: int = 0
+    missed: float = -inf
+
+
+@dataclass(slots=True)
+class ShortReads:
+    """Reads of one drive; nothing is written. `ended` is why they broke off, if they did."""
+
+    line: ModbusLine
+    device: int
+    profile: Profile | None
+    values: dict[str, tuple[Parameter, list[int]]] = field(default_factory=dict)
+    """Values that were read of small settings, by code, oldest first."""
+    frames: list[Frame] = field(default_factory=list)
+    ended: LineError | None = None
+    seconds: float = 0.0
+    """Seconds that the reads took."""
+    last: float = 0.0
+    """Time of the last frame that was taken."""
+
+    async def read(self, reads: int, within: float, *, pause: float = 0.0) -> None:
+        """Read so many times, in turns of all shapes, for so long at most."""
+        shapes, held = _shapes(self), self.line.timing.late_reply
+        began, misses = REAL_CLOCK.monotonic(), 0
+        for number in range(reads):
+            now = REAL_CLOCK.monotonic()
+            if (
+                now > began + within
+                or misses >= MISSES_IN_A_ROW
+                or self.line.state.status is LineStatus.CLOSED
+            ):
+                break
+            free = [one for one in shapes if now - one.missed >= held]
+            shape = min(free, key=lambda one: one.times) if free else _longest_ago(shapes)
+            ask = shape.asks[shape.times % len(shape.asks)]
+            shape.times += 1
+            try:
+                await ask()
+                misses = 0
+            except DeviceException:
+                misses = 0
+            except ExchangeError:
+                shape.missed, misses = REAL_CLOCK.monotonic(), misses + 1
+                await REAL_CLOCK.sleep(AFTER_A_MISS)
+            except RequestRefused as error:
+                shapes.remove(shape)
+                if not shapes:
+                    self.ended = error
+                    break
+            except LineError as error:
+                self.ended = error
+                break
+            if pause:
+                await REAL_CLOCK.sleep(pause)
+            if number % FRAMES_AT_ONCE == FRAMES_AT_ONCE - 1:
+                self.take_frames()
+        self.seconds = REAL_CLOCK.monotonic() - began
+
+    @property
+    def patience(self) -> float | None:
+        """Seconds in which a reply is to begin; None before the first one."""
+        quickest = min(_delays(self.line.trace, self.device), default=None)
+        return None if quickest is None else max(PATIENCE, SLOWER * quickest)
+
+    def take_frames(self) -> None:
+        """Take the frames since the last look."""
+        new = [one for one in self.line.trace if one.time > self.last]
+        if new:
+            self.frames += new
+            self.last = new[-1].time
+
+    def note(self, parameters: Sequence[Parameter], words: Sequence[int]) -> None:
+        """Keep values that were read."""
+        for one, raw in zip(parameters, words, strict=True):
+            self.values.setdefault(one.code, (one, []))[1].append(raw)
+
+    @property
+    def swapped(self) -> tuple[int, int]:
+        """Settings that make sense with swapped bytes alone, and as they are alone."""
+        swapped = straight = 0
+        for one, raws in self.values.values():
+            low, high = raw_range(one)
+            raw = raws[-1]
+            fits = low <= raw <= high
+            fits_turned = low <= ((raw & 0xFF) << 8 | raw >> 8) <= high
+            swapped += fits_turned and not fits
+            straight += fits and not fits_turned
+        return swapped, straight
+
+    @property
+    def turns(self) -> int:
+        """The number of times that a setting returned to an earlier value."""
+        return sum(
+            raw != raws[at - 1] and raw in raws[: at - 1]
+            for _, raws in self.values.values()
+            for at, raw in enumerate(raws)
+            if at > 1
+        )
+
+
+def _delays(frames: Sequence[Frame], device: int) -> Iterator[float]:
+    """Seconds from requests to their replies."""
+    for before, frame in pairwise(frames):
+        replied = before.direction == "out" and frame.direction == "in" and not frame.note
+        if replied and device in (before.data[0], *before.data[TCP_HEAD : TCP_HEAD + 1]):
+            yield frame.time - before.time
+
+
+def _longest_ago(shapes: Sequence[_Shape]) -> _Shape:
+    return min(shapes, key=lambda one: one.missed)
+
+
+def _shapes(reads: ShortReads) -> list[_Shape]:
+    """The shapes that the drive is known to understand; never none."""
+    line, device, profile = reads.line, reads.device, reads.profile
+
+    def read(parameters: Sequence[Parameter]) -> ReadOnce:
+        async def ask() -> None:
+            address, count = parameters[0].address, len(parameters)
+            reply = await line.read(
+                device, address, count, priority=Priority.OPERATOR_READ, within=reads.patience
+            )
+            reads.note(parameters, reply.words)
+
+        return ask
+
+    async def identify() -> None:
+        await line.identify(device, priority=Priority.OPERATOR_READ, within=reads.patience)
+
+    async def echo() -> None:
+        await line.diagnose(device, ECHO, randbelow(1 << 16), priority=Priority.OPERATOR_READ)
+
+    async def status() -> None:
+        address = next(iter(status_words_without_identification()), 0)
+        await line.read(device, address, 1, priority=Priority.OPERATOR_READ, within=reads.patience)
+
+    if profile is None:
+        return [_Shape([identify]), _Shape([status])]
+    runs = _runs(profile)
+    shapes = [_Shape([read(one) for one in found]) for found in runs if found]
+    diagnose = profile.function(DIAGNOSE)
+    if diagnose is not None and ECHO in diagnose.subfunctions:
+        shapes.append(_Shape([echo]))
+    if len(shapes) == 1 and profile.function(IDENTIFY) is not None:
+        shapes.append(_Shape([identify]))
+    return shapes or [_Shape([status])]
+
+
+def _runs(profile: Profile) -> list[list[tuple[Parameter, ...]]]:
+    """Small settings at adjacent addresses, by the length of the runs, from 1 on."""
+    small = {
+        one.address: one
+        for one in profile.parameters
+        if "w" in one.access and word_count(one) == 1 and one.function == REGISTERS
+        and raw_range(one)[0] >= 0 and raw_range(one)[1] <= SMALL
+    }  # fmt: skip
+    reading = profile.function(REGISTERS)
+    most = (reading.max_read if reading is not None else None) or 1
+    longest = 1 if profile.data.reading.single_words_only else min(LONGEST_READ, most)
+    found = []
+    for length in range(1, longest + 1):
+        runs = (tuple(small.get(at + step) for step in range(length)) for at in small)
+        whole = [tuple(one for one in run if one is not None) for run in runs]
+        found.append([run for run in whole if len(run) == length][:CHECKED])
+    return found
