@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -15,6 +16,7 @@ from tui.bus.api import DeviceCounters, LineCounters, Priority
 from tui.bus.errors import ExchangeError, RequestRefused
 from tui.bus.line import Line, Timing
 from tui.bus.link import SerialLink, TcpLink
+from tui.bus.trace import Frame
 from tui.drive.profile import library
 from tui.session.counters.compare import (
     Bounds,
@@ -25,6 +27,7 @@ from tui.session.counters.compare import (
     frames_since,
     load_of,
 )
+from tui.session.counters.strays import stray_difference
 from tui.session.counters.watch import THIS_PORT, CounterWatch
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
@@ -32,6 +35,7 @@ from tui.session.journal_reading import entries_of
 from tui.simulator.simulation import Simulation
 from tui.simulator.spec import DriveSpec
 from tui.simulator.troubles import FaultRates
+from tui.wire.frames import frame
 
 QUICK = Timing(first_timeout=0.4, min_timeout=0.4, late_reply=0.5, retries=0)
 
@@ -171,6 +175,34 @@ async def test_frames_that_the_drive_saw_and_we_did_not_get(tcp: bool) -> None:
         assert counted[THIS_PORT].frames > 8
         assert counted["Modbus network"].counts_this_line
         assert counted["Keypad port"].counts_this_line is False
+
+
+@pytest.mark.parametrize("tcp", [False, True], ids=["serial", "tcp"])
+async def test_frames_that_answer_no_request_are_explained(tcp: bool) -> None:
+    with simulated(tcp=tcp) as (simulation, line):
+        watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
+        await watch.look()
+        simulation.faults.rates = FaultRates(duplicated=1.0)
+        await ask(line, 3)
+        simulation.faults.rates = FaultRates()
+        await asyncio.sleep(0.1)
+        await watch.look()
+        (strays,) = (one for one in watch.now().differences if one.kind == "strays")
+        assert strays.count == 3
+        assert "3 copies of replies" in strays.text
+        watch.reset_ours()
+        assert watch.now().agree
+
+
+def test_strays_name_another_master_and_none_without_strays() -> None:
+    request = frame(5, bytes.fromhex("030C810001"))
+    frames = [Frame(1.0, "in", request, "late or repeated, device 5")]
+    (found,) = stray_difference(1, frames, 0.5, 2, tcp=False)
+    assert found.text.startswith("1 frame answers no program's request")
+    assert "Address 5: read of register 3201" in found.text
+    (older,) = stray_difference(1, frames, 1.0, 2, tcp=False)
+    assert "Address 5" not in older.text
+    assert stray_difference(0, frames, 0.5, 2, tcp=False) == []
 
 
 async def test_damaged_frames_and_those_of_another_master() -> None:

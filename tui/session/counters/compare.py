@@ -26,7 +26,7 @@ COUNTED_ANEW = (
 
 DifferenceKind = Literal[
     "never-arrived", "not-answered", "damaged-there", "not-from-here", "damaged-here",
-    "no-answer", "counted-anew", "another-port",
+    "no-answer", "counted-anew", "another-port", "strays",
 ]  # fmt: skip
 
 

@@ -8,9 +8,11 @@ from functools import partial
 
 from tui.bus.api import DeviceCounters, LastMinute, LineCounters, Priority
 from tui.bus.errors import LineError, RequestRefused
+from tui.bus.link import TcpLink
 from tui.drive.chart import watched_codes
 from tui.drive.profile.schema import PortCounters
 
+from ..diagnosis.asking import last_time
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
 from ..read.reader import Reader
@@ -24,6 +26,7 @@ from .compare import (
     load_of,
     own_differences,
 )
+from .strays import stray_difference
 
 DIAGNOSTICS = 8
 ECHO, RESET, DAMAGED, FRAMES = 0x00, 0x0A, 0x0C, 0x0E
@@ -93,6 +96,8 @@ class CounterWatch:
     _line: LineCounters = field(init=False)
     """The line when it was begun."""
     _begun: float = field(init=False)
+    _since: float = field(init=False)
+    """Time of the last frame before, on the line's clock."""
     _looked: bool = False
     _drive: dict[str, Comparison] = field(default_factory=dict)
 
@@ -127,6 +132,7 @@ class CounterWatch:
     def reset_ours(self) -> None:
         """Count from now on; the line's own counts, which others look at, stay."""
         self._line = self.session.line.counters
+        self._since = last_time(self.session.line.trace)
         self._begun = self.session.clock.monotonic()
         self._drive = {name: Comparison(one.last, one.last) for name, one in self._drive.items()}
 
@@ -243,7 +249,14 @@ class CounterWatch:
             self.trouble,
             line_minute=line.minute,
         )
-        return replace(found, differences=_told(found.compared, since))
+        strays = stray_difference(
+            line.stale - self._line.stale,
+            self.session.line.trace,
+            self._since,
+            self.session.device,
+            tcp=isinstance(self.session.line.link, TcpLink),
+        )
+        return replace(found, differences=(*_told(found.compared, since), *strays))
 
 
 def _reset_entry(session: DriveSession, answer: str) -> Entry:
