@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tui.bus.api import Priority
-from tui.bus.errors import NoAnswer, RequestRefused
+from tui.bus.errors import LineLost, NoAnswer, RequestRefused
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.session.clock import Clock
@@ -121,6 +121,44 @@ async def test_a_time_out_that_is_not_the_one_set_is_told(timeout: float, held: 
     assert "NOT AS SET: 2 s are set." in result.text
     assert result.bracket.not_after is not None
     assert result.bracket.not_before <= timeout <= result.bracket.not_after
+
+
+@pytest.mark.parametrize("timeout", [2.0, math.inf])
+async def test_connection_closed_in_a_silence_is_read_once_it_is_back(timeout: float) -> None:
+    clock, texts, lost = OwnTime(), list[str](), dict[float, float]()
+
+    class BehindAGateway(WatchingDrive):
+        """A gateway closes the connection after 1.5 s, and takes the next one 0.3 s later."""
+
+        async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+            now = clock.monotonic()
+            if now - self._heard > 1.5 and self._heard not in lost:
+                lost[self._heard] = now + 0.3
+            if now < lost.get(self._heard, 0.0):
+                raise LineLost("The line was lost: the other end closed it.")
+            await super().before_read(device, registers, priority)
+
+    drive = BehindAGateway(clock, timeout, held=2.0)
+    prover = bench(clock, drive)
+    prover.tell = texts.append
+    result = await prover.prove()
+    assert lost
+    assert any("connection was closed" in text for text in texts)
+    assert result.as_set is (timeout == 2.0)
+    assert result.bracket.not_before <= timeout <= (result.bracket.not_after or math.inf)
+
+
+async def test_line_that_stays_lost_ends_the_proof() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 2.0)
+    drive.at_twelfth = lambda: setattr(drive, "before_read", lost)
+
+    async def lost(*_: object) -> None:
+        raise LineLost("The line was lost: no route.")
+
+    with pytest.raises(LineLost):
+        await bench(clock, drive).prove()
+    assert not drive.facts.hushed
 
 
 async def test_a_drive_that_never_reacts_is_told_in_capitals() -> None:

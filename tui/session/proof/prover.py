@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from tui.bus.api import Priority
+from tui.bus.errors import LineLost
 from tui.drive.chart import ENABLED_KINDS, fault_code
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused, deciding_codes
@@ -28,6 +29,8 @@ from .silences import Bracket, silences
 LEFT_ALONE_FOR_PROOF = "Its communication time-out is being proved: nobody asks it meanwhile."
 LOOK_FOR_STOP = 0.05
 """Seconds between two looks, in a silence, whether a stop was given."""
+RECONNECTED_BY_THEN = 10.0
+"""Seconds for which a line may be lost after a silence before the proof ends."""
 REACTION_SHOWS_AFTER = 0.3
 """Seconds that a drive has for its reaction to show, before it is read with all words."""
 SLOWER = 0.8
@@ -209,7 +212,7 @@ class Prover:
             self.tell(f"silent for {seconds:.1f} s; set are {timeout:g} s.")
             await self._silence(ended + seconds)
             asked = clock.monotonic()
-            readings = await self._read(self._state_codes())
+            readings = await self._read_after_silence()
             heard = clock.monotonic()
             state = drive_state(self.session.profile, readings)
             seen = self._seen(state, speed, self._hertz(readings))
@@ -221,6 +224,25 @@ class Prover:
             bracket = bracket.alive(asked - ended)
             begun, ended = asked, heard
         return await self._result(rules, timeout, reaction, bracket, "", changed)
+
+    async def _read_after_silence(self) -> dict[str, Reading]:
+        """Read the state. A gateway may close a connection without requests: then once it is back.
+
+        The drive is not read in between, so its silence only lasts longer. Raises LineLost if the
+        line stays lost.
+        """
+        clock = self.session.clock
+        limit, reported = clock.monotonic() + RECONNECTED_BY_THEN, False
+        while True:
+            try:
+                return await self._read(self._state_codes())
+            except LineLost:
+                if clock.monotonic() >= limit:
+                    raise
+            if not reported:
+                self.tell("the connection was closed in the silence. Waiting for it.")
+                reported = True
+            await self._silence(clock.monotonic() + LOOK_FOR_STOP)
 
     def _check_rest(self, state: DriveState) -> None:
         """Raise OrderRefused where a motor turns by now that was at rest: nobody agreed to that."""
