@@ -7,6 +7,7 @@ from .defect import Defect
 LADDER = "tests/session/test_diagnosis.py"
 COMMAND = "tests/cli/test_why.py"
 PORTS = "tests/bus/test_port_errors.py"
+MEASURED = "tests/session/test_examining.py"
 
 DEFECTS = (
     Defect(
@@ -91,5 +92,64 @@ DEFECTS = (
         "yield from wiring_hints(sight)",
         "A person changes over the wires of a drive that answers by them.",
         ("tests/session/test_diagnosis.py::test_who_answers_has_the_right_wires",),
+    ),
+    Defect(
+        "copies-taken-for-a-second-drive",
+        "tui/session/diagnosis/measure.py",
+        "        if paused.second >= TURNS:",
+        "        if self.second:",
+        "A person looks for a second drive where an adapter sends each frame twice.",
+        (f"{MEASURED}::test_a_copy_during_the_next_request_is_no_second_drive",),
+    ),
+    Defect(
+        "late-replies-taken-for-one-behind",
+        "tui/session/diagnosis/measure.py",
+        "prompt = due and frame.time - now.began < PROMPT",
+        "prompt = due",
+        "A slow drive is said to show values of other registers.",
+        (f"{MEASURED}::test_one_behind_is_at_once_and_a_late_reply_is_not",),
+    ),
+    Defect(
+        "collisions-taken-for-one-behind",
+        "tui/session/diagnosis/measure.py",
+        'if one.older and (one.replies or one.damaged or one.older == "second"):',
+        "if one.older and one.replies:",
+        "Two drives at one address are called a converter that is behind.",
+        (f"{MEASURED}::test_an_older_reply_is_counted_by_what_else_came",),
+    ),
+    Defect(
+        "gateway-refusals-taken-for-replies",
+        "tui/session/diagnosis/measure.py",
+        "and body[2] in unreached:",
+        "and body[2] in ():",
+        "A gateway that misses the drive now and then is called well.",
+        (f"{MEASURED}::test_a_gateway_that_misses_the_drive_is_counted",),
+    ),
+    Defect(
+        "lone-unit-of-a-gateway-that-passes-units-on",
+        "tui/session/diagnosis/gateway_probe.py",
+        "    if others - {device, ANY_UNIT}:\n        return None  # the gateway passes units on\n",
+        "",
+        "An address without a drive is called a gateway that answers unit 255 only.",
+        (f"{MEASURED}::test_no_connection_is_made_beside_a_line_that_answers",),
+    ),
+    Defect(
+        "requests-beside-another-master",
+        "tui/session/diagnosis/examining.py",
+        "if ready and not isinstance(line.link, TcpLink) and (others := await _others(line)):",
+        'if ready and (others := ""):',
+        "A diagnosis disturbs the master that controls the line.",
+        (f"{MEASURED}::test_nothing_is_sent_while_another_master_is_heard",),
+    ),
+    Defect(
+        "line-lost-in-a-silence-ends-the-proof",
+        "tui/session/proof/prover.py",
+        "                if clock.monotonic() >= limit:\n                    raise\n",
+        "                raise\n",
+        "Behind a gateway that closes idle connections nobody learns what the drive did.",
+        (
+            "tests/session/test_prover.py::"
+            "test_connection_closed_in_a_silence_is_read_once_it_is_back",
+        ),
     ),
 )

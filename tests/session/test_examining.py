@@ -121,6 +121,16 @@ def test_an_older_reply_is_counted_by_what_else_came(
     assert found.one_behind == (found.behind > 1)
 
 
+@pytest.mark.parametrize(("after", "kind"), [(0.05, "behind"), (0.3, "late")])
+def test_one_behind_is_at_once_and_a_late_reply_is_not(after: float, kind: str) -> None:
+    frames = [Frame(0, "out", ASKED), Frame(1, "out", WIDE), Frame(1 + after, "in", REPLY, OLD)]
+    found = measure_of(frames, 2)
+    assert {one: found.count(one) for one in ("behind", "late")} == {
+        "behind": int(kind == "behind"),
+        "late": int(kind == "late"),
+    }
+
+
 def test_replies_of_other_polled_drives_are_not_foreign() -> None:
     other = frame(7, ASKED[1:-2])
     assert counted([ASKED, frame(7, REPLY[1:-2])]).foreign == 1
@@ -191,6 +201,23 @@ async def test_the_only_unit_of_a_gateway_is_found(unit: int) -> None:
     with opened({"only-unit": unit}, "tcp") as line:
         found = await found_on(line)
     assert (found.rung, f"unit {unit}," in found.text) == ("other-unit", True)
+
+
+async def test_no_connection_is_made_beside_a_line_that_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Many gateways take one client: a second one ends the connection of the line."""
+    beside: list[object] = []
+
+    async def refused(*place: object) -> None:
+        beside.append(place)
+        raise OSError
+
+    with opened({}, "tcp") as line:
+        await line.read(2, 3201)
+        monkeypatch.setattr("asyncio.open_connection", refused)
+        found = diagnosed(await examine_line(line, 9, None))
+        assert (found.rung, beside) == ("silence", [])
 
 
 async def test_an_idle_timeout_is_found() -> None:

@@ -70,6 +70,9 @@ async def probed(line: ModbusLine, device: int, *, beside: bool = True) -> Works
     """
     link = line.link
     assert isinstance(link, TcpLink | RtuTcpLink)
+    others = {unit for unit, one in line.counters.devices.items() if one.replies}
+    if others - {device, ANY_UNIT}:
+        return None  # the gateway passes units on
     if isinstance(link, TcpLink) and await _reads(line, ANY_UNIT):
         return Works("", ANY_UNIT)
     counters = line.counters
