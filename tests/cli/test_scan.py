@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from tests.bus.peer import PtyPeer, Step, silent
+from tests.bus.peer import PtyPeer, Step, TcpPeer, silent, tcp_reply, tcp_request_length
 from tests.programs import DRIVEPANEL, PATIENCE, served
 from tui.drive.finding import LineSetting, likely_settings
 from tui.session.connect import strangers
@@ -197,6 +197,45 @@ def test_damaged_identification_is_unclear_and_no_family_is_likely() -> None:
     assert unclear["device"] == 3
     assert "damaged" in unclear["text"]
     assert [request[1] for request in peer.requests if request[0] == 3][:4] == [3, 43, 43, 43]
+
+
+@pytest.mark.parametrize(("code", "text"), [(10, "0A, it has no way"), (11, "0B, the drive did")])
+def test_refusals_of_a_gateway_are_reported(code: int, text: str) -> None:
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        return [tcp_reply(request, bytes([request[7] | 0x80, code]))]
+
+    with TcpPeer(script, length=tcp_request_length) as peer:
+        line = f"tcp:127.0.0.1:{peer.port}"
+        done = invoked("scan", line, "--addresses", "3-5", "--json")
+    assert done.exit_code == 3
+    (end,) = events(done.stdout, "ended")
+    (remark,) = end["remarks"]
+    assert remark.startswith(f"The gateway answers {text}")
+    assert "3-5" in remark
+    assert remark in done.stderr
+    assert "drivepanel why" in done.stderr
+
+
+def test_echo_of_the_adapter_is_reported() -> None:
+    simulation = Simulation([DriveSpec("atv71", 2)], any_settings=True)
+
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        reply = simulation.line.receive(request)
+        return [request, reply.data] if reply is not None else [request]
+
+    with simulation, PtyPeer(script) as peer:
+        done = ended(0, "scan", peer.path, "--addresses", "1-3", "--json")
+    (hit,) = events(done.stdout, "hit")
+    assert hit["device"] == 2
+    (end,) = events(done.stdout, "ended")
+    assert "as an echo" in end["remarks"][0]
+    assert "The adapter repeats what it sends" in done.stderr
+
+
+def test_line_that_is_well_has_no_remarks() -> None:
+    with tcp_line("atv71@2") as line:
+        (end,) = events(ended(0, "scan", line, "--addresses", "1-2", "--json").stdout, "ended")
+    assert end["remarks"] == []
 
 
 def test_over_a_network_there_is_no_setting() -> None:

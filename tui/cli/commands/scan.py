@@ -136,10 +136,11 @@ def _end(scans: list[Scan], addresses: str) -> str:
         "settings": [{"baud": one.baud, "format": one.format} for one in scan.tried],
         "not_tried": len(scan.settings) - len(scan.tried),
         "held_back": scan.held_back or None,
+        "remarks": scan.remarks,
         "text": text,
     }
     scan.tell.ended(ended)
-    return text
+    return " ".join((text, *scan.remarks))
 
 
 def _settings_text(scan: Scan) -> str:
@@ -150,6 +151,8 @@ def _settings_text(scan: Scan) -> str:
 
 def _hint(scan: Scan) -> str:
     """What to look at where nobody answers."""
+    if scan.remarks:
+        return "drivepanel why LINE -d ADDRESS names the cause and the next steps."
     look = "Are the drives on, and are the two wires those of the line?"
     if scan.setting is not None and len(scan.settings) == 1:
         return f"{look} --all-settings tries other baud rates and formats."

@@ -234,6 +234,8 @@ class ScanEndTold(DocumentTold, kw_only=True):
     not_tried: int
     held_back: str | None
     """Why others were not tried; null where nothing kept them back."""
+    remarks: list[str]
+    """Troubles of the line that the search has shown: an echo, refusals of a gateway."""
     text: str
 
 

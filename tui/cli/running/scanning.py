@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.connect.search import Search
     from tui.session.connect.setting_costs import SettingCosts
+    from tui.session.diagnosis.remarks import LineRemarks
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
 
@@ -53,22 +54,31 @@ class Scan:
     """With the drives at the present setting of which a profile may be known."""
     unknown: list[int] = field(default_factory=list)
     """The others that answered there."""
+    remarks: list[str] = field(default_factory=list)
+    """Troubles of the line that the search has shown, a sentence each."""
 
     async def run(self) -> None:
         """Listen, then search. Raises Failure before anything is sent, and the line's errors."""
         from tui.drive.finding import watching_families
         from tui.session.connect.strangers import known_profiles
+        from tui.session.diagnosis.asking import FRAMES_COME_WITHIN
+        from tui.session.diagnosis.remarks import LineRemarks
 
         self.tell.families(watching_families(await asyncio.to_thread(known_profiles)))
         await asyncio.to_thread(_ready_for_hits)
         await self._listen()
         later = self.settings[1:]
-        goes_on = await self._at_this_setting(last=not later)
+        remarks = LineRemarks(self.opened.line)
+        goes_on = await self._at_this_setting(remarks, last=not later)
         while later and goes_on:
             await self._tell_slow(later)
             setting = later.pop(0)
             if await self._reopened(setting):
-                goes_on = await self._at_this_setting(last=not later)
+                goes_on = await self._at_this_setting(remarks, last=not later)
+        if not self.hits:
+            await asyncio.sleep(FRAMES_COME_WITHIN)
+        remarks.look()
+        self.remarks = remarks.texts
         self.done = True
 
     async def _listen(self) -> None:
@@ -93,13 +103,19 @@ class Scan:
         link = self.opened.line.link
         return LineSetting(link.baud, link.format) if isinstance(link, SerialLink) else None
 
-    async def _at_this_setting(self, *, last: bool) -> bool:
+    async def _at_this_setting(self, remarks: LineRemarks, *, last: bool) -> bool:
         """Ask all addresses; whether other settings may be tried, with what is found held on."""
         from tui.session.connect.other_masters import MasterLookout
         from tui.session.connect.search import Search
 
         if (setting := self.setting) is not None:
             self.tried.append(setting)
+        masters = MasterLookout(self.opened.line)
+
+        def look() -> None:
+            masters.look()
+            remarks.look()
+
         async with self._held() as fleet:
 
             async def found(result: ScanResult) -> None:
@@ -109,7 +125,7 @@ class Scan:
                 self._not_known(),
                 once=True,
                 patient=self.opened.simulation is not None,
-                between=MasterLookout(self.opened.line).look,
+                between=look,
             )
             await self._searched(search, asyncio.ensure_future(search.run(fleet.line, found)))
             if last:

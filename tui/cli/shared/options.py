@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import time
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -18,7 +19,7 @@ from .looking_after import guard_motors
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
 from .say import say
 from .signals import never_suspended
-from .silence import about_silence
+from .silence import STATE_COMES_WITHIN, about_silence
 
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
@@ -190,7 +191,9 @@ def on_line(
             mind_the_line(opened)
             return asyncio.run(to_its_end([opened], lambda: work(opened)))
         except NoAnswer as error:
-            hint = about_silence(opened, text, by_profile=usual is not None)
+            if opened.line.facts.voice is not None:
+                time.sleep(STATE_COMES_WITHIN)
+            hint = about_silence(opened, text, error.device, by_profile=usual is not None)
             if not hint:
                 raise
             text = f"{error} {hint}"

@@ -5,16 +5,36 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tui.bus.api import ModbusLine
     from tui.session.connect.open_line import OpenLine
 
     from .options import Target
 
 
-def about_silence(opened: OpenLine, text: str, *, by_profile: bool) -> str:
+STATE_COMES_WITHIN = 0.4
+"""Seconds in which the keeper of a line has sent what it knows of a drive."""
+ANSWERS_LATE = (
+    "It answers, but after its timeout. Add ,timeout=SECONDS to LINE, for example ,timeout=2; the"
+    " longest is 30 s."
+)
+
+
+def is_slow(line: ModbusLine, device: int) -> bool:
+    """True if late replies of a drive came that did not answer in time."""
+    from tui.bus.link import TcpLink
+
+    # over Modbus TCP late replies are counted for the line alone
+    late = isinstance(line.link, TcpLink) and line.counters.stale > 0
+    return late or line.device_state(device).lateness > 0
+
+
+def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool) -> str:
     """What to look at where nothing answers; empty for a line without settings of its own."""
     from tui.bus.link import SerialLink, UsualSettings, parse_link
 
     link = opened.line.link
+    if is_slow(opened.line, device):
+        return ANSWERS_LATE
     if not isinstance(link, SerialLink) or opened.simulation is not None:
         return ""
     other = UsualSettings(link.baud + 1, "8N1" if link.format != "8N1" else "8E1")
@@ -34,5 +54,5 @@ def silence_hint(error: Exception, opened: OpenLine, target: Target) -> str:
     if not isinstance(error, NoAnswer):
         return ""
     by_profile = target.profile_id is not None
-    hint = about_silence(opened, target.line_text, by_profile=by_profile)
+    hint = about_silence(opened, target.line_text, error.device, by_profile=by_profile)
     return f" {hint}" if hint else ""

@@ -10,8 +10,9 @@ from tui.bus.errors import LineError
 from tui.drive.settings.parameter_set import ParameterSet, dump_set
 
 from ..counters.watch import CounterWatch
-from ..diagnosis.asking import sight_of_drive, sight_of_port
+from ..diagnosis.asking import sight_of_port
 from ..diagnosis.diagnosis import Diagnosis, diagnosed
+from ..diagnosis.examining import examine_line
 from ..drive import DriveSession
 from ..journal import Journal
 from ..journal_reading import entries_of
@@ -93,7 +94,7 @@ class _Drive:
         known = subject.opened.known
         changed = known.text if known is not None else ""
         return diagnosed(
-            await sight_of_drive(subject.opened.line, device, profile, changed=changed)
+            await examine_line(subject.opened.line, device, profile, changed=changed)
         )
 
     async def _session(self) -> DriveSession:

@@ -14,6 +14,7 @@ REFUSED = 0x80
 REGISTER_READS = (3, 4)
 TCP_HEAD = 6
 """Bytes of Modbus TCP before the address."""
+ECHO_NOTE = "echo"
 LATE_NOTE = "late"
 """How the note of a frame begins that came when none was due."""
 
