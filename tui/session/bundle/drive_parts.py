@@ -93,9 +93,7 @@ class _Drive:
             return diagnosed(replace(seen, profile=profile))
         known = subject.opened.known
         changed = known.text if known is not None else ""
-        return diagnosed(
-            await examine_line(subject.opened.line, device, profile, changed=changed)
-        )
+        return diagnosed(await examine_line(subject.opened.line, device, profile, changed=changed))
 
     async def _session(self) -> DriveSession:
         if self._withheld:
