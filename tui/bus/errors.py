@@ -193,3 +193,7 @@ class DeviceException(ExchangeError):
             address,
             f"Device {device} refused {_asked(function, address)} with exception {code}{why}.",
         )
+
+
+HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)
+"""Failures that waiting does not mend."""

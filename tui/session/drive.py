@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import weakref
+from collections.abc import Mapping
 
 from tui.bus.api import ModbusLine
 from tui.bus.link import label
@@ -20,7 +21,7 @@ from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
 from .connect.prepared_stop import prepared_stop
 from .image import RegisterImage
-from .reading import Rating
+from .reading import Rating, Reading
 from .starts.keeper import StartKeeper
 from .timeout_told import Timeout
 from .unsaved import UnsavedSettings
@@ -147,6 +148,14 @@ class DriveSession:
     def note_given(self) -> None:
         """Another program commands the drive: what its motor does is no longer from here."""
         self.commanded_at = None
+
+    def take(self, found: Mapping[str, Reading]) -> None:
+        """Keep what was read. Raises BytesSwapped, and forgets all, while words arrive swapped."""
+        self.byte_order.note(self.profile, found, self.clock.monotonic())
+        if (error := self.byte_order.error) is not None:
+            self.image.forget()
+            raise error
+        self.image.take(found)
 
     def stir(self) -> None:
         """Something was done to the drive: whoever watches it looks at all of it again."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TypeVar
 
-from ..errors import LineClosed, LineError, LineLost, NotShared, PortBusy, PortMissing, PortRefused
+from ..errors import HOPELESS, LineClosed, LineError, LineLost
 from ..link import Link, TcpLink, label
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
@@ -33,8 +33,6 @@ log = logging.getLogger(__name__)
 
 WORKERS_END = 2.0
 """Seconds that cancelled workers have to end when the line is closed."""
-HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)
-"""Failures that waiting does not mend."""
 
 
 class Engine:

@@ -23,7 +23,7 @@ from ..drive_state import drive_state
 from ..read.reader import Reader
 from ..read.rotation import Rotation
 from ..reading import Quality, Reading
-from .rates import SLOW_FACTOR, Rates, rates_of
+from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan
 from .trend import Trend, TrendPoint
@@ -194,7 +194,8 @@ class Monitor:
                     error, contact = str(fault), contact_of(fault)
                     failures += 1
                     if contact == "swapped":
-                        readings = self._none_good((*rates.fast, *rates.seldom), error)
+                        now = self.session.clock.monotonic()
+                        readings = bad_readings(self.profile, rates, now, error)
                     begun.clear()
                     due.failed(self.reader.groups)
                     if self._may_be_another(fault, failures):
@@ -217,11 +218,6 @@ class Monitor:
         finally:
             self._steady.end()
             self.line.pace.release(self)
-
-    def _none_good(self, codes: Sequence[str], error: str) -> dict[str, Reading]:
-        """No value of these is to be shown, and why."""
-        now = self.session.clock.monotonic()
-        return {code: Reading.bad(self.profile[code], now, error) for code in codes}
 
     async def _goes_on(self, rates: Rates, due: Rotation, at: float) -> bool:
         """Wait for the next cycle from the line's holder; False if it is to be read from here."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from tui.drive.chart import fault_code, watched_codes
 from tui.drive.profile.profile import Profile
 
+from ..reading import Reading
+
 SLOW_FACTOR = 10
 """Cycles of the fast values to one of the slow ones."""
 
@@ -27,6 +29,11 @@ class Rates:
     def seldom(self) -> tuple[str, ...]:
         """What is not read in every cycle."""
         return (*self.changing, *self.slow)
+
+
+def bad_readings(profile: Profile, rates: Rates, now: float, why: str) -> dict[str, Reading]:
+    """None of these values is to be shown, and why."""
+    return {code: Reading.bad(profile[code], now, why) for code in (*rates.fast, *rates.seldom)}
 
 
 def rates_of(profile: Profile) -> Rates:

@@ -169,17 +169,8 @@ class Reader:
             found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
-        self._check_byte_order(found)
-        image.take(found)
+        self.session.take(found)
         return found
-
-    def _check_byte_order(self, found: Mapping[str, Reading]) -> None:
-        """Keep nothing of a drive whose words arrive with swapped bytes. Raises BytesSwapped."""
-        order = self.session.byte_order
-        order.note(self.profile, found, self.session.clock.monotonic())
-        if (error := order.error) is not None:
-            self.session.image.forget()
-            raise error
 
     async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Reading]:
         """Values of a plan; those of a block whose slots have changed meanwhile are left out."""
