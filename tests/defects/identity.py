@@ -32,8 +32,8 @@ DEFECTS = (
     Defect(
         "one-word-means-swapped-bytes",
         "tui/session/byte_order.py",
-        "REGISTERS = 3\n",
-        "REGISTERS = 1\n",
+        "LEAST_REGISTERS = 3\n",
+        "LEAST_REGISTERS = 1\n",
         "A value out of its range takes a healthy drive from its person.",
         (f"{BYTES}::test_values_read_anyway_show_that_bytes_are_swapped_from_now_on",),
     ),

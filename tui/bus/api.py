@@ -61,7 +61,7 @@ class LineWorker(Protocol):
         """Ask the work to end; more than once does no harm."""
 
     def done(self) -> bool:
-        """Whether the work has ended: by itself, by cancel() or by an error."""
+        """True if the work has ended: by itself, by cancel() or by an error."""
 
 
 class ModbusLine(Protocol):
@@ -84,7 +84,7 @@ class ModbusLine(Protocol):
 
     @property
     def read_only(self) -> bool:
-        """Whether everything that changes a device is refused with RequestRefused."""
+        """True if everything that changes a device is refused with RequestRefused."""
 
     @property
     def timing(self) -> Timing:
@@ -100,7 +100,7 @@ class ModbusLine(Protocol):
 
     @property
     def state(self) -> LineState:
-        """Whether the line can be used now, and if not, why and when it is tried again."""
+        """State of the line; if it cannot be used now, why and when it is tried again."""
 
     @property
     def counters(self) -> LineCounters:

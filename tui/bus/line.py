@@ -115,7 +115,7 @@ class Line:
 
     @property
     def state(self) -> LineState:
-        """Whether the line can be used now, and if not, why and when it is tried again."""
+        """State of the line; if it cannot be used now, why and when it is tried again."""
         return self._engine.state
 
     @property

@@ -57,7 +57,7 @@ class Request(ABC):
 
     @property
     def changes(self) -> bool:
-        """Whether the request changes anything in the device; such a request is sent once."""
+        """True if the request changes anything in the device; such a request is sent once."""
         return False
 
     def words(self, _pdu: bytes) -> tuple[int, ...]:

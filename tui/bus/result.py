@@ -52,7 +52,7 @@ class ExchangeResult:
     strays: list[Piece] = field(default_factory=list)
     """Whole frames that are neither the reply nor an echo."""
     resynchronised: bool = False
-    """Whether the reply was found behind or between other bytes."""
+    """True if the reply was found behind or between other bytes."""
     recognised: bool = False
     """Of damaged bytes: whether they are surely what is left of the reply."""
     sent: float = 0.0

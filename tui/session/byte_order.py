@@ -11,11 +11,11 @@ from tui.drive.profile.profile import Profile
 
 from .reading import Reading
 
-REGISTERS = 3
+LEAST_REGISTERS = 3
 """Registers that must speak for swapped bytes; one word may be out of its range."""
 MAJORITY = 4
 """So many times more registers must speak for one order than for the other to change it."""
-REMEMBERED = 90.0
+VOTES_LAST = 90.0
 """Seconds after which a value says nothing about the present order."""
 
 
@@ -68,17 +68,17 @@ class ByteOrder:
         right = sum(vote is False for vote in votes.values())
         wrong = sum(vote is True for vote in votes.values())
         with self._lock:
-            if right >= REGISTERS and right >= MAJORITY * wrong:
+            if right >= LEAST_REGISTERS and right >= MAJORITY * wrong:
                 self._seen, self._against = {}, ()  # whatever came before
-            elif wrong >= REGISTERS and wrong >= MAJORITY * right:
+            elif wrong >= LEAST_REGISTERS and wrong >= MAJORITY * right:
                 self._seen = {}
             kept = {c: s for c, s in self._seen.items() if c not in read}
             new = {c: (vote, read[c][0].time) for c, vote in votes.items() if vote is not None}
             every = {**kept, **new}
-            self._seen = {c: s for c, s in every.items() if now - s[1] <= REMEMBERED}
+            self._seen = {c: s for c, s in every.items() if now - s[1] <= VOTES_LAST}
             against = sorted(code for code, (swapped, _) in self._seen.items() if swapped)
             others = len(self._seen) - len(against)
-            begins = not self._against and len(against) >= max(REGISTERS, MAJORITY * others)
+            begins = not self._against and len(against) >= max(LEAST_REGISTERS, MAJORITY * others)
             if begins:
                 self._against = tuple(against)
         if begins:

@@ -52,9 +52,9 @@ class Dispatcher:
         """Decides which replies are trusted after another process has used the line."""
         self._alive_reads = AliveReads(devices, self.facts, clock, self.submit)
         self.in_flight = False
-        """Whether a request was sent whose end is not known yet."""
+        """True if a request was sent whose end is not known yet."""
         self.held_back: Callable[[], bool] = bool
-        """Whether nothing but stops may go out now: others may have sent stops meanwhile."""
+        """True if nothing but stops may go out now: others may have sent stops meanwhile."""
         self.last_way: LastWay | None = None
         """Where stops wait that go around the queue."""
 

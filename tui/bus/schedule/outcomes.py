@@ -59,7 +59,7 @@ class Outcomes:
         self._gateway = gateway
 
     def waited_for_us(self, job: Job, result: ExchangeResult) -> bool:
-        """Whether a read is asked anew: when its answer came is not known.
+        """True if a read is asked anew: when its answer came is not known.
 
         This program may have been stopped in between, and the answer have waited for it.
         """
@@ -163,7 +163,7 @@ class Outcomes:
         return False
 
     def _is_repeated(self, job: Job, kind: ResultKind) -> bool:
-        """Whether a request is sent again: never one that changes anything."""
+        """True if a request is sent again: never one that changes anything."""
         polled = job.priority is Priority.POLL
         retries = POLL_REPEATS if polled and self._timing.retries else self._timing.retries
         if job.request.changes or job.repeats >= retries:

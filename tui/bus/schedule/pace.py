@@ -50,7 +50,7 @@ class Pace:
 
     @property
     def busy(self) -> bool:
-        """Whether anybody asks again and again."""
+        """True if anybody asks again and again."""
         return bool(self._wishes)
 
     def release(self, who: Hashable) -> None:

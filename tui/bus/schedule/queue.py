@@ -31,12 +31,12 @@ class Job:
     """When it was first sent, if it is sent again: a reply to it may be of that time."""
     pdu: bytes = b""
     begun: bool = False
-    """Whether it was taken from the queue once, so that it cannot be withdrawn any more."""
+    """True if it was taken from the queue once, so that it cannot be withdrawn any more."""
     expectation: Expectation | None = None
     order: int = 0
     """Place among the jobs of its priority; kept when it is sent again."""
     replaceable: bool = False
-    """Whether a newer write of the same register may take its place while it waits."""
+    """True if a newer write of the same register may take its place while it waits."""
     forbidden: Callable[[], str] | None = None
     """Asked just before it is sent: why it must not be any more, or empty."""
     program: str = ""
@@ -64,7 +64,7 @@ class Job:
 
     @property
     def commands(self) -> bool:
-        """Whether it changes anything and is no stop: a stop voids it."""
+        """True if it changes anything and is no stop: a stop voids it."""
         return self.request.changes and self.priority is not Priority.STOP
 
     def fail(self, error: LineError) -> None:

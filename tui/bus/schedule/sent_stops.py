@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 JUST_SENT = 3.0
 """Seconds for which a stop that was sent makes one like it a repeat."""
-TRIES = 5
+MOST_UNACKNOWLEDGED = 5
 """Times that a stop may be sent without an acknowledgment before the next counts as a repeat."""
 
 
@@ -36,11 +36,11 @@ class SentStops:
         self._stopped_last = False
 
     def yields(self, job: Job, now: float) -> bool:
-        """Whether one other request goes before this stop."""
+        """True if one other request goes before this stop."""
         if job.priority is not Priority.STOP or not self._stopped_last:
             return False
         sent = self._sent.get((job.request.device, job.pdu))
-        return sent is not None and now - sent.when < JUST_SENT and sent.tries in (0, TRIES)
+        return sent is not None and now - sent.when < JUST_SENT and sent.tries in (0, MOST_UNACKNOWLEDGED)
 
     def count(self, job: Job, now: float, *, acknowledged: bool) -> None:
         """A request was sent, and its exchange is over."""
@@ -59,5 +59,5 @@ class SentStops:
             }
             which = request.device, job.pdu
             before = self._sent.get(which, SentStop(now, 0))
-            tries = 0 if acknowledged else min(before.tries + 1, TRIES)
+            tries = 0 if acknowledged else min(before.tries + 1, MOST_UNACKNOWLEDGED)
             self._sent[which] = SentStop(now, tries)

@@ -98,7 +98,7 @@ class Client:
             self.say(Alive())
 
     def is_silent(self, now: float, looks: int) -> bool:
-        """Whether it gave no sign of life for too long, however often one was looked for.
+        """True if it gave no sign of life for too long, however often one was looked for.
 
         By looks, too: where this program got no time to look, the client may be well.
         """
