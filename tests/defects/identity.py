@@ -23,9 +23,9 @@ DEFECTS = (
     ),
     Defect(
         "swapped-bytes-kept",
-        "tui/session/read/reader.py",
-        "        if (error := order.error) is not None:\n",
-        "        if (error := order.error) is not None and False:\n",
+        "tui/session/drive.py",
+        "        if (error := self.byte_order.error) is not None:\n",
+        "        if (error := self.byte_order.error) is not None and False:\n",
         "HSP 6246.5 Hz is shown as a good value.",
         (f"{BYTES}::test_monitor_of_swapped_bytes_shows_no_good_value",),
     ),

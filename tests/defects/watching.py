@@ -24,8 +24,8 @@ DEFECTS = (
     Defect(
         "values-of-the-monitor-not-noted",
         "tui/session/read/reader.py",
-        "        image.take(found)\n",
-        "        _ = priority < Priority.POLL and image.take(found)\n",
+        "        self.session.take(found)\n",
+        "        _ = priority < Priority.POLL and self.session.take(found)\n",
         "Parameters and stops do not know what Monitor shows.",
         ("tests/session/test_reader.py",),
     ),

@@ -40,7 +40,11 @@ class SentStops:
         if job.priority is not Priority.STOP or not self._stopped_last:
             return False
         sent = self._sent.get((job.request.device, job.pdu))
-        return sent is not None and now - sent.when < JUST_SENT and sent.tries in (0, MOST_UNACKNOWLEDGED)
+        return (
+            sent is not None
+            and now - sent.when < JUST_SENT
+            and sent.tries in (0, MOST_UNACKNOWLEDGED)
+        )
 
     def count(self, job: Job, now: float, *, acknowledged: bool) -> None:
         """A request was sent, and its exchange is over."""

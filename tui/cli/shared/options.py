@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import time
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -19,7 +18,7 @@ from .looking_after import guard_motors
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
 from .say import say
 from .signals import never_suspended
-from .silence import STATE_COMES_WITHIN, about_silence
+from .silence import about_silence, wait_for_state
 
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
@@ -191,8 +190,7 @@ def on_line(
             mind_the_line(opened)
             return asyncio.run(to_its_end([opened], lambda: work(opened)))
         except NoAnswer as error:
-            if opened.line.facts.voice is not None:
-                time.sleep(STATE_COMES_WITHIN)
+            wait_for_state(opened.line)
             hint = about_silence(opened, text, error.device, by_profile=usual is not None)
             if not hint:
                 raise

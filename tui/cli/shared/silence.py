@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,6 +18,12 @@ ANSWERS_LATE = (
     "It answers, but after its timeout. Add ,timeout=SECONDS to LINE, for example ,timeout=2; the"
     " longest is 30 s."
 )
+
+
+def wait_for_state(line: ModbusLine) -> None:
+    """Give the keeper of a line the time to send what it has seen."""
+    if line.facts.voice is not None:
+        time.sleep(STATE_COMES_WITHIN)
 
 
 def is_slow(line: ModbusLine, device: int) -> bool:
