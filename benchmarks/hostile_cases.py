@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tui.bus.errors import LineError
+from tui.bus.identification import Objects
 from tui.bus.requests import (
     Diagnose,
     Identify,
@@ -26,7 +27,6 @@ from tui.bus.requests import (
     WriteMany,
     WriteOne,
     diagnostic_of,
-    objects_of,
 )
 from tui.bus.rtu.exchange import RtuExchange
 from tui.drive.blocks.assignment import Assignment
@@ -388,7 +388,7 @@ def _understood(request: Request, pdu: bytes) -> None:
 
     match request:
         case Identify():
-            told = objects_of(pdu)
+            told = Objects().with_more(pdu)
             identity = identity_from(1, IdentificationObjects(told.conformity, told.objects))
             # whoever shows it, and wherever
             no_commands(f"{identity.vendor}{identity.reference}{identity.version}{identity.name}")
