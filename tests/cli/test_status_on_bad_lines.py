@@ -78,7 +78,7 @@ def test_status_does_not_list_a_timeout_as_unread_that_it_shows(
     """The drive told it as it was identified; every later read of it hangs."""
     monkeypatch.setattr(drive_status, "STATUS_WITHIN", 2.0)
     with tcp_line("atv71@1") as line:
-        lose(monkeypatch, TIMEOUT_WORD, 60.0, answered=1)
+        lose(monkeypatch, TIMEOUT_WORD, 60.0, answered=2)
         document = json.loads(ended(0, "status", line, "--json").stdout)
     assert document["timeout"]["seconds"] == document["watch"]["timeout_s"] == 10
     assert document["unread"] == []

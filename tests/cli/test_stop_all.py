@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -56,12 +57,12 @@ def with_drive(damaged: float) -> FakeLine:
 
 
 async def test_what_is_heard_but_damaged_is_asked_for_with_more_patience() -> None:
+    for patience in (Priority.BACKGROUND, Priority.PATIENT):
+        assert await stop_of(with_drive(2), patience) == "Altivar 71"
     with pytest.raises(LineError):  # the next round is the patient one
-        await stop_of(with_drive(1), Priority.BACKGROUND)
-    line = with_drive(1)
-    assert await stop_of(line, Priority.PATIENT) == "Altivar 71"
+        await stop_of(with_drive(math.inf), Priority.BACKGROUND)
     with pytest.raises(Failure, match="NOT STOPPED"):
-        await stop_of(with_drive(2), Priority.PATIENT)
+        await stop_of(with_drive(math.inf), Priority.PATIENT)
     silent = FakeLine({1: {}})
     silent.silence(1)
     assert await stop_of(silent, Priority.PATIENT) == ""

@@ -77,8 +77,8 @@ DEFECTS = (
     Defect(
         "own-reading-taken-for-a-new-one",
         "tui/session/read/reader.py",
-        "self.session.clock.monotonic() - max(newest, since)",
-        "self.session.clock.monotonic() - since",
+        "        return max((since, *(image.changed(place.code) for place in request.places)))\n",
+        "        return since\n",
         "A value that was read in the cycle before is told as not read now.",
         (
             "tests/session/test_slots.py"

@@ -8,6 +8,7 @@ import pkgutil
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -25,6 +26,7 @@ from tui.screens.command.options import OptionsScreen
 from tui.screens.command.teaching import PickWord, fault_of_look
 from tui.screens.connection.choices import fault_of_line
 from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.bundle import BundleScreen
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.files import fault_of_new
 from tui.screens.dialogs.leave import Leave
@@ -40,6 +42,8 @@ from tui.screens.monitor.screen import MonitorScreen, fault_of_rating
 from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
 from tui.screens.parameters.results import RestQuestion, Results
 from tui.screens.parameters.skipped import Skipped
+from tui.session.bundle.archive import Bundle
+from tui.session.bundle.parts import PartProgress
 from tui.session.connect.addresses import parse_addresses
 from tui.session.console import DriveConsole
 from tui.session.diagnosis.diagnosis import Diagnosis
@@ -52,6 +56,12 @@ from .test_flows import picture, until
 SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
 Make = Callable[[DrivePanelApp, DriveConsole], ModalScreen[Any]]
 APPLIED = Applied((), Edits(()))
+
+
+async def _no_bundle(_: PartProgress) -> Bundle:
+    """It is collected as long as the test goes on."""
+    await asyncio.sleep(3600)
+    raise AssertionError
 
 
 async def _no_answer() -> Diagnosis:
@@ -85,6 +95,7 @@ DIALOGS: dict[str, Make] = {
     "EditBits": lambda _, one: EditBits(one.editor, _parameter(one, "CMD")),
     "Results": lambda *_: Results(APPLIED),
     "RestQuestion": lambda app, one: RestQuestion(APPLIED, MotorsNow(app, [one.session])),
+    "BundleScreen": lambda *_: BundleScreen(Path("a.zip"), _no_bundle),
     "Skipped": lambda *_: Skipped(1, "backup.toml", []),
 }
 

@@ -102,7 +102,7 @@ async def test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked() -
             assert "No drive answered" not in said(app)
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
-            assert "Something answered at 2: what it does" in dialog(app)
+            assert "Device 2: what it does when it is asked no more" in dialog(app)
             await pilot.press("y")
             await until(
                 pilot, lambda: "Somebody answers, and not clearly, at 19200 8N2" in said(app)

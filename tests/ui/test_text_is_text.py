@@ -187,6 +187,14 @@ async def connection(made: Bench) -> None:
             field.value = ""
     made.app.connection.drives.focus()
     await dialog(made, "n")
+    await made.pilot.press("ctrl+p")
+    await until(made.pilot, lambda: isinstance(made.app.screen, Palette))
+    await made.pilot.press(*"bundle", "enter")
+    await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+    for text in MARKUP:
+        made.app.screen.query_one(Input).value = text
+        await made.pilot.pause()
+    await made.pilot.press("escape")
 
 
 WAYS: dict[str, tuple[str, Way]] = {
@@ -210,6 +218,7 @@ ASKED = {
     "Ctrl+S of Faults",
     "Ctrl+S of Frames",
     "n",
+    "bundle of the palette",
 }
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import partial
@@ -20,6 +19,7 @@ from tui.drive.small_file import read_small
 from tui.wire.capture.forms import READ_RAW
 
 from ..capture_file import CaptureFile
+from ..clock import REAL_CLOCK
 from ..connect.share_place import share_place
 from ..event_notes import EVENTS_OF_LINE, LeftEvent
 from ..events import Event
@@ -113,7 +113,7 @@ class _Past:
             raise Missing("No frame was seen on the line.")
         tcp = isinstance(self._subject.link, TcpLink)
         content = await in_own_thread(partial(_captured, frames, raw=raw, tcp=tcp))
-        wall = time.time() - time.monotonic()
+        wall = REAL_CLOCK.wall_of(0.0)
         times = [f"{datetime.fromtimestamp(wall + frames[at].time):%H:%M:%S}" for at in (0, -1)]
         note = f"{len(frames)} frames, from {times[0]} to {times[1]}. {self._note}".strip()
         return PartFile(content, note)
@@ -131,7 +131,7 @@ class _Past:
 
 
 def _captured(frames: Sequence[Frame], *, raw: bool, tcp: bool) -> bytes:
-    wall = time.time() - time.monotonic()
+    wall = REAL_CLOCK.wall_of(0.0)
     with tempfile.TemporaryDirectory(prefix="drivepanel-") as folder:
         path = Path(folder) / CAPTURE_NAME
         file = CaptureFile(path, CAPTURE_NAME, raw=raw)
