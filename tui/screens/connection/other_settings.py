@@ -158,7 +158,11 @@ class OtherSettings(LineKeys):
         from tui.session.paths import remember_line
 
         self.form.show_settings(setting.baud, setting.format)
-        answer = "Drives answer" if self.found else "Somebody answers, and not clearly,"
+        answer = (
+            "Drives answer"
+            if self.found.keys() - self.unclear
+            else "Somebody answers, and not clearly,"
+        )
         self.say(f"{answer} at {setting}.", "The line stays there.")
         remember_line(remembered_text(text))
         self.action_refresh_lines()

@@ -27,6 +27,8 @@ class Scanning(LineView):
     """Asks each address; a drive that answers gets its profile and is looked after."""
 
     _led = False
+    unclear: frozenset[int] = frozenset()
+    """Addresses whose last identification was damaged: no drive is known to answer there."""
     """Whether the cursor was led to the drives of the open line."""
 
     def action_scan(self) -> bool:
@@ -156,12 +158,14 @@ class Scanning(LineView):
     async def _take(self, result: ScanResult) -> None:
         """Keep a drive that answered, with its profile and state."""
         if result.error:
+            self.unclear |= {result.device}
             self.say(
                 f"{result.error} The address is taken.", "Press s to search again.", ALARM_KIND
             )
         if result.identity is None:
             return
         if not result.error:
+            self.unclear -= {result.device}
             await self._equip(result.identity)
         elif (fleet := self.app.fleet) is not None and fleet.console(result.device) is None:
             # of no family, not even of the one typed; a drive that is known keeps its stop keys
