@@ -117,6 +117,12 @@ def _driver_continues_by_opening_again() -> bool:
     )
 
 
+def _driver_writes_to_a_file_in_a_thread() -> bool:
+    return "self._file = sys.__stderr__" in _source(
+        "__init__"
+    ) and "WriterThread(self._file)" in _source("start_application_mode")
+
+
 def _driver_heeds_mouse() -> bool:
     from textual.drivers.linux_driver import LinuxDriver
 
@@ -334,6 +340,12 @@ PARTS = [
         "driver.py",
         "read_keys: which thread of Textual reads the keys, and how it ends",
         _driver_reads_in_a_thread,
+    ),
+    Part(
+        "LinuxDriver._file",
+        "driver.py",
+        "ReadingDriver: where a thread of Textual writes, which must not end",
+        _driver_writes_to_a_file_in_a_thread,
     ),
     Part(
         "LinuxDriver.write",

@@ -25,6 +25,7 @@ from textual.message import Message
 
 from .held_input import with_held_input
 from .loop import soon_in_loop
+from .outlet import Outlet
 from .reader import KeyReader, Pressed, Stops, TerminalInput
 from .stroke import attach
 from .tokens import Report
@@ -151,6 +152,10 @@ def _quiet(driver: type[Driver]) -> type[Driver]:
 def _reading(driver: type[Driver]) -> type[Driver]:
     class ReadingDriver(driver):  # type: ignore[valid-type, misc]
         """Reads keys from a POSIX terminal."""
+
+        def __init__(self, app: Any, **settings: Any) -> None:
+            super().__init__(app, **settings)
+            self._file: Any = Outlet(self._file)
 
         def run_input_thread(self) -> None:
             """Read until the panel ends; in a thread of its own."""
