@@ -33,6 +33,7 @@ SCREENS = {
 }
 DIALOGS = {
     "Ask": "dialogs.ask",
+    "BundleScreen": "dialogs.bundle",
     "Confirm": "dialogs.confirm",
     "Leave": "dialogs.leave",
     "Palette": "dialogs.palette",

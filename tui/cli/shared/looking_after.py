@@ -12,7 +12,6 @@ from .say import say
 if TYPE_CHECKING:
     from tui.bus.program import Program
     from tui.session.connect.open_line import OpenLine
-    from tui.session.sharing.guardian import Guardian
 
 
 MOTORS_STOP_WITHIN = 60.0
@@ -26,14 +25,14 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     `name` is what the line is called where a command has several. Returns what waits until those
     motors are stopped, before the line is closed.
     """
+    # imported now: the package may be replaced by an upgrade before this program holds the line
+    from tui.session.journal import Journal
+    from tui.session.sharing.guardian import Guardian
+
     line = opened.line
     guardians: list[Guardian] = []
 
     def begin() -> None:
-        # imported when it is needed: most commands never share their line as its holder
-        from tui.session.journal import Journal
-        from tui.session.sharing.guardian import Guardian
-
         for leave in waiting:
             leave()
         guardians.append(Guardian(line, Journal()))
