@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import pytest
 
-from tests.bus.peer import PtyPeer, eventually, silent
+from tests.bus.peer import PtyPeer, Step, eventually, silent
+from tui.bus.errors import LineError
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.bus.trace import Frame
@@ -94,6 +95,24 @@ async def test_a_master_is_heard_on_a_line_on_which_nothing_is_sent(gap: float) 
                 heard = await listen_first(line, 2.0)
             assert {one.device for one in heard.requests} == {4}
             assert peer.requests == []
+        finally:
+            line.close()
+
+
+async def test_damaged_replies_to_polls_are_no_talk_of_others() -> None:
+    def damaged(request: bytes, _count: int) -> Sequence[Step]:
+        return [frame(request[0], bytes.fromhex("03 02 0001"))[:-1] + b"\0"]
+
+    with PtyPeer(damaged) as peer:
+        line = Line(SerialLink(peer.path))
+        line.open(wait=10.0)
+        try:
+            listening = asyncio.create_task(listen_first(line, 0.5))
+            for _ in range(3):
+                with pytest.raises(LineError):
+                    await line.read(2, 3201, 1)
+            assert (await listening).text == ""
+            assert len(peer.requests) >= 3
         finally:
             line.close()
 

@@ -87,14 +87,16 @@ def overheard(frames: Iterable[Frame], since: float) -> Overheard:
 async def listen_first(
     line: ModbusLine, seconds: float = LISTEN, clock: Clock = REAL_CLOCK
 ) -> Overheard:
-    """Listen to a line on which nothing is sent from here."""
+    """Listen to a line. Drives that are polled meanwhile are not taken for others' talk."""
     since, before = _last_time(line.trace), line.counters.bytes_in
     await clock.sleep(seconds)
     found = overheard(line.trace, since)
-    if not found.text:
-        # talk in the midst of which the time was up
-        return Overheard(loose=line.counters.bytes_in - before)
-    return found
+    new = [frame for frame in line.trace if frame.time >= since]
+    if found.text or any(frame.direction == "out" for frame in new):
+        return found
+    # bytes that are no frame yet: the listening ended in the midst of somebody's talk
+    framed = sum(len(frame.data) for frame in new)
+    return Overheard(loose=found.loose + line.counters.bytes_in - before - framed)
 
 
 class MasterLookout:
