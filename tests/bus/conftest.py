@@ -37,7 +37,8 @@ OpenLine = Callable[..., Line]
 
 @pytest.fixture
 def open_line() -> Iterator[OpenLine]:
-    """Open a line to a peer; devices 1 to 9 take every function."""
+    """Open a line to a peer; devices 1 to 9 take every function. Without probes, scripts count
+    their requests alone."""
     lines: list[Line] = []
 
     def opened(
@@ -46,9 +47,10 @@ def open_line() -> Iterator[OpenLine]:
         *,
         read_only: bool = False,
         wait: float | None = 5.0,
+        probes: bool = False,
     ) -> Line:
         link = SerialLink(link) if isinstance(link, str) else link
-        line = Line(link, read_only=read_only, timing=timing)
+        line = Line(link, read_only=read_only, timing=replace(timing, probes=probes))
         lines.append(line)
         for device in range(1, 10):
             line.describe(device, WIDE)

@@ -21,7 +21,9 @@ from .conftest import WIDE
 from .peer import eventually
 
 ROOT = Path(__file__).parent.parent.parent
-QUICK = Timing(first_timeout=1.5, min_timeout=1.5, late_reply=0.2, reconnect_first=0.05)
+QUICK = Timing(
+    first_timeout=1.5, min_timeout=1.5, late_reply=0.2, reconnect_first=0.05, probes=False
+)
 """Patient with answers, quick to take a line over."""
 
 

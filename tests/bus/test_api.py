@@ -87,6 +87,7 @@ def end(request: pytest.FixtureRequest) -> Iterator[Open]:
 
         def real(*, read_only: bool = False, timing: Timing = PATIENT) -> End:
             peer = stack.enter_context(TcpPeer(device))
+            timing = replace(timing, probes=False)
             line = Line(RtuTcpLink("127.0.0.1", peer.port), read_only=read_only, timing=timing)
             stack.callback(line.close)
             line.open(wait=10.0)

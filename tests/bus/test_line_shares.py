@@ -43,7 +43,7 @@ class TimedLine:
         self._later: list[Asked] = []
         self._again: list[Asked] = []
         self._waiting: list[Job] = []
-        timing = Timing()
+        timing = Timing(probes=False)
         devices = Devices(timing, mistakable=False)
         self.dispatcher = Dispatcher(devices, Tally(), timing, lambda: self.now, gateway=False)
 

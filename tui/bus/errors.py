@@ -66,6 +66,10 @@ class LineLost(LineError):
     """The line went away or cannot be reached; it is tried again by itself."""
 
 
+class LineBehind(LineLost):
+    """The line gives each request the reply to an earlier one; only stops are sent."""
+
+
 class LineFailed(LineLost):
     """The line's own code failed: an internal error, not one of the port or of a drive."""
 

@@ -265,5 +265,7 @@ class Timing:
     wire_time: bool | None = None
     """Whether bytes take the time of their baud, so that a reply which began before its request
     was over is another's. None: on every serial port that is no pseudo-terminal."""
+    probes: bool = True
+    """True if a drive must prove that its replies belong to their requests before they count."""
     queue_length: int = 256
     trace_length: int = 1000

@@ -51,6 +51,8 @@ class ExchangeResult:
     received: bytes = b""
     strays: list[Piece] = field(default_factory=list)
     """Whole frames that are neither the reply nor an echo."""
+    instead: Piece | None = None
+    """Over Modbus TCP: the reply of this transaction, if it is not that of its request."""
     resynchronised: bool = False
     """True if the reply was found behind or between other bytes."""
     recognised: bool = False

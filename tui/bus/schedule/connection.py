@@ -11,7 +11,7 @@ from functools import partial
 
 import serial
 
-from ..errors import LineError, LineFailed, LineLost
+from ..errors import LineBehind, LineError, LineFailed, LineLost
 from ..link import Link, RtuTcpLink, SerialLink, TcpLink, label
 from ..master import LineContext, Master
 from ..model import LineState, LineStatus
@@ -126,6 +126,8 @@ class Connection:
         self._quiet_after = quiet_after
         self._failures = 0
         self._lost_since: float | None = None
+        self._note = ""
+        dispatcher.steps.said = self._say_connected
         self.refusal: LineError | None = None
         """Why requests are failed at once; None while they are taken."""
 
@@ -135,6 +137,10 @@ class Connection:
         while True:
             try:
                 await self._once()
+                continue
+            except LineBehind as error:
+                # opened again immediately: stops wait for it, all else has failed
+                self._say(LineStatus.LOST, str(error), error)
                 continue
             except LineError as error:
                 failure = error
@@ -194,7 +200,14 @@ class Connection:
             task.result()
 
     def _say_opened(self, note: str) -> None:
-        self._say(LineStatus.CONNECTED, f"{self._dispatcher.facts.unkept} {note}".strip())
+        self._note = note
+        if behind := self._dispatcher.steps.behind:
+            self._say(LineStatus.LOST, behind, LineBehind(behind))
+        else:
+            self._say_connected()
+
+    def _say_connected(self) -> None:
+        self._say(LineStatus.CONNECTED, f"{self._dispatcher.facts.unkept} {self._note}".strip())
 
     def _say_of_owner(self, status: LineStatus, text: str, error: LineError | None) -> None:
         """What the program tells that owns the line; its requests are its own business."""

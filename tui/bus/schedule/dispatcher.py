@@ -7,21 +7,24 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 
-from ..errors import LineClosed, LineError, LineFailed, LineLost, NoAnswer, RequestRefused
+from ..errors import LineBehind, LineClosed, LineError, LineFailed, LineLost, RequestRefused
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
-from ..requests import Diagnose
+from ..requests import Request
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
 from ..tally import Tally
 from .alive_reads import AliveReads
 from .back_to_back import BackToBack
+from .copies import ask_again, is_copy
 from .echo import resolve_echo
 from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
 from .patience import Devices
 from .queue import Job, JobQueue
 from .step_proof import StepProof
+from .steps import FAILED, Steps
+from .unsent import ends_unsent, refusal_of
 
 HELD_LOOK = 0.01
 """Seconds between two looks whether requests are held back still."""
@@ -38,6 +41,7 @@ class Dispatcher:
         clock: MonotonicClock,
         *,
         gateway: bool,
+        buffers: bool = False,
         facts: SharedFacts | None = None,
     ) -> None:
         self.facts = facts or SharedFacts()
@@ -48,7 +52,9 @@ class Dispatcher:
         self._back_to_back = BackToBack()
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
-        self.proof = StepProof(devices, self._outcomes, clock, self.submit)
+        self.steps = Steps(devices, self._outcomes, clock, timing, buffers=buffers)
+        """Decides which replies belong to the requests that they follow."""
+        self.proof = StepProof(devices, self._outcomes, clock, self.submit, self.steps)
         """Decides which replies are trusted after another process has used the line."""
         self._alive_reads = AliveReads(devices, self.facts, clock, self.submit)
         self.in_flight = False
@@ -64,7 +70,7 @@ class Dispatcher:
 
     def submit(self, job: Job) -> None:
         """Queue a request, or fail it at once when its device is being left alone."""
-        if self._left_alone(job) or self._is_answered(job):
+        if self._ends_unsent(job):
             return
         try:
             self._queue.put(job)
@@ -95,25 +101,21 @@ class Dispatcher:
 
     def void(self) -> None:
         """A stop was given: what waits to change its device is refused at once."""
-        self._refuse(self.refusal)
+        self._queue.refuse(self.refusal)
 
     def void_older(self, than: float, why: str) -> None:
         """Refuse what waits to change anything since before a moment, but for stops."""
-        self._refuse(lambda job: why if job.commands and job.asked < than else "")
-
-    def _refuse(self, reason: Callable[[Job], str]) -> None:
-        for job in self._queue.waiting():
-            if why := reason(job):
-                self._queue.remove(job)
-                job.fail(RequestRefused(why))
+        self._queue.refuse(lambda job: why if job.commands and job.asked < than else "")
 
     def stray(self, piece: Piece, time: float) -> None:
         """A whole frame came that nobody waited for; it may be what others were held back for."""
         self._outcomes.note_stray(piece, time)
+        self.steps.stray(piece)
         self._wake.set()
 
     async def serve(self, master: Master) -> None:
         """Send requests until the line is lost. Raises LineLost."""
+        self.steps.opened()
         while True:
             self._wake.clear()
             if self.last_way is not None and self.last_way.waits:
@@ -121,6 +123,8 @@ class Dispatcher:
             due = self._alive_reads.put_due()
             if master.failure is not None:
                 raise LineLost(str(master.failure))
+            if self.steps.reopen:
+                raise LineBehind(self.steps.behind)
             if len(self._queue):
                 # the choice is made after the silence, so that a stop that comes in meanwhile
                 # goes first
@@ -131,6 +135,8 @@ class Dispatcher:
                     await self._run(master, job)
                     continue
                 due = due if ready is None else min(due, ready)
+            if self.steps.behind:
+                due = min(due, self._clock() + await self.steps.attend(master))
             await self._sleep(max(0.0, due - self._clock()))
 
     async def _sleep(self, pause: float) -> None:
@@ -142,6 +148,11 @@ class Dispatcher:
         now = self._clock()
         if job.priority is not Priority.STOP and self.held_back():
             return now + HELD_LOOK
+        if job.priority is not Priority.STOP:
+            if self.steps.behind:
+                return 0.0  # taken out at once, to fail
+            if self.steps.quiet_until > now:
+                return self.steps.quiet_until
         if (trusted := self.proof.not_before(job, now)) > now:
             return trusted
         if (free := self._back_to_back.not_before(job)) > now:
@@ -149,41 +160,24 @@ class Dispatcher:
         if self._devices.backed_off(job.request.device, job.priority, now, job.within) is not None:
             # taken out at once, to be told
             return 0.0
+        ready = self._free_from(job, now)
+        if ready > max(now, self._devices.quiet_until) and self.steps.lengthen(job):
+            ready = self._free_from(job, now)
+        return ready
+
+    def _free_from(self, job: Job, now: float) -> float:
         return self._devices.not_before(
             job.request.device, job.expectation, job.priority, now, job.tries
         )
 
-    def _left_alone(self, job: Job) -> bool:
-        """Fail a poll of a silent device that is not asked again yet."""
-        device = job.request.device
-        rest = self._devices.backed_off(device, job.priority, self._clock(), job.within)
-        if rest is None:
-            return False
-        text = f"Device {device} does not answer."
-        job.fail(NoAnswer(device, job.request.function, job.request.register, text, retry_in=rest))
-        return True
-
-    def _is_answered(self, job: Job) -> bool:
-        """Answer a read from what was read for another program, where that is young enough."""
-        if not job.max_age or job.begun:
-            return False
-        reply = self._outcomes.values.find(job.request, self._clock() - job.max_age)
-        if reply is None or not job.answer.set_running_or_notify_cancel():
-            return False
-        job.begun = True
-        job.answer.set_result(reply)
-        return True
+    def _ends_unsent(self, job: Job) -> bool:
+        if self.steps.refuses(job):
+            return True
+        return ends_unsent(job, self._devices, self._outcomes.values, self._clock())
 
     def refusal(self, job: Job) -> str:
         """Why a write must not go out: a stop came after it, or another program commands."""
-        if job.priority is Priority.STOP or not job.program:
-            return ""
-        if hushed := self.facts.hushed.get(job.request.device):
-            return hushed[1]
-        if not job.commands:
-            return ""
-        writes = job.request.function != Diagnose.function
-        return self.facts.refusal(job.program, job.request.device, job.stamp, writes=writes)
+        return refusal_of(job, self.facts)
 
     def forbidden(self, job: Job) -> str:
         """Why a request must not go out, by all, and by the one who asks."""
@@ -191,7 +185,7 @@ class Dispatcher:
 
     def _begins(self, job: Job) -> bool:
         """Take a job up; False if nothing is to be sent for it, or not yet."""
-        if self._left_alone(job) or self._is_answered(job):
+        if self._ends_unsent(job):
             return False
         if why := self.forbidden(job):
             job.fail(RequestRefused(why))
@@ -205,19 +199,28 @@ class Dispatcher:
             self._queue.put_back(job)
             await self.proof.prove(master, job)
             return
+        if (probe := self.steps.prepare(job)) is not None:
+            self._queue.put_back(job)
+            await self._prove(master, job, probe)
+            return
         if not job.begun and not job.answer.set_running_or_notify_cancel():
             return
         job.begun = True
         if job.request.changes:
             self._outcomes.values.drop(job.request.device)
+        await self._send(master, job)
+
+    async def _send(self, master: Master, job: Job) -> None:
         begun = self._clock()
         self.in_flight = True
         try:
             result = await master.exchange(self._sending(job))
             if result.kind is ResultKind.UNSURE:
                 await resolve_echo(master, job, result, self._devices, self._outcomes)
-            if self._is_repeat(job, result):
-                result = await self._ask_again(master, job, result)
+            if is_copy(job, result, self._devices):
+                result = await ask_again(
+                    master, job, result, self._sending(job), self._devices, self._outcomes
+                )
         except _NotSent as reason:
             self._not_sent(job, str(reason))
             return
@@ -240,16 +243,34 @@ class Dispatcher:
         self._queue.count(job, begun, self._clock(), acknowledged=acknowledged)
         self._conclude(job, result, begun)
 
+    async def _prove(self, master: Master, job: Job, probe: Request) -> None:
+        """Send a probe for a job that waits; without a reply, the job has none either."""
+        self.in_flight = True
+        try:
+            result = await self.steps.prove(master, job, probe)
+        finally:
+            self.in_flight = False
+        if result.kind not in FAILED or job not in self._queue.waiting():
+            return
+        self._queue.remove(job)
+        if self._outcomes.conclude(job, result, unsent=True):
+            self._repeat(job, result)
+
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
+        if job.expectation is not None:
+            self.steps.note(job, job.expectation, result)
         self._back_to_back.count(job, begun, self._clock())
         self.proof.sent(job, begun)
-        if self._outcomes.waited_for_us(job, result):
+        if self.steps.end_form(job, result) or self._outcomes.waited_for_us(job, result):
             self.put_back(job)
         elif self._outcomes.conclude(job, result):
-            # one drive that went away must not keep the others waiting for several time-outs
-            missed = job.priority is Priority.POLL and result.kind is ResultKind.NOTHING
-            self._queue.put_back(job, behind=missed)
-            self._wake.set()
+            self._repeat(job, result)
+
+    def _repeat(self, job: Job, result: ExchangeResult) -> None:
+        # one drive that went away must not keep the others waiting for several time-outs
+        missed = job.priority is Priority.POLL and result.kind is ResultKind.NOTHING
+        self._queue.put_back(job, behind=missed)
+        self._wake.set()
 
     def _not_sent(self, job: Job, why: str) -> None:
         self.in_flight = False
@@ -277,28 +298,10 @@ class Dispatcher:
             job.pdu,
             job.expectation,
             self._devices.time_out(request.device, request.function, job.priority, job.within),
-            sure and not self.proof.doubts_refusal(request.device),
+            job.form is not None or (sure and not self.proof.doubts_refusal(request.device)),
             skip,
             look,
         )
-
-    def _is_repeat(self, job: Job, result: ExchangeResult) -> bool:
-        """Whether a reply may be a copy of the one before."""
-        return result.kind is ResultKind.REPLY and self._devices.is_repeat(
-            job.request.device, job.pdu, result.pdu, result.turnaround
-        )
-
-    async def _ask_again(self, master: Master, job: Job, doubted: ExchangeResult) -> ExchangeResult:
-        """The same once more: whichever of its two replies comes first, it is the right one."""
-        await master.quiet()
-        result = await master.exchange(self._sending(job))
-        self._outcomes.count_beside(job.request.device, doubted)
-        if result.pdu != doubted.pdu and job.expectation is not None:
-            # it was a copy: one more reply to this request is on its way
-            device, now = job.request.device, self._clock()
-            self._devices.may_come(device, job.expectation, result.sent, now)
-        self._outcomes.note_strays(doubted.strays, doubted.end)
-        return result
 
 
 class _NotSent(Exception):

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TypeVar
 
-from ..errors import HOPELESS, LineClosed, LineError, LineLost
-from ..link import Link, TcpLink, label
+from ..errors import HOPELESS, LineBehind, LineClosed, LineError, LineLost
+from ..link import Link, SerialLink, TcpLink, label
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
 from ..prepared import PreparedWrite
@@ -75,6 +75,7 @@ class Engine:
             timing,
             clock,
             gateway=isinstance(link, TcpLink),
+            buffers=not isinstance(link, SerialLink),
             facts=self.facts,
         )
         self.facts.keep_alives.changed = self._wake
@@ -126,15 +127,18 @@ class Engine:
             while not self._news.wait_for(self._is_decided, wait):
                 if self._shared is None or not self._shared.starts:
                     break
-            if self.state.status is LineStatus.CONNECTED or self._waits_for_holder():
+            if self._takes_stops():
                 return
             error = self._error
         self.close()
         raise error or LineLost(f"{label(self._link)} was not connected within {wait:g} s.")
 
     def _is_decided(self) -> bool:
-        connected = self.state.status is LineStatus.CONNECTED or self._waits_for_holder()
-        return connected or self._closed or isinstance(self._error, HOPELESS)
+        return self._takes_stops() or self._closed or isinstance(self._error, HOPELESS)
+
+    def _takes_stops(self) -> bool:
+        connected = self.state.status is LineStatus.CONNECTED
+        return connected or isinstance(self._error, LineBehind) or self._waits_for_holder()
 
     def _waits_for_holder(self) -> bool:
         """True if the process that holds the line does not answer: a stop ends it, or fails."""

@@ -70,8 +70,11 @@ class Outcomes:
         # a long reply at 1200 baud is on the wire for longer than that
         return result.turnaround + self._clock() - result.end > longest + STILL
 
-    def conclude(self, job: Job, result: ExchangeResult) -> bool:
-        """Note what became of a request, and hand it back; True where it is to be sent again."""
+    def conclude(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> bool:
+        """Note what became of a request, and hand it back; True where it is to be sent again.
+
+        `unsent`: the probe before it had no reply, so that it was not sent itself.
+        """
         request, now = job.request, self._clock()
         if job.expectation is None:
             self.note_strays(result.strays, result.end)
@@ -96,8 +99,19 @@ class Outcomes:
             case ResultKind.EXCEPTION:
                 self._tally.count_exception(request.device, result.exception)
                 job.fail(self._exception(job, result.exception))
+            case _ if unsent and request.changes:
+                return self._unsent(job)
             case _:
                 return self._failed(job, result, now)
+        return False
+
+    def _unsent(self, job: Job) -> bool:
+        request = job.request
+        if job.repeats < self._timing.retries:
+            job.repeats += 1
+            return True
+        text = f"Device {request.device} did not answer a test read. Nothing was written."
+        job.fail(NoAnswer(request.device, request.function, request.register, text))
         return False
 
     def count_beside(self, device: int, result: ExchangeResult) -> None:
@@ -120,7 +134,7 @@ class Outcomes:
         """
         if len(self._facts.programs) > 1 or job.max_age:
             time = self._time_of(job, result)
-            self.values.note(job.request, job.request.words(result.pdu), time)
+            self.values.note(job.request, job.request.words(job.own_part(result.pdu)), time)
 
     @staticmethod
     def _time_of(job: Job, result: ExchangeResult) -> float:

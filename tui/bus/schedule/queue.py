@@ -7,12 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from ..errors import LineBusy, LineError, LineFailed, Superseded
+from ..errors import LineBusy, LineError, LineFailed, RequestRefused, Superseded
 from ..expectation import Expectation
 from ..limits import Limits
 from ..model import Priority, Reply
 from ..program_use import ProgramUse
-from ..requests import BROADCAST, Request
+from ..requests import BROADCAST, Read, Request
 from .sent_stops import SentStops
 from .shares import LineShares
 
@@ -30,6 +30,8 @@ class Job:
     first_sent: float | None = None
     """When it was first sent, if it is sent again: a reply to it may be of that time."""
     pdu: bytes = b""
+    form: Read | None = None
+    """The longer read that is sent for it."""
     begun: bool = False
     """True if it was taken from the queue once, so that it cannot be withdrawn any more."""
     expectation: Expectation | None = None
@@ -57,6 +59,18 @@ class Job:
         if self.request.device != BROADCAST:
             self.expectation = self.request.expectation()
 
+    def take_form(self, form: Read | None) -> None:
+        """Have a longer read sent for it, or itself again."""
+        self.form, sent = form, form or self.request
+        self.pdu, self.expectation = sent.pdu(), sent.expectation()
+
+    def own_part(self, pdu: bytes) -> bytes:
+        """The reply as it would be if the request itself had been sent."""
+        if not isinstance(self.request, Read) or self.form is None:
+            return pdu
+        size = 2 * self.request.count
+        return bytes([pdu[0], size]) + pdu[2 : 2 + size]
+
     @property
     def tries(self) -> tuple[bytes, float | None]:
         """The request, and when it was first sent, if it is sent again."""
@@ -79,7 +93,8 @@ class Job:
 
     def finish(self, pdu: bytes, time: float) -> None:
         """Hand back a checked reply, without device and checksum."""
-        self.answer.set_result(Reply(self.request.words(pdu), time, pdu))
+        own = self.own_part(pdu)
+        self.answer.set_result(Reply(self.request.words(own), time, own))
 
 
 class JobQueue:
@@ -177,6 +192,13 @@ class JobQueue:
     def remove(self, job: Job) -> None:
         """Take out a job that waits."""
         self._jobs.remove(job)
+
+    def refuse(self, reason: Callable[[Job], str]) -> None:
+        """Take out and fail what waits and has a reason not to be sent."""
+        for job in self.waiting():
+            if why := reason(job):
+                self.remove(job)
+                job.fail(RequestRefused(why))
 
     def drain(self) -> list[Job]:
         """Take out everything that waits."""

@@ -17,9 +17,8 @@ from ..result import ExchangeResult, ResultKind
 from .outcomes import Outcomes
 from .patience import Devices
 from .queue import Job
+from .steps import ECHO, Steps
 
-ECHO = 0
-"""The sub-function that every device echoes, if it has function 8."""
 MOST_TRIES = 3
 """Requests that are sent for a proof; then the device has to wait."""
 
@@ -36,11 +35,13 @@ class StepProof:
         outcomes: Outcomes,
         clock: MonotonicClock,
         submit: Callable[[Job], None],
+        steps: Steps,
     ) -> None:
         self._devices = devices
         self._outcomes = outcomes
         self._clock = clock
         self._submit = submit
+        self._steps = steps
         self.busy = False
         """True while a reply to a request for a proof is due."""
         self._until = 0.0
@@ -134,5 +135,6 @@ class StepProof:
             if result is None or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
                 sent = begun if result is None else result.sent
                 self._devices.may_come(device, expectation, sent, self._clock())
+        self._steps.note(job, expectation, result, number=isinstance(request, Diagnose))
         self._outcomes.count_beside(device, result)
         return result

@@ -20,6 +20,7 @@ from ..bounds import (
 from ..errors import (
     ChecksumFault,
     DeviceException,
+    LineBehind,
     LineBusy,
     LineClosed,
     LineError,
@@ -59,7 +60,9 @@ class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
 
 _EXCHANGE = ("device", "function", "address")
 _KINDS: Mapping[type[LineError], tuple[str, ...]] = {
-    **dict.fromkeys((RequestRefused, LineBusy, LineLost, LineFailed, LineClosed, LineError), ()),
+    **dict.fromkeys(
+        (RequestRefused, LineBusy, LineBehind, LineLost, LineFailed, LineClosed, LineError), ()
+    ),
     NoAnswer: (*_EXCHANGE, "detail", "retry_in"),
     ChecksumFault: (*_EXCHANGE, "detail", "received"),
     WrongReply: (*_EXCHANGE, "detail", "received"),

@@ -11,13 +11,14 @@ from pymodbus.pdu import DecodePDU
 from ..errors import LineLost
 from ..expectation import exception_code
 from ..master import LineContext, Sending, settle
-from ..result import ExchangeResult, ResultKind
+from ..result import ExchangeResult, Piece, ResultKind
 from ..transport.base import Transport
 
 HEADER_LENGTH = 7
 """Transaction id, protocol id, length, unit id."""
 SHOWN = 260
 """Bytes of something else that are kept to be looked at."""
+NO_CHECKSUM = bytes(2)
 MAX_LENGTH = 254
 """Unit id and the longest function and data."""
 
@@ -160,4 +161,6 @@ def _result(unit: bytes, sending: Sending) -> ExchangeResult:
     code = exception_code(expectation.function, pdu)
     if code is not None:
         return ExchangeResult(ResultKind.EXCEPTION, pdu=pdu, exception=code, received=unit)
-    return ExchangeResult(ResultKind.WRONG, detail=expectation.mismatch(pdu), received=unit)
+    instead = Piece(unit[HEADER_LENGTH - 1 :] + NO_CHECKSUM, whole=True)
+    detail = expectation.mismatch(pdu)
+    return ExchangeResult(ResultKind.WRONG, detail=detail, received=unit, instead=instead)

@@ -1,0 +1,285 @@
+"""Replies that belong to other requests than they seem to: found, named, and never shown."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import pytest
+
+from tui.bus.api import Priority
+from tui.bus.errors import LineError, LineLost
+from tui.bus.limits import Limits
+from tui.bus.line import Line, LineStatus, Timing
+from tui.bus.link import RtuTcpLink
+
+from .conftest import NO_ECHO, WIDE, OpenLine
+from .peer import PtyPeer, Step, TcpPeer, eventually, honest, reply
+
+SHORT = Timing(
+    first_timeout=0.15, min_timeout=0.15, late_reply=0.3, reconnect_first=0.02, connect_timeout=3.0
+)
+SINGLE = replace(WIDE, functions=frozenset({3, 6, 43}), max_read=1, single_words_only=True)
+"""Reads single words, and has no echo."""
+LIMITS = {"echo": WIDE, "no echo": NO_ECHO, "single words": SINGLE}
+
+
+class Behind:
+    """A converter that holds each reply until so many more requests have come."""
+
+    def __init__(self, held: int = 1) -> None:
+        self.held = held
+        self._replies: list[bytes] = []
+
+    def __call__(self, request: bytes, _count: int) -> Sequence[Step]:
+        self._replies.append(self.made(request))
+        return [self._replies.pop(0)] if len(self._replies) > self.held else []
+
+    def made(self, request: bytes) -> bytes:
+        return reply(request)
+
+    def mend(self) -> None:
+        self.held = 0
+        self._replies.clear()
+
+
+async def values(line: Line, count: int, seconds: float = 15.0) -> list[tuple[int, int]]:
+    """Registers that were read, with their values; in turn, for so many tries."""
+    found = []
+    async with asyncio.timeout(seconds):
+        for at in range(count):
+            with suppress(LineError):
+                register = 100 + at % 7
+                answer = await line.read(1, register, priority=Priority.OPERATOR_READ)
+                found.append((register, answer.words[0]))
+            await asyncio.sleep(0.02)
+    return found
+
+
+def right(found: list[tuple[int, int]]) -> bool:
+    return all(register == word for register, word in found)
+
+
+def is_named(line: Line) -> bool:
+    state = line.state
+    return state.status is LineStatus.LOST and state.reason.startswith("Replies are one behind")
+
+
+async def until_named(line: Line) -> list[tuple[int, int]]:
+    found = []
+    async with asyncio.timeout(20.0):
+        while not is_named(line):
+            found += await values(line, 1)
+    return found
+
+
+def opened(open_line: OpenLine, path: str | RtuTcpLink, limits: Limits) -> Line:
+    line = open_line(path, SHORT, probes=True)
+    line.describe(1, limits)
+    return line
+
+
+@pytest.mark.parametrize("kind", LIMITS)
+async def test_replies_one_behind_are_named_and_no_value_is_wrong(
+    open_line: OpenLine, kind: str
+) -> None:
+    with PtyPeer(Behind()) as peer:
+        line = opened(open_line, peer.path, LIMITS[kind])
+        assert right(await until_named(line))
+        with pytest.raises(LineLost, match="one behind"):
+            await line.read(1, 100)
+        with pytest.raises(LineLost, match="one behind"):
+            await line.write(1, 100, [7])
+        assert 6 not in [one[1] for one in peer.requests]
+
+
+@pytest.mark.parametrize("kind", LIMITS)
+async def test_converter_that_falls_behind_later_shows_no_wrong_value(
+    open_line: OpenLine, kind: str
+) -> None:
+    converter = Behind(0)
+    with PtyPeer(converter) as peer:
+        line = opened(open_line, peer.path, LIMITS[kind])
+        assert len(await values(line, 8)) == 8
+        converter.held = 1
+        assert right(await until_named(line))
+
+
+async def test_replies_behind_over_rtu_tcp_are_named(open_line: OpenLine) -> None:
+    with TcpPeer(Behind()) as peer:
+        line = opened(open_line, RtuTcpLink("127.0.0.1", peer.port), WIDE)
+        assert right(await until_named(line))
+        before = len(peer.requests)
+        await asyncio.to_thread(peer.await_requests, before + 2)
+        assert is_named(line), "it is looked again whether they are in step"
+
+
+async def test_stop_is_sent_on_a_line_that_is_behind(open_line: OpenLine) -> None:
+    with PtyPeer(Behind()) as peer:
+        line = opened(open_line, peer.path, NO_ECHO)
+        await until_named(line)
+        await asyncio.to_thread(eventually, lambda: _stopped(line, peer))
+
+
+def _stopped(line: Line, peer: PtyPeer) -> bool:
+    """Send a stop; while the port is opened again, it may fail."""
+    with suppress(LineError):
+        asyncio.run(line.write(1, 1, [0], priority=Priority.STOP))
+    return any(one[1] == 6 for one in peer.requests)
+
+
+async def test_line_in_step_again_is_used_again(open_line: OpenLine) -> None:
+    converter = Behind()
+    with PtyPeer(converter) as peer:
+        line = opened(open_line, peer.path, WIDE)
+        await until_named(line)
+        converter.mend()
+        await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.CONNECTED, 15.0)
+        found = await values(line, 5)
+        assert right(found)
+        assert len(found) >= 4
+
+
+async def test_slow_drive_is_not_named_as_behind(open_line: OpenLine) -> None:
+    """Its replies come after the timeout, by themselves."""
+    slow = [0.2]
+
+    def late(request: bytes, _count: int) -> Sequence[Step]:
+        return [slow[0], reply(request)]
+
+    with PtyPeer(late) as peer:
+        line = opened(open_line, peer.path, NO_ECHO)
+        found = await values(line, 8)
+        assert right(found)
+        assert line.state.status is LineStatus.CONNECTED
+
+
+@pytest.mark.parametrize("kind", LIMITS)
+async def test_first_value_costs_one_more_exchange(open_line: OpenLine, kind: str) -> None:
+    with PtyPeer(honest) as peer:
+        line = opened(open_line, peer.path, LIMITS[kind])
+        assert (await line.read(1, 100)).words == (100,)
+        assert len(peer.requests) == 2
+        for register in range(101, 110):
+            await line.read(1, register)
+        assert len(peer.requests) == 11, "once is enough"
+
+
+async def test_absent_drive_costs_no_more_than_without_a_probe(open_line: OpenLine) -> None:
+    with PtyPeer(lambda _request, _count: []) as peer:
+        line = opened(open_line, peer.path, WIDE)
+        with pytest.raises(LineError):
+            await line.read(1, 100)
+        assert len(peer.requests) == 1
+
+
+async def test_stop_waits_for_no_probe(open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        line = opened(open_line, peer.path, WIDE)
+        await line.write(1, 1, [0], priority=Priority.STOP)
+        assert peer.requests[0][1] == 6
+
+
+async def test_write_is_not_sent_before_the_drive_has_proved_its_step(
+    open_line: OpenLine,
+) -> None:
+    with PtyPeer(lambda _request, _count: []) as peer:
+        line = opened(open_line, peer.path, WIDE)
+        with pytest.raises(LineError, match="Nothing was written"):
+            await line.write(1, 1, [7])
+        assert 6 not in [one[1] for one in peer.requests]
+
+
+async def test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing(
+    open_line: OpenLine,
+) -> None:
+    def loses_the_third(request: bytes, count: int) -> Sequence[Step]:
+        return [] if count == 2 else [reply(request)]
+
+    timing = replace(SHORT, late_reply=60.0, retries=0)
+    with PtyPeer(loses_the_third) as peer:
+        line = open_line(peer.path, timing, probes=True)
+        await line.read(1, 100)
+        with pytest.raises(LineError):
+            await line.read(1, 101)
+        async with asyncio.timeout(30.0):
+            answer = await line.read(1, 102)
+        assert answer.words == (102,)
+        assert answer.pdu == bytes([3, 2, 0, 102]), "the reply to what was wanted"
+        assert peer.requests[-1][5] > 1
+
+
+async def test_longer_read_that_is_refused_is_replaced(open_line: OpenLine) -> None:
+    """The register after the last one does not exist."""
+
+    def refuses(request: bytes, count: int) -> Sequence[Step]:
+        from tui.wire.frames import frame
+
+        if count == 2:
+            return []
+        too_long = int.from_bytes(request[2:4], "big") + request[5] > 103
+        refused = request[1] == 3 and too_long
+        return [frame(1, bytes([0x83, 2])) if refused else reply(request)]
+
+    timing = replace(SHORT, late_reply=0.6, retries=0)
+    with PtyPeer(refuses) as peer:
+        line = open_line(peer.path, timing, probes=True)
+        await line.read(1, 100)
+        with pytest.raises(LineError):
+            await line.read(1, 101)
+        assert (await line.read(1, 102)).words == (102,)
+
+
+async def test_late_reply_is_not_taken_for_that_of_a_longer_read(open_line: OpenLine) -> None:
+    """Replies out of order, as no echo between them could find."""
+
+    def out_of_order(request: bytes, count: int) -> Sequence[Step]:
+        if count == 2:
+            held.append(reply(request))
+            return []
+        return [held.pop() + reply(request)] if held and count == 4 else [reply(request)]
+
+    held: list[bytes] = []
+    with PtyPeer(out_of_order) as peer:
+        line = open_line(peer.path, replace(SHORT, late_reply=60.0, retries=0), probes=True)
+        await line.read(1, 100)
+        with pytest.raises(LineError):
+            await line.read(1, 101)
+        for register in (102, 103, 104):
+            assert (await line.read(1, register)).words == (register,)
+
+
+async def test_connection_that_buffers_proves_its_step_now_and_then() -> None:
+    """Every ten seconds; on a port, once."""
+    from tui.bus.requests import Read
+    from tui.bus.result import ExchangeResult, ResultKind
+    from tui.bus.schedule.outcomes import Outcomes
+    from tui.bus.schedule.patience import Devices
+    from tui.bus.schedule.queue import Job
+    from tui.bus.schedule.steps import Steps
+    from tui.bus.shared_facts import SharedFacts
+    from tui.bus.tally import Tally
+
+    now = 0.0
+    lengths: dict[bool, list[int]] = {}
+    for buffers in (False, True):
+        devices, timing = Devices(Timing(), mistakable=True), Timing()
+        clock = lambda: now  # noqa: E731
+        outcomes = Outcomes(devices, Tally(), timing, clock, SharedFacts(), gateway=False)
+        steps = Steps(devices, outcomes, clock, timing, buffers=buffers)
+        steps.opened()
+        lengths[buffers] = sent = []
+        for at in range(600):
+            now = at * 0.1
+            job = Job(Read(1, 100 + at % 5, 2), Priority.POLL, NO_ECHO)
+            while (probe := steps.prepare(job)) is not None:
+                steps.note(job, probe.expectation(), ExchangeResult(ResultKind.REPLY, sent=now))
+                sent.append(-1)
+            assert job.expectation is not None
+            steps.note(job, job.expectation, ExchangeResult(ResultKind.REPLY, sent=now))
+            sent.append((job.form or Read(1, 0, 2)).count)
+    assert lengths[False].count(-1) == lengths[True].count(-1) == 1, "the first alone costs one"
+    assert sum(one > 2 for one in lengths[False]) == 0
+    assert 4 <= sum(one > 2 for one in lengths[True]) <= 6
