@@ -127,7 +127,7 @@ class Connection:
         self._failures = 0
         self._lost_since: float | None = None
         self._note = ""
-        dispatcher.steps.said = self._say_connected
+        dispatcher.steps.recovered = self._say_connected
         self.refusal: LineError | None = None
         """Why requests are failed at once; None while they are taken."""
 

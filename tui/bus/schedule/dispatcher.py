@@ -18,12 +18,12 @@ from .alive_reads import AliveReads
 from .back_to_back import BackToBack
 from .copies import ask_again, is_copy
 from .echo import resolve_echo
+from .in_step import UNANSWERED, InStep
 from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
 from .patience import Devices
 from .queue import Job, JobQueue
 from .step_proof import StepProof
-from .steps import FAILED, Steps
 from .unsent import ends_unsent, refusal_of
 
 HELD_LOOK = 0.01
@@ -52,7 +52,7 @@ class Dispatcher:
         self._back_to_back = BackToBack()
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
-        self.steps = Steps(devices, self._outcomes, clock, timing, buffers=buffers)
+        self.steps = InStep(devices, self._outcomes, clock, timing, buffers=buffers)
         """Decides which replies belong to the requests that they follow."""
         self.proof = StepProof(devices, self._outcomes, clock, self.submit, self.steps)
         """Decides which replies are trusted after another process has used the line."""
@@ -250,7 +250,7 @@ class Dispatcher:
             result = await self.steps.prove(master, job, probe)
         finally:
             self.in_flight = False
-        if result.kind not in FAILED or job not in self._queue.waiting():
+        if result.kind not in UNANSWERED or job not in self._queue.waiting():
             return
         self._queue.remove(job)
         if self._outcomes.conclude(job, result, unsent=True):

@@ -14,10 +14,10 @@ from ..master import Master, MonotonicClock, Sending
 from ..model import Priority
 from ..requests import BROADCAST, Diagnose, Read, Request
 from ..result import ExchangeResult, ResultKind
+from .in_step import ECHO, InStep
 from .outcomes import Outcomes
 from .patience import Devices
 from .queue import Job
-from .steps import ECHO, Steps
 
 MOST_TRIES = 3
 """Requests that are sent for a proof; then the device has to wait."""
@@ -35,7 +35,7 @@ class StepProof:
         outcomes: Outcomes,
         clock: MonotonicClock,
         submit: Callable[[Job], None],
-        steps: Steps,
+        steps: InStep,
     ) -> None:
         self._devices = devices
         self._outcomes = outcomes

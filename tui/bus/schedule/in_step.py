@@ -32,7 +32,7 @@ CHECK_EVERY, CHECK_SHARE = 10.0, 0.01
 SUSPECT = 2
 """Exchanges in a row that brought an earlier reply, after which the line is left to drain."""
 LONGEST_DRAIN = 10.0
-ROUNDS = 3
+REOPENINGS = 3
 """Times that the line is opened again immediately; after that, every RETRY seconds."""
 RETRY = 10.0
 PROBE_AGAIN = 0.2
@@ -43,10 +43,10 @@ BEHIND = (
     "Replies are one behind: each request gets the reply to the one before. No value is shown, and"
     " only stops are sent. Switch the converter or gateway off and on."
 )
-FAILED = (ResultKind.NOTHING, ResultKind.DAMAGED, ResultKind.WRONG)
+UNANSWERED = (ResultKind.NOTHING, ResultKind.DAMAGED, ResultKind.WRONG)
 
 
-class Steps:
+class InStep:
     """Decides which replies are in step, and names a line that is behind; in the line's loop."""
 
     def __init__(
@@ -80,7 +80,7 @@ class Steps:
         """The trouble in a sentence, if the replies are behind."""
         self.reopen = False
         """True if the connection must be closed, and opened again immediately."""
-        self.said: Callable[[], None] = lambda: None
+        self.recovered: Callable[[], None] = lambda: None
         """Called once the replies are in step again."""
 
     def opened(self) -> None:
@@ -165,7 +165,7 @@ class Steps:
         try:
             result = await master.exchange(Sending(device, probe.pdu(), expectation, time_out))
         finally:
-            if result is None or result.kind in FAILED:
+            if result is None or result.kind in UNANSWERED:
                 sent = begun if result is None else result.sent
                 self._devices.may_come(device, expectation, sent, self._clock())
         self.note(job, expectation, result, number=isinstance(probe, Diagnose))
@@ -195,13 +195,13 @@ class Steps:
         proves = proves or (device in self._weak and expectation != before[-1])
         self._weak.discard(device)
         frames = result.strays if result.instead is None else [result.instead]
-        shifted = result.kind in FAILED and any(map(self._is_earlier, frames))
+        shifted = result.kind in UNANSWERED and any(map(self._is_earlier, frames))
         before.append(expectation)
         if result.kind is ResultKind.REPLY and proves:
             self._proved.add(device)
             self._next_check = now + max(CHECK_EVERY, (now - result.sent) / CHECK_SHARE)
             self._fall_in()
-        elif result.kind in FAILED:
+        elif result.kind in UNANSWERED:
             self._proved.discard(device)
         for piece in result.strays:
             self._proved.discard(piece.device)
@@ -231,7 +231,7 @@ class Steps:
         self._shifts, self.quiet_until = 0, 0.0
         if self.behind:
             self.behind = ""
-            self.said()
+            self.recovered()
 
     def stray(self, piece: Piece) -> None:
         """Note a frame that came while none was due: replies are late, and not held back."""
@@ -268,12 +268,12 @@ class Steps:
         await master.quiet()
         self._probes += 1
         result = await self.prove(master, self._witness, probe)
-        if result.kind in FAILED:
+        if result.kind in UNANSWERED:
             self._outcomes.note_strays(result.strays, result.end)
         if self.behind and self._probes >= PROBES:
             self._rounds += 1
             if not self._shifts:
                 self._fall_in()  # nothing speaks for it any more
             drain = self._timing.first_timeout
-            self._next_try = self._clock() + (drain if self._rounds < ROUNDS else RETRY)
+            self._next_try = self._clock() + (drain if self._rounds < REOPENINGS else RETRY)
         return 0.0

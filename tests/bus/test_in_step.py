@@ -14,6 +14,15 @@ from tui.bus.errors import LineError, LineLost
 from tui.bus.limits import Limits
 from tui.bus.line import Line, LineStatus, Timing
 from tui.bus.link import RtuTcpLink
+from tui.bus.requests import Read
+from tui.bus.result import ExchangeResult, ResultKind
+from tui.bus.schedule.in_step import InStep
+from tui.bus.schedule.outcomes import Outcomes
+from tui.bus.schedule.patience import Devices
+from tui.bus.schedule.queue import Job
+from tui.bus.shared_facts import SharedFacts
+from tui.bus.tally import Tally
+from tui.wire.frames import frame
 
 from .conftest import NO_ECHO, WIDE, OpenLine
 from .peer import PtyPeer, Step, TcpPeer, eventually, honest, reply
@@ -215,8 +224,6 @@ async def test_longer_read_that_is_refused_is_replaced(open_line: OpenLine) -> N
     """The register after the last one does not exist."""
 
     def refuses(request: bytes, count: int) -> Sequence[Step]:
-        from tui.wire.frames import frame
-
         if count == 2:
             return []
         too_long = int.from_bytes(request[2:4], "big") + request[5] > 103
@@ -251,35 +258,28 @@ async def test_late_reply_is_not_taken_for_that_of_a_longer_read(open_line: Open
             assert (await line.read(1, register)).words == (register,)
 
 
-async def test_connection_that_buffers_proves_its_step_now_and_then() -> None:
-    """Every ten seconds; on a port, once."""
-    from tui.bus.requests import Read
-    from tui.bus.result import ExchangeResult, ResultKind
-    from tui.bus.schedule.outcomes import Outcomes
-    from tui.bus.schedule.patience import Devices
-    from tui.bus.schedule.queue import Job
-    from tui.bus.schedule.steps import Steps
-    from tui.bus.shared_facts import SharedFacts
-    from tui.bus.tally import Tally
-
+@pytest.mark.parametrize(("buffers", "longer"), [(False, 0), (True, 5)])
+def test_connection_that_buffers_proves_its_step_every_ten_seconds(
+    buffers: bool, longer: int
+) -> None:
     now = 0.0
-    lengths: dict[bool, list[int]] = {}
-    for buffers in (False, True):
-        devices, timing = Devices(Timing(), mistakable=True), Timing()
-        clock = lambda: now  # noqa: E731
-        outcomes = Outcomes(devices, Tally(), timing, clock, SharedFacts(), gateway=False)
-        steps = Steps(devices, outcomes, clock, timing, buffers=buffers)
-        steps.opened()
-        lengths[buffers] = sent = []
-        for at in range(600):
-            now = at * 0.1
-            job = Job(Read(1, 100 + at % 5, 2), Priority.POLL, NO_ECHO)
-            while (probe := steps.prepare(job)) is not None:
-                steps.note(job, probe.expectation(), ExchangeResult(ResultKind.REPLY, sent=now))
-                sent.append(-1)
-            assert job.expectation is not None
-            steps.note(job, job.expectation, ExchangeResult(ResultKind.REPLY, sent=now))
-            sent.append((job.form or Read(1, 0, 2)).count)
-    assert lengths[False].count(-1) == lengths[True].count(-1) == 1, "the first alone costs one"
-    assert sum(one > 2 for one in lengths[False]) == 0
-    assert 4 <= sum(one > 2 for one in lengths[True]) <= 6
+    devices, timing = Devices(Timing(), mistakable=True), Timing()
+
+    def clock() -> float:
+        return now
+
+    outcomes = Outcomes(devices, Tally(), timing, clock, SharedFacts(), gateway=False)
+    steps = InStep(devices, outcomes, clock, timing, buffers=buffers)
+    steps.opened()
+    probes, counts = 0, []
+    for at in range(600):
+        now = at * 0.1
+        job = Job(Read(1, 100 + at % 5, 2), Priority.POLL, NO_ECHO)
+        while (probe := steps.prepare(job)) is not None:
+            steps.note(job, probe.expectation(), ExchangeResult(ResultKind.REPLY, sent=now))
+            probes += 1
+        assert job.expectation is not None
+        steps.note(job, job.expectation, ExchangeResult(ResultKind.REPLY, sent=now))
+        counts.append((job.form or Read(1, 0, 2)).count)
+    assert probes == 1, "a longer read costs no exchange"
+    assert sum(count > 2 for count in counts) == longer
