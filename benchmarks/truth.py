@@ -66,7 +66,7 @@ CANCELLED = 0.03
 WRITTEN = 0.02
 SCRATCH = 60000
 """From this register on nothing is read but what was written there."""
-WIDE = Limits(frozenset({3, 6, 16}), 125, 123, 0, 0)
+WIDE = Limits(frozenset({3, 6, 16}), 125, 123, 0, 0, answers_all=True)
 ALIKE = (3202, 2)
 """Register and words of the reads that all look alike, apart from their register."""
 

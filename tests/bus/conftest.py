@@ -24,6 +24,7 @@ WIDE = Limits(
     max_write_23=121,
     subfunctions=frozenset({0, 10, 11}),
     broadcast_functions=frozenset({6, 16}),
+    answers_all=True,
 )
 NO_ECHO = replace(WIDE, functions=WIDE.functions - {8})
 """The same for a device without diagnostics."""

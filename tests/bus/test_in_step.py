@@ -31,6 +31,8 @@ SHORT = Timing(
     first_timeout=0.15, min_timeout=0.15, late_reply=0.3, reconnect_first=0.02, connect_timeout=3.0
 )
 SINGLE = replace(WIDE, functions=frozenset({3, 6, 43}), max_read=1, single_words_only=True)
+SILENT = replace(NO_ECHO, functions=frozenset({3, 6, 16}), answers_all=False)
+"""May answer a longer read with silence."""
 """Reads single words, and has no echo."""
 LIMITS = {"echo": WIDE, "no echo": NO_ECHO, "single words": SINGLE}
 

@@ -77,6 +77,8 @@ class Limits:
     broadcast_functions: ByteValues = frozenset()
     max_read_4: RegisterCount = 1
     """Words of one read by function 4."""
+    answers_all: bool = False
+    """True if it refuses what it does not have; else it may be silent, as to a longer read."""
     exceptions: Annotated[Mapping[ByteValue, Text], Meta(max_length=256)] = field(
         default_factory=lambda: STANDARD_EXCEPTIONS
     )

@@ -29,6 +29,8 @@ class Forms:
 
     def longer(self, request: Read, limits: Limits) -> Iterator[Read]:
         """Reads of more registers from the same one on, shortest first."""
+        if not limits.answers_all:
+            return
         for more in range(1, MOST_MORE + 1):
             form = replace(request, count=request.count + more)
             if self._failures.get(form, 0) > TRIES:

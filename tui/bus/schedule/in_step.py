@@ -13,7 +13,6 @@ from secrets import randbelow
 
 from ..errors import LineBehind, NoAnswer
 from ..expectation import EXCEPTION, IDENTIFY, REPORT_ID, Expectation
-from ..limits import CAUTIOUS
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import Diagnose, Identify, Read, Request
@@ -66,6 +65,8 @@ class InStep:
         self._buffers = buffers
         self._forms = Forms()
         self._sent: dict[int, deque[Expectation]] = {}
+        self._good: dict[int, dict[int, Read]] = {}
+        """By device and length, the read that was answered last."""
         self._proved: set[int] = set()
         self._weak: set[int] = set()
         """Drives whose next reply proves its step if it is unlike the last one alone."""
@@ -107,14 +108,14 @@ class InStep:
         stops = job.priority is Priority.STOP
         if own is None or (stops and job.request.changes) or own.function in (IDENTIFY, REPORT_ID):
             return None
-        if not self._timing.probes:
-            return None
+        if not self._timing.probes or job.within is not None:
+            return None  # who says how long is waited looks whether anybody answers at all
         if self._buffers and self._clock() >= self._next_check:
             self._proved.discard(device)
         before = self._sent.get(device)
         if device in self._proved or (before and own not in before and not job.request.changes):
             return None
-        if (before and self.lengthen(job)) or stops or job.limits == CAUTIOUS:
+        if (before and self.lengthen(job)) or stops:
             return None
         if (probe := self._probe(job)) is not None or not before:
             return probe
@@ -149,9 +150,10 @@ class InStep:
         if isinstance(request, Read):
             yield from shorter(request, limits)
             yield from self._forms.longer(request, limits)
+        yield from self._good.get(request.device, {}).values()
         if Diagnose.function in limits.functions and ECHO in limits.subfunctions:
             yield Diagnose(request.device, ECHO, randbelow(1 << 16))
-        if IDENTIFY in limits.functions:
+        if IDENTIFY in limits.functions and limits.answers_all:
             yield Identify(request.device)
         if Read.function in limits.functions and not isinstance(request, Read):
             yield (read := Read(request.device, request.register, 1))
@@ -197,7 +199,10 @@ class InStep:
         frames = result.strays if result.instead is None else [result.instead]
         shifted = result.kind in UNANSWERED and any(map(self._is_earlier, frames))
         before.append(expectation)
-        if result.kind is ResultKind.REPLY and proves:
+        read, replied = job.form or job.request, result.kind is ResultKind.REPLY
+        if replied and isinstance(read, Read) and read.expectation() == expectation:
+            self._good.setdefault(device, {})[read.count] = read
+        if replied and proves:
             self._proved.add(device)
             self._next_check = now + max(CHECK_EVERY, (now - result.sent) / CHECK_SHARE)
             self._fall_in()

@@ -11,7 +11,7 @@ def limits_of(profile: Profile) -> Limits:
     """What a drive of this family may be sent; the line refuses everything else."""
     functions = {function.code: function for function in profile.data.functions}
     read, inputs, write, both = (functions.get(code) for code in (3, 4, 16, 23))
-    diagnose = functions.get(8)
+    diagnose, reading = functions.get(8), profile.data.reading
     return Limits(
         functions=frozenset(functions),
         max_read=(read.max_read if read else None) or 1,
@@ -19,7 +19,8 @@ def limits_of(profile: Profile) -> Limits:
         max_read_4=(inputs.max_read if inputs else None) or 1,
         max_read_23=(both.max_read if both else None) or 0,
         max_write_23=(both.max_write if both else None) or 0,
-        single_words_only=profile.data.reading.single_words_only,
+        answers_all=read is not None and read.past_limit != "silence",
+        single_words_only=reading.single_words_only,
         read_windows=_windows(profile.data.blocks, "read"),
         write_windows=_windows(profile.data.blocks, "write"),
         subfunctions=frozenset(diagnose.subfunctions if diagnose else ()),
