@@ -118,6 +118,16 @@ async def test_converter_that_falls_behind_later_shows_no_wrong_value(
         assert right(await until_named(line))
 
 
+async def test_drive_with_few_forms_shows_no_wrong_value(open_line: OpenLine) -> None:
+    """Its identification is the only reply that is unlike that of a read."""
+    with PtyPeer(Behind()) as peer:
+        line = opened(open_line, peer.path, SINGLE)
+        for _ in range(2):
+            with suppress(LineError):
+                await line.identify(1)
+        assert right(await until_named(line))
+
+
 async def test_replies_behind_over_rtu_tcp_are_named(open_line: OpenLine) -> None:
     with TcpPeer(Behind()) as peer:
         line = opened(open_line, RtuTcpLink("127.0.0.1", peer.port), WIDE)
