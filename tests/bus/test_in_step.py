@@ -82,7 +82,7 @@ async def until_named(line: Line) -> list[tuple[int, int]]:
     found = []
     async with asyncio.timeout(20.0):
         while not is_named(line):
-            found += await values(line, 1)
+            found += await values(line, 2)
     return found
 
 
