@@ -6,6 +6,7 @@ from .defect import Defect
 
 FAULTS = "tests/bus/test_faults.py"
 QUEUE = "tests/bus/test_queue.py"
+IN_STEP = "tests/bus/test_in_step.py"
 
 DEFECTS = (
     Defect(
