@@ -11,7 +11,7 @@ from ..result import ExchangeResult, ResultKind
 
 MOST_MORE = 8
 """Registers that are read in addition at most."""
-TRIES = 2
+FORM_TRIES = 2
 """Longer reads in a row without a reply after which that length is not sent again."""
 REMEMBERED = 4096
 """Longer reads whose failures are remembered at most."""
@@ -33,9 +33,9 @@ class Forms:
             return
         for more in range(1, MOST_MORE + 1):
             form = replace(request, count=request.count + more)
-            if self._failures.get(form, 0) > TRIES:
+            if self._failures.get(form, 0) > FORM_TRIES:
                 return  # refused: what is longer is refused too
-            if not send_refusal(form, limits) and self._failures.get(form, 0) < TRIES:
+            if not send_refusal(form, limits) and self._failures.get(form, 0) < FORM_TRIES:
                 yield form
 
     def note(self, form: Read, result: ExchangeResult) -> None:
@@ -46,7 +46,7 @@ class Forms:
         if len(self._failures) >= REMEMBERED:
             self._failures.clear()
         refused = result.kind is ResultKind.EXCEPTION
-        self._failures[form] = TRIES + 1 if refused else self._failures.get(form, 0) + 1
+        self._failures[form] = FORM_TRIES + 1 if refused else self._failures.get(form, 0) + 1
 
 
 def shorter(request: Read, limits: Limits) -> Iterator[Read]:
