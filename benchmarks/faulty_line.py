@@ -79,6 +79,8 @@ class Setting:
     slow_once: float = 0.0
     """The drive is slow at the tenth request, by so many seconds, and then answers all that it
     was sent meanwhile, in order; nothing else is wrong."""
+    behind_from: int | None = None
+    """From this request on, each one gets the reply to the one before; nothing else is wrong."""
 
 
 class FaultyLine:
@@ -113,6 +115,8 @@ class _Server:
     requests: int = 0
     pending: bytes = b""
     busy_until: float = 0.0
+    held: bytes = b""
+    """The reply that waits for the next request, on a line that is one behind."""
 
     def serve(self) -> None:
         """Answer until the input of the process ends."""
@@ -150,6 +154,10 @@ class _Server:
         if self.setting.slow_once:
             wait = max(wait, self.busy_until - time.monotonic())
             self.busy_until += self.setting.turnaround
+        if kind == "behind":
+            right, self.held = self.held, right
+            if not right:
+                return
         chance = self._chance()
         for after, data in _spoilt(kind, right, chance, self.setting):
             due = time.monotonic() + wait + after
@@ -178,6 +186,8 @@ class _Server:
         return random.Random(self.setting.seed * 1_000_003 + self.requests)
 
     def _kind(self) -> str:
+        if self.setting.behind_from is not None:
+            return "behind" if self.requests > self.setting.behind_from else ""
         if self.setting.slow_once:
             return "late" if self.requests == 10 else ""
         drawn = random.Random(self.setting.seed * 7_919 + self.requests).random()
@@ -199,6 +209,7 @@ def _spoilt(
     body = right[1:-2]
     made: dict[str, list[tuple[float, bytes]]] = {
         "": [(0.0, right)],
+        "behind": [(0.0, right)],
         "late": [(late, right)],
         "lost": [],
         "duplicated": [(0.0, right), (0.004, right)],

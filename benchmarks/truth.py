@@ -113,10 +113,13 @@ class Job:
     seed: int = 1
     faults: Faults = MIXED
     slow_once: float = 0.0
+    behind_from: int | None = None
     real: bool = False
 
     def setting(self) -> Setting:
         """The line of this job."""
+        if self.behind_from is not None:
+            return Setting(self.seed, behind_from=self.behind_from)
         if not self.real:
             return Setting(self.seed, self.faults, slow_once=self.slow_once)
         late = Faults(**(asdict(self.faults) | {"late_from": 0.2, "late_to": 1.2}))
@@ -264,7 +267,7 @@ def minimalmodbus(path: str, job: Job, *, cleared: bool) -> Tally:
 
 def _reads(job: Job) -> list[tuple[int, int, int]]:
     """The mixed reads; or, for late replies alone, reads that look alike, as polls do."""
-    if job.faults == MIXED and not job.slow_once:
+    if job.faults == MIXED and not job.slow_once and job.behind_from is None:
         return plan(job.seed, job.count)
     return [(1, ALIKE[0] + at % 100, ALIKE[1]) for at in range(job.count)]
 
@@ -397,6 +400,9 @@ def main() -> None:
         *((f"{name}, 15 % late", [Job(name, few, 5, LATE)]) for name in others),
         ("our line, one slow reply", [Job("our line", 60, 7, slow_once=0.12)]),
         *((f"{name}, one slow reply", [Job(name, 60, 7, slow_once=0.12)]) for name in others),
+        ("our line, one behind", [Job("our line", 300, seed, behind_from=0) for seed in range(2)]),
+        ("our line, one behind later", [Job("our line", 300, 7, behind_from=150)]),
+        *((f"{name}, one behind", [Job(name, 60, 7, behind_from=0)]) for name in others),
     ]
     rows = [joined(name, run(jobs, options.processes)) for name, jobs in cases]
     Console(width=120).print(table_of(rows))

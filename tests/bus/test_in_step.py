@@ -34,7 +34,7 @@ SINGLE = replace(WIDE, functions=frozenset({3, 6, 43}), max_read=1, single_words
 SILENT = replace(NO_ECHO, functions=frozenset({3, 6, 16}), answers_all=False)
 """May answer a longer read with silence."""
 """Reads single words, and has no echo."""
-LIMITS = {"echo": WIDE, "no echo": NO_ECHO, "single words": SINGLE}
+LIMITS = {"echo": WIDE, "no echo": NO_ECHO, "single words": SINGLE, "silent": SILENT}
 
 
 class Behind:
@@ -230,6 +230,19 @@ async def test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing(
         assert answer.words == (102,)
         assert answer.pdu == bytes([3, 2, 0, 102]), "the reply to what was wanted"
         assert peer.requests[-1][5] > 1
+
+
+def test_length_of_a_reply_that_may_still_come_is_not_used() -> None:
+    devices, timing = Devices(Timing(), mistakable=True), Timing()
+    outcomes = Outcomes(devices, Tally(), timing, lambda: 1.0, SharedFacts(), gateway=False)
+    steps = InStep(devices, outcomes, lambda: 1.0, timing, buffers=False)
+    for count in (1, 2):
+        devices.may_come(1, Read(1, 0, count).expectation(), 0.5, 0.6)
+    job = Job(Read(1, 100, 1), Priority.POLL, WIDE)
+    assert steps.lengthen(job)
+    assert (job.form, job.own_part(bytes([3, 6, 0, 1, 0, 2, 0, 3]))) == (
+        Read(1, 100, 3), bytes([3, 2, 0, 1]),
+    )  # fmt: skip
 
 
 async def test_longer_read_that_is_refused_is_replaced(open_line: OpenLine) -> None:

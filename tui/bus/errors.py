@@ -74,6 +74,8 @@ class LineFailed(LineLost):
     """The line's own code failed: an internal error, not one of the port or of a drive."""
 
 
+ONE_BEHIND = "Replies are one behind"
+"""Opens the text of a LineBehind."""
 OWNER_SILENT = "owns the line and does not answer"
 """What a LineLost says of a frozen program of Drive Panel that has the line."""
 

@@ -250,7 +250,8 @@ class Dispatcher:
             result = await self.steps.prove(master, job, probe)
         finally:
             self.in_flight = False
-        if result.kind not in UNANSWERED or job not in self._queue.waiting():
+        silent = self.steps.may_be_silent(job, probe)
+        if result.kind not in UNANSWERED or silent or job not in self._queue.waiting():
             return
         self._queue.remove(job)
         if self._outcomes.conclude(job, result, unsent=True):

@@ -28,9 +28,7 @@ class Forms:
         self._failures: dict[Read, int] = {}
 
     def longer(self, request: Read, limits: Limits) -> Iterator[Read]:
-        """Reads of more registers from the same one on, shortest first."""
-        if not limits.answers_all:
-            return
+        """Reads of more registers from the same one on, shortest first; some may meet silence."""
         for more in range(1, MOST_MORE + 1):
             form = replace(request, count=request.count + more)
             if self._failures.get(form, 0) > FORM_TRIES:

@@ -11,13 +11,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from secrets import randbelow
 
-from ..errors import LineBehind, NoAnswer
+from ..errors import ONE_BEHIND, LineBehind, NoAnswer
 from ..expectation import EXCEPTION, IDENTIFY, REPORT_ID, Expectation
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import Diagnose, Identify, Read, Request
 from ..result import ExchangeResult, Piece, ResultKind
-from .forms import Forms, shorter
+from .forms import TRIES, Forms, shorter
 from .outcomes import Outcomes
 from .patience import Devices
 from .queue import Job
@@ -39,7 +39,7 @@ PROBE_AGAIN = 0.2
 PROBES = 2
 """Requests that show whether an opened line is in step."""
 BEHIND = (
-    "Replies are one behind: each request gets the reply to the one before. No value is shown, and"
+    f"{ONE_BEHIND}: each request gets the reply to the one before. No value is shown, and"
     " only stops are sent. Switch the converter or gateway off and on."
 )
 UNANSWERED = (ResultKind.NOTHING, ResultKind.DAMAGED, ResultKind.WRONG)
@@ -67,6 +67,8 @@ class InStep:
         self._sent: dict[int, deque[Expectation]] = {}
         self._good: dict[int, dict[int, Read]] = {}
         """By device and length, the read that was answered last."""
+        self._silences: dict[int, int] = {}
+        """By device, the longer reads that met silence, and may always do so."""
         self._proved: set[int] = set()
         self._weak: set[int] = set()
         """Drives whose next reply proves its step if it is unlike the last one alone."""
@@ -121,11 +123,11 @@ class InStep:
             return probe
         # few forms: one that differs from the last request's is the best there is
         self._weak.add(device)
-        return None if own != before[-1] else self._probe(job, 1)
+        return self._probe(job, 1) if own == before[-1] else None
 
     def lengthen(self, job: Job) -> bool:
         """Have a read sent longer, so that no earlier reply can be taken for its own."""
-        if not isinstance(job.request, Read):
+        if not isinstance(job.request, Read) or not job.limits.answers_all:
             return False
         forms = self._forms.longer(job.request, job.limits)
         form = next((one for one in forms if self._is_new(job, one)), None)
@@ -149,8 +151,9 @@ class InStep:
         request, limits = job.request, job.limits
         if isinstance(request, Read):
             yield from shorter(request, limits)
-            yield from self._forms.longer(request, limits)
         yield from self._good.get(request.device, {}).values()
+        if isinstance(request, Read) and self._silences.get(request.device, 0) < TRIES:
+            yield from self._forms.longer(request, limits)
         if Diagnose.function in limits.functions and ECHO in limits.subfunctions:
             yield Diagnose(request.device, ECHO, randbelow(1 << 16))
         if IDENTIFY in limits.functions and limits.answers_all:
@@ -158,6 +161,14 @@ class InStep:
         if Read.function in limits.functions and not isinstance(request, Read):
             yield (read := Read(request.device, request.register, 1))
             yield from self._forms.longer(read, limits)
+
+    @staticmethod
+    def may_be_silent(job: Job, probe: Request) -> bool:
+        """True if a drive that would answer the job may be silent to the probe."""
+        read = job.request
+        if not isinstance(probe, Read) or not isinstance(read, Read) or job.limits.answers_all:
+            return False
+        return probe.count > read.count
 
     async def prove(self, master: Master, job: Job, probe: Request) -> ExchangeResult:
         """Send a probe for a job. Raises LineLost."""
@@ -173,6 +184,8 @@ class InStep:
         self.note(job, expectation, result, number=isinstance(probe, Diagnose))
         if isinstance(probe, Read):
             self._forms.note(probe, result)
+        if result.kind in UNANSWERED and self.may_be_silent(job, probe):
+            self._silences[device] = self._silences.get(device, 0) + 1
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._outcomes.count_beside(device, result)
             self._outcomes.note_strays(result.strays, result.end)
