@@ -17,7 +17,7 @@ from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import Diagnose, Identify, Read, Request
 from ..result import ExchangeResult, Piece, ResultKind
-from .forms import TRIES, Forms, shorter
+from .forms import FORM_TRIES, Forms, shorter
 from .outcomes import Outcomes
 from .patience import Devices
 from .queue import Job
@@ -152,7 +152,7 @@ class InStep:
         if isinstance(request, Read):
             yield from shorter(request, limits)
         yield from self._good.get(request.device, {}).values()
-        if isinstance(request, Read) and self._silences.get(request.device, 0) < TRIES:
+        if isinstance(request, Read) and self._silences.get(request.device, 0) < FORM_TRIES:
             yield from self._forms.longer(request, limits)
         if Diagnose.function in limits.functions and ECHO in limits.subfunctions:
             yield Diagnose(request.device, ECHO, randbelow(1 << 16))
