@@ -69,6 +69,8 @@ class InStep:
         """By device and length, the read that was answered last."""
         self._silences: dict[int, int] = {}
         """By device, the longer reads that met silence, and may always do so."""
+        self._heard = False
+        """True once a reply came that the adapter's own echo cannot be."""
         self._proved: set[int] = set()
         self._weak: set[int] = set()
         """Drives whose next reply proves its step if it is unlike the last one alone."""
@@ -89,6 +91,7 @@ class InStep:
     def opened(self) -> None:
         """Trust no drive on a new connection before it has proved its step."""
         self._proved.clear()
+        self._heard = False
         self._shifts, self._probes, self._next_try = 0, 0, 0.0
         self.quiet_until, self.reopen = 0.0, False
         if not self.behind:
@@ -154,7 +157,7 @@ class InStep:
         yield from self._good.get(request.device, {}).values()
         if isinstance(request, Read) and self._silences.get(request.device, 0) < FORM_TRIES:
             yield from self._forms.longer(request, limits)
-        if Diagnose.function in limits.functions and ECHO in limits.subfunctions:
+        if self._heard and Diagnose.function in limits.functions and ECHO in limits.subfunctions:
             yield Diagnose(request.device, ECHO, randbelow(1 << 16))
         if IDENTIFY in limits.functions and limits.answers_all:
             yield Identify(request.device)
@@ -210,6 +213,7 @@ class InStep:
         proves = proves or (device in self._weak and expectation != before[-1])
         self._weak.discard(device)
         frames = result.strays if result.instead is None else [result.instead]
+        self._heard |= result.kind is ResultKind.REPLY and not number
         shifted = result.kind in UNANSWERED and any(map(self._is_earlier, frames))
         before.append(expectation)
         read, replied = job.form or job.request, result.kind is ResultKind.REPLY
