@@ -27,7 +27,7 @@ def test_a_drive_that_answers() -> None:
         assert run(0, "why", line, "-d", "2").startswith("Address 2 answers: 203 of 203 requests")
         told = json.loads(run(0, "why", line, "-d", "2", "--json"))
     assert (told["rung"], told["answers"], told["next"]) == ("answers", True, [])
-    assert (told["profile"], told["seen"]["answered"]) == ("atv71", 3)
+    assert (told["profile"], told["seen"]["answered"]) == ("atv71", 4)
     assert told["timeout"]["seconds"] == 10.0
 
 

@@ -373,7 +373,7 @@ async def test_damaged_answers_beside_good_ones(line: OpenedLine) -> None:
     with PtyPeer(script) as peer:
         found = await why(line(peer.path))
     assert found.rung == "checksum"
-    assert "1 of 2 answers came damaged" in found.text
+    assert "2 of 4 answers came damaged" in found.text
     assert any("termination" in step for step in found.steps)
 
 
@@ -457,7 +457,7 @@ async def test_a_drive_that_answers(line: OpenedLine) -> None:
     with PtyPeer(honest) as peer:
         found = await why(line(peer.path))
         assert found.well
-        assert found.text.startswith("Address 2 answers: 3 of 3 requests")
+        assert found.text.startswith("Address 2 answers: 4 of 4 requests")
         assert {request[1] for request in peer.requests} == {3}
     with PtyPeer(honest) as peer:
         found = await why(line(peer.path), family=None)

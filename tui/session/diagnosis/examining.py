@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 
 from tui.bus.api import LineStatus, ModbusLine
-from tui.bus.errors import LineError, LineLost
+from tui.bus.errors import ONE_BEHIND, LineError, LineLost
 from tui.bus.link import SerialLink, TcpLink
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
@@ -48,6 +48,24 @@ async def examine_line(
     reads: int = SHORT_READS,
 ) -> Sight:
     """Everything that is seen of a drive and its line."""
+    behind = [ONE_BEHIND in line.state.reason]
+    end = line.on_state(lambda state: behind.append(ONE_BEHIND in state.reason))
+    try:
+        sight = await _examined(line, device, profile, changed, answering, reads, behind)
+    finally:
+        end()
+    return replace(sight, behind=any(behind))
+
+
+async def _examined(
+    line: ModbusLine,
+    device: int,
+    profile: Profile | None,
+    changed: str,
+    answering: Sequence[int],
+    reads: int,
+    behind: Sequence[bool],
+) -> Sight:
     ready = line.state.status is LineStatus.CONNECTED
     if ready and not isinstance(line.link, TcpLink) and (others := await _others(line)):
         seen = await asyncio.to_thread(sight_of_port, line.link, device)
@@ -57,6 +75,8 @@ async def examine_line(
     if cut and not isinstance(line.link, SerialLink) and await _connected_again(line):
         sight = await sight_of_drive(line, device, profile, changed=changed, neighbours=answering)
         cut = isinstance(sight.trouble, LineLost)
+    if any(behind):
+        return sight
     heard = sight.heard
     unreached = heard.nothing or not (heard.answered or set(heard.exceptions) - GATEWAY_REFUSALS)
     if not isinstance(line.link, SerialLink) and (cut or (heard.asked and unreached)):

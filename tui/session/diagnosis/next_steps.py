@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from tui.bus.errors import ONE_BEHIND, PortMissing
+from tui.bus.errors import PortMissing
 from tui.bus.link import SerialLink
 
 from .family import address_hint, as_factory, settings_hints, speed_hint, wiring_hints
@@ -74,9 +74,6 @@ def other_port(sight: Sight) -> Iterator[str]:
 
 def reach_line(sight: Sight) -> Iterator[str]:
     """A line that was lost, or a host that is not reached."""
-    if ONE_BEHIND in str(sight.trouble):
-        yield "Restart the converter; set its receive timeout longer than the drive takes to reply."
-        return
     if isinstance(sight.link, SerialLink):
         yield "Look at the adapter's plug; the line is opened again by itself."
         return

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
+from tui.bus.errors import ONE_BEHIND
+
 from . import next_steps as steps
 from .gateway_probe import Works
 from .measure import Measure
@@ -31,6 +33,21 @@ def _works(sight: Sight) -> Works:
     return sight.works
 
 
+def _says_behind(sight: Sight) -> str:
+    count = sight.measure
+    if sight.behind or count is None:
+        return f"{ONE_BEHIND}: each request gets the reply to the one before."
+    many = f"{count.behind} of {count.asked} requests"
+    return f"{ONE_BEHIND}: {many} got the reply to the request before."
+
+
+def _sureness_of_behind(sight: Sight) -> str:
+    count = sight.measure
+    if sight.behind or count is None:
+        return LIKELY
+    return POSSIBLE if count.late else sureness(count.behind)
+
+
 GATEWAY_RUNGS = (
     Rung(
         "other-master",
@@ -50,20 +67,17 @@ GATEWAY_RUNGS = (
         lambda s: f"The gateway answers unit {_works(s).unit}, and not address {s.device}.",
         steps.set_unit,
     ),
+    Rung(
+        "behind",
+        lambda s: s.behind or (s.measure is not None and s.measure.one_behind),
+        _says_behind,
+        steps.restart_converter,
+        _sureness_of_behind,
+        ("Another master asks the same drive.", "The replies come much later."),
+    ),
 )
 """Found without a reply on the line itself."""
 SICK_RUNGS: tuple[Rung, ...] = (
-    Rung(
-        "behind",
-        lambda s: s.measure is not None and s.measure.one_behind,
-        lambda s: (
-            f"Replies are one behind: {_measure(s).behind} of {_measure(s).asked} requests got the"
-            " reply to the request before."
-        ),
-        steps.restart_converter,
-        lambda s: POSSIBLE if _measure(s).late else sureness(_measure(s).behind),
-        ("Another master asks the same drive.", "The replies come much later."),
-    ),
     Rung(
         "two-drives",
         lambda s: s.measure is not None and s.measure.two_drives,

@@ -60,6 +60,8 @@ class Sight:
     """Shares of sick frames among many reads; None where the drive was not read so often."""
     works: Works | None = None
     """The request that a silent gateway answers."""
+    behind: bool = False
+    """True if the line was named as one whose replies are one behind."""
     idle_closed: bool = False
     """True if the connection was closed as nothing was sent."""
     neighbours: tuple[int, ...] = ()
