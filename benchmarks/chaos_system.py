@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.chaos_line import Stage, processes_of
 from benchmarks.chaos_round import DEAD_FROZEN, KILLED, THAWED, Round
-from benchmarks.shell import slow_group
+from benchmarks.quota import slow_group
 from tests.sources import ROOT
 
 End = tuple[float, float | None, bool]

@@ -6,9 +6,11 @@ Five simulated drives at 19200 baud, in a process of their own. Compared in one 
 
 - `drivepanel read` with a new keeper, with one that waits from the command before, and without
   one: seconds from the start of the command to its end;
-- `drivepanel watch` of the five drives at 2 Hz: memory of the keeper, and processor time of keeper
-  and command together against that of a command which holds the line itself;
-- the keeper killed under that `watch`: seconds without a good value.
+- `drivepanel watch` of the five drives at 2 Hz, and the panel with its Monitor: memory of the
+  keeper, and processor time of keeper and program together against that of a program which holds
+  the line itself;
+- the keeper killed under that `watch`: seconds without a good value;
+- the same, but for the panel, with a tenth of a processor for all programs together (needs root).
 """
 
 from __future__ import annotations
@@ -21,8 +23,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -30,6 +32,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.quota import slow_group
+from benchmarks.terminal import Terminal
+from tests.sources import ROOT
 from tui.bus.share.place import has_ended, owner_of_lock
 from tui.bus.share.starting import NO_KEEPER
 
@@ -37,6 +42,7 @@ PROGRAM = (sys.executable, "-m", "tui")
 DRIVES = ("atv71@1", "atv31@2", "atv312@3", "atv71@4", "atv31@5")
 TICKS = os.sysconf("SC_CLK_TCK")
 WARM_UP = 3.0
+SIZE = 80, 24
 
 
 def keeper_of(state: Path) -> int | None:
@@ -72,18 +78,40 @@ def memory(pid: int) -> tuple[float, float]:
     return private / 1000, found["Rss:"] / 1000
 
 
-def seconds_to_read(line: str) -> float:
+class Bench:
+    """The line, and where its programs run."""
+
+    def __init__(self, folder: Path, line: str, group: Path | None = None) -> None:
+        self.folder = folder
+        self.line = line
+        self._group = group
+
+    @property
+    def state(self) -> Path:
+        """The state folder of all programs."""
+        return self.folder / "state"
+
+    def command(self, *words: str) -> list[str]:
+        """A command of Drive Panel; it enters the control group first, if there is one."""
+        if self._group is None:
+            return [*PROGRAM, *words]
+        enter = 'echo 0 > "$0"; exec "$@"'
+        return ["sh", "-c", enter, str(self._group / "cgroup.procs"), *PROGRAM, *words]
+
+
+def seconds_to_read(bench: Bench) -> float:
     """Seconds that `drivepanel read` of one value takes."""
     begun = time.monotonic()
-    command = [*PROGRAM, "read", line, "ETA", "-d", "1", "-p", "atv71"]
+    command = bench.command("read", bench.line, "ETA", "-d", "1", "-p", "atv71")
     subprocess.run(command, check=True, capture_output=True, timeout=60)
     return time.monotonic() - begun
 
 
 @contextmanager
-def watching(line: str) -> Iterator[subprocess.Popen[str]]:
+def watching(bench: Bench) -> Iterator[subprocess.Popen[str]]:
     """`drivepanel watch` of all drives at 2 Hz; begun once it printed a line."""
-    command = [*PROGRAM, "watch", f"{line}@1-{len(DRIVES)}", "--every", "0.5", "--json"]
+    every = ("--every", "0.5", "--json")
+    command = bench.command("watch", f"{bench.line}@1-{len(DRIVES)}", *every)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     process.stdout.readline()
@@ -91,26 +119,43 @@ def watching(line: str) -> Iterator[subprocess.Popen[str]]:
         yield process
     finally:
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=60)
 
 
-def load(state: Path, line: str, seconds: float) -> dict[str, float]:
+def load(bench: Bench, seconds: float) -> dict[str, float]:
     """Share of a core that a watch takes with its keeper, and the memory of that."""
-    with watching(line) as process:
-        end = time.monotonic() + WARM_UP
-        while time.monotonic() < end:
-            read_line(process)
-        pids = [pid for pid in (process.pid, keeper_of(state)) if pid is not None]
-        pids = list(dict.fromkeys(pids))
-        before, begun = [processor_seconds(pid) for pid in pids], time.monotonic()
-        while time.monotonic() < begun + seconds:
-            read_line(process)
-        taken = time.monotonic() - begun
-        used = [
-            (processor_seconds(pid) - one) / taken for pid, one in zip(pids, before, strict=True)
-        ]
-        private, resident = memory(pids[-1])
-        return {"together": sum(used), "holder": used[-1], "private": private, "rss": resident}
+    with watching(bench) as process:
+
+        def run(seconds: float) -> None:
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                read_line(process)
+
+        return load_of(bench, process.pid, run, seconds)
+
+
+def panel_load(bench: Bench, seconds: float) -> dict[str, float]:
+    """Share of a core that the panel on Monitor takes with its keeper."""
+    environment = {"TERM": "xterm-256color", "TEXTUAL_ANIMATIONS": "none"}
+    command = bench.command("panel", bench.line, "-d", "1")
+    with closing(Terminal(command, SIZE, ROOT, environment)) as terminal:
+        terminal.press("2")
+        terminal.see("Monitor", "A ")
+        return load_of(bench, terminal.process, terminal.run, seconds)
+
+
+def load_of(
+    bench: Bench, pid: int, run: Callable[[float], None], seconds: float
+) -> dict[str, float]:
+    """Share of a core that a program takes with its keeper, and the memory of the holder."""
+    run(WARM_UP)
+    pids = list(dict.fromkeys(one for one in (pid, keeper_of(bench.state)) if one is not None))
+    before, begun = [processor_seconds(one) for one in pids], time.monotonic()
+    run(seconds)
+    taken = time.monotonic() - begun
+    used = [(processor_seconds(one) - b) / taken for one, b in zip(pids, before, strict=True)]
+    private, resident = memory(pids[-1])
+    return {"together": sum(used), "holder": used[-1], "private": private, "rss": resident}
 
 
 def read_line(process: subprocess.Popen[str]) -> bool:
@@ -120,13 +165,13 @@ def read_line(process: subprocess.Popen[str]) -> bool:
     return told["error"] is None and "stale" not in json.dumps(told)
 
 
-def gap(state: Path, line: str) -> float:
+def gap(bench: Bench) -> float:
     """Seconds between two good values of a watch whose keeper is killed."""
-    with watching(line) as process:
+    with watching(bench) as process:
         end = time.monotonic() + WARM_UP
         while time.monotonic() < end:
             read_line(process)
-        pid = keeper_of(state)
+        pid = keeper_of(bench.state)
         assert pid is not None
         os.kill(pid, signal.SIGKILL)
         longest, last = 0.0, time.monotonic()
@@ -138,11 +183,23 @@ def gap(state: Path, line: str) -> float:
         return max(longest, now - last)
 
 
+@contextmanager
+def no_keeper(bench: Bench) -> Iterator[None]:
+    """Programs hold the line themselves."""
+    end_keeper(bench.state)
+    os.environ[NO_KEEPER] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[NO_KEEPER]
+
+
 def measure(rounds: int, seconds: float) -> dict[str, Any]:
-    """All figures of one run."""
+    """All figures of one run, without and with a quota of the processor."""
     with tempfile.TemporaryDirectory() as name:
-        state = Path(name, "state")
-        os.environ.update(DRIVEPANEL_STATE=str(state), DRIVEPANEL_CONFIG=str(Path(name, "config")))
+        folder = Path(name)
+        for one in ("state", "config"):
+            os.environ[f"DRIVEPANEL_{one.upper()}"] = str(folder / one)
         os.environ.pop(NO_KEEPER, None)
         line = f"serial:{name}/line,19200,8N1"
         served = [*PROGRAM, "simulate", *DRIVES, "--pty", f"{name}/line", "--real-time"]
@@ -150,30 +207,32 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
             assert drives.stdout is not None
             drives.stdout.readline()
             try:
-                return _measured(state, line, rounds, seconds)
+                found = _measured(Bench(folder, line), rounds, seconds)
+                found["panel"] = _panels(Bench(folder, line), seconds)
+                with slow_group("-keeper") as group:
+                    if group is not None:
+                        found["quota"] = _measured(Bench(folder, line, group), rounds, seconds)
+                        end_keeper(folder / "state")
+                return {"benchmark": "keeper", **found}
             finally:
-                end_keeper(state)
+                end_keeper(folder / "state")
                 drives.terminate()
 
 
-def _measured(state: Path, line: str, rounds: int, seconds: float) -> dict[str, Any]:
+def _measured(bench: Bench, rounds: int, seconds: float) -> dict[str, Any]:
     times: dict[str, list[float]] = {"new": [], "kept": [], "none": []}
-    seconds_to_read(line)  # compiles what is imported
+    seconds_to_read(bench)  # compiles what is imported
     for _ in range(rounds):
-        end_keeper(state)
-        times["new"].append(seconds_to_read(line))
-        times["kept"].append(seconds_to_read(line))
-        end_keeper(state)
-        os.environ[NO_KEEPER] = "1"
-        times["none"].append(seconds_to_read(line))
-        del os.environ[NO_KEEPER]
-    with_keeper = load(state, line, seconds)
-    gaps = [gap(state, line) for _ in range(rounds)]
-    end_keeper(state)
-    os.environ[NO_KEEPER] = "1"
-    alone = load(state, line, seconds)
+        end_keeper(bench.state)
+        times["new"].append(seconds_to_read(bench))
+        times["kept"].append(seconds_to_read(bench))
+        with no_keeper(bench):
+            times["none"].append(seconds_to_read(bench))
+    with_keeper = load(bench, seconds)
+    gaps = [gap(bench) for _ in range(rounds)]
+    with no_keeper(bench):
+        alone = load(bench, seconds)
     return {
-        "benchmark": "keeper",
         "read": {name: median(found) for name, found in times.items()},
         "with_keeper": with_keeper,
         "alone": alone,
@@ -182,13 +241,16 @@ def _measured(state: Path, line: str, rounds: int, seconds: float) -> dict[str, 
     }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=20.0)
-    options = parser.parse_args()
-    found = measure(options.rounds, options.seconds)
-    table = Table(title="The keeper of a line")
+def _panels(bench: Bench, seconds: float) -> dict[str, float]:
+    found = panel_load(bench, seconds)["together"]
+    with no_keeper(bench):
+        alone = panel_load(bench, seconds)["together"]
+    return {"together": found, "alone": alone, "ratio": found / alone}
+
+
+def table_of(found: dict[str, Any], title: str) -> Table:
+    """The figures without or with a quota."""
+    table = Table(title=title)
     table.add_column("what")
     table.add_column("measured", justify="right")
     read, held = found["read"], found["with_keeper"]
@@ -203,7 +265,21 @@ def main() -> None:
         "killed: without a good value, worst": f"{max(found['gaps']):.1f} s",
     }.items():
         table.add_row(name, text)
-    Console().print(table)
+    if panel := found.get("panel"):
+        table.add_row("panel and keeper", f"{panel['together']:.1%} of a core")
+        table.add_row("panel and keeper / panel that holds the line", f"{panel['ratio']:.2f}")
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    options = parser.parse_args()
+    found = measure(options.rounds, options.seconds)
+    Console().print(table_of(found, "The keeper of a line"))
+    if quota := found.get("quota"):
+        Console().print(table_of(quota, "With 10 % of a processor"))
     print(json.dumps(found))
 
 

@@ -23,8 +23,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -33,6 +33,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.keeper import end_keeper
+from benchmarks.quota import slow_group
 from benchmarks.wire import WireLine
 from tui.bus.program import KEEPER, Program
 from tui.bus.share.messages import VERSION
@@ -45,9 +46,6 @@ WRITES = (6, 16)
 WITHIN = 60.0
 """Seconds after which a program that hangs ends the run."""
 HELD, NAME = "serial:/dev/null,19200,8N1", "pump"
-GROUPS = ("/sys/fs/cgroup/cpu", "/sys/fs/cgroup")
-QUOTA, PERIOD = 10_000, 100_000
-"""Microseconds of processor time in each so many."""
 
 Start = Callable[[Sequence[str]], "subprocess.Popen[bytes]"]
 
@@ -64,30 +62,6 @@ def start(command: Sequence[str], group: Path | None = None) -> subprocess.Popen
 def move(group: Path) -> None:
     """Put this process into a control group."""
     (group / "cgroup.procs").write_text("0")
-
-
-@contextmanager
-def slow_group(name: str = "") -> Iterator[Path | None]:
-    """A control group with the quota; None if this user, or this system, can make none."""
-    for folder in GROUPS:
-        group = Path(folder, f"drivepanel-{os.getpid()}{name}")
-        with suppress(OSError):
-            group.mkdir()
-            try:
-                if (group / "cpu.cfs_quota_us").exists():
-                    (group / "cpu.cfs_quota_us").write_text(str(QUOTA))
-                    (group / "cpu.cfs_period_us").write_text(str(PERIOD))
-                else:
-                    (group / "cpu.max").write_text(f"{QUOTA} {PERIOD}")
-            except OSError:
-                group.rmdir()
-                continue
-            try:
-                yield group
-            finally:
-                group.rmdir()
-            return
-    yield None
 
 
 def seconds_of_nothing(started: Start) -> float:

@@ -175,8 +175,8 @@ class Terminal:
         # the reader must not wait for the picture to be brought up to date
         sys.setswitchinterval(SWITCH)
         self.started = time.monotonic()
-        self._process, self._terminal = pty.fork()
-        if self._process == 0:
+        self.process, self._terminal = pty.fork()
+        if self.process == 0:
             self._become(command, size, folder, environment)
         self._reader = threading.Thread(target=self._read, args=(rate,), daemon=True)
         self._reader.start()
@@ -252,7 +252,7 @@ class Terminal:
 
     def usage(self) -> Usage | None:
         """What the program has used so far; None where the system does not tell it."""
-        place = Path(f"/proc/{self._process}")
+        place = Path(f"/proc/{self.process}")
         if not place.exists():
             return None
         fields = (place / "stat").read_text().rpartition(")")[2].split()
@@ -262,8 +262,8 @@ class Terminal:
 
     def close(self) -> None:
         """End the program, and take the terminal away from it."""
-        os.kill(self._process, signal.SIGTERM)
-        os.waitpid(self._process, 0)
+        os.kill(self.process, signal.SIGTERM)
+        os.waitpid(self.process, 0)
         self._reader.join()
         os.close(self._terminal)
 
