@@ -66,7 +66,7 @@ def served(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=_own_interrupts,
+        preexec_fn=own_interrupts,
     )
     try:
         yield Served(process, _ready_line(process, ready))
@@ -117,7 +117,7 @@ def is_running(pid: int) -> bool:
         return False
 
 
-def _own_interrupts() -> None:
+def own_interrupts() -> None:
     """Let signals work in the program even where the test run itself ignores them, as by nohup."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -13,7 +13,15 @@ from pathlib import Path
 import pytest
 
 from tests.bus.peer import PtyPeer, silent
-from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, rtu_tcp, served, wait_until
+from tests.programs import (
+    DRIVEPANEL,
+    PATIENCE,
+    drivepanel,
+    own_interrupts,
+    rtu_tcp,
+    served,
+    wait_until,
+)
 from tui.simulator import DriveSpec, Simulation
 from tui.wire.capture.forms import READ_RAW
 
@@ -98,7 +106,9 @@ def test_ctrl_c_leaves_no_file(tmp_path: Path) -> None:
     file = tmp_path / "a.zip"
     with PtyPeer(silent) as silence:
         words = ["bundle", silence.path, "-d", "1", "-d", "2", "--output", str(file)]
-        with subprocess.Popen([*DRIVEPANEL, *words], stderr=subprocess.PIPE, text=True) as program:
+        with subprocess.Popen(
+            [*DRIVEPANEL, *words], stderr=subprocess.PIPE, text=True, preexec_fn=own_interrupts
+        ) as program:
             wait_until(lambda: bool(silence.requests), "the drive is requested")
             program.send_signal(signal.SIGINT)
             _, output = program.communicate(timeout=PATIENCE)
