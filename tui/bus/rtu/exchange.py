@@ -60,6 +60,16 @@ class RtuExchange:
         echo = len(self.frame) if self.echo else 0
         return echo + (MAX_FRAME if length is None else length + 3)
 
+    @property
+    def missing(self) -> int:
+        """Characters that come before there is a result; 0 unless the reply has begun for sure."""
+        expectation = self._expectation
+        if expectation is None or expectation.length is None or self._skip:
+            return 0
+        head = bytes((self._device, *expectation.prefix))
+        begun = self.buffer.startswith(head, len(self.frame) if self.echo else 0)
+        return self.longest - len(self.buffer) if begun else 0
+
     def feed(self, data: bytes) -> ExchangeResult | None:
         """Take received bytes; the result once the reply is whole."""
         self.buffer += data

@@ -17,6 +17,7 @@ from ..transport.port_errors import PortErrors
 from .exchange import RtuExchange
 from .frames import pieces
 from .notes import noted
+from .timer import PutOffTimer
 
 BABBLE = 1.0
 """Seconds to wait for silence on a line that never falls silent, before sending all the same."""
@@ -32,6 +33,9 @@ MUCH_TALK = 256
 """Bytes that came in while nothing was due, and no silence, after which they are looked at."""
 IDLE_LIMIT = 4096
 """Bytes kept of what comes in while nothing is due."""
+BEFORE_END, SHORTEST_PAUSE = 0.0003, 0.0005
+"""Seconds before the end of a reply from which each piece of it is taken at once, and seconds for
+which it is worth to take none: a line that delivers single characters costs a turn for each."""
 
 
 class RtuMaster:
@@ -49,6 +53,8 @@ class RtuMaster:
     ) -> None:
         self.echo: bool | None = None
         self.failure: LineLost | None = None
+        self.pause: Callable[[float], None] = lambda _: None
+        """Has the transport take nothing in for so many seconds, unless something is sent."""
         self._transport = transport
         self._around = around
         self._ended = ended
@@ -63,9 +69,7 @@ class RtuMaster:
         self._hold = 0.0
         self._exchange: RtuExchange | None = None
         self._done: asyncio.Future[ExchangeResult] | None = None
-        self._timer: asyncio.TimerHandle | None = None
-        self._due = 0.0
-        self._action: Callable[[], None] | None = None
+        self._timer = PutOffTimer()
         self._sent = 0.0
         self._over = 0.0
         """When the last character of the reply that has begun is on the wire, at the latest."""
@@ -80,7 +84,7 @@ class RtuMaster:
 
     def close(self) -> None:
         """Give the port back."""
-        self._stop_timer()
+        self._timer.stop()
         self._transport.close()
 
     def received(self, data: bytes, time: float) -> None:
@@ -91,7 +95,7 @@ class RtuMaster:
             self._idle += data
             del self._idle[:-IDLE_LIMIT]
             if len(self._idle) < MUCH_TALK:
-                self._start_timer(self._gap, self._sort_idle)
+                self._timer.start(self._gap, self._sort_idle)
             else:
                 self._sort_idle()  # others talk on and on: no silence would ever come
             return
@@ -102,7 +106,10 @@ class RtuMaster:
         if result is not None:
             settle(self._done, result)
         elif self._exchange.expected:
-            self._start_timer(self._ends - time, self._fell_silent)
+            self._timer.start(self._ends - time, self._fell_silent)
+            pause = self._exchange.missing * self._character - BEFORE_END
+            if pause > SHORTEST_PAUSE:
+                self.pause(pause)
 
     def _expect_end(self, exchange: RtuExchange, came: int, time: float) -> None:
         """Wait for the rest of what has begun: by a gap, and as long as it is on the wire.
@@ -130,7 +137,7 @@ class RtuMaster:
 
     def lost(self, reason: str) -> None:
         """The port went away: whoever waits is told at once."""
-        self._stop_timer()
+        self._timer.stop()
         self.failure = LineLost(f"The line was lost: {reason}.")
         settle(self._done, ExchangeResult(ResultKind.NOTHING))
         self._ended()
@@ -183,7 +190,7 @@ class RtuMaster:
             result = await (self._distrust(sending) if still else self._result(exchange, sending))
         finally:
             self._exchange = self._done = None
-            self._stop_timer()
+            self._timer.stop()
         self.echo = exchange.echo
         end = clock() if result.kind is ResultKind.NOTHING else self._last
         tally.count_end(sending.device, clock() - begun, len(result.received))
@@ -264,7 +271,7 @@ class RtuMaster:
         """Look at what came in while nothing was due."""
         if not self._idle:
             return
-        self._stop_timer()
+        self._timer.stop()
         data, self._idle = bytes(self._idle), bytearray()
         for piece in pieces(data):
             note = f"late or repeated, device {piece.device}" if piece.whole else "noise"
@@ -284,27 +291,3 @@ class RtuMaster:
         tally.parity += new.parity
         tally.breaks += new.breaks
         tally.overruns += new.overruns
-
-    def _start_timer(self, delay: float, action: Callable[[], None]) -> None:
-        """Do this once so many seconds have gone by; a timer that is set for it is put off."""
-        loop = asyncio.get_running_loop()
-        self._due, before, self._action = loop.time() + delay, self._action, action
-        if self._timer is not None and (before != action or self._timer.when() > self._due):
-            self._stop_timer()
-        if self._timer is None:
-            self._timer = loop.call_at(self._due, self._ring)
-
-    def _ring(self) -> None:
-        """The time that was set first is over; to set it anew for each piece costs more."""
-        loop = asyncio.get_running_loop()
-        if loop.time() < self._due:
-            self._timer = loop.call_at(self._due, self._ring)
-            return
-        self._timer = None
-        if self._action is not None:
-            self._action()
-
-    def _stop_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None

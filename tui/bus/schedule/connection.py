@@ -97,7 +97,10 @@ async def open_master(
         counts: Callable[[], PortErrors | None] = transport.errors
     else:
         counts = _no_counts
-    return RtuMaster(transport, link, around, wake, wire_time=wire_time, port_errors=counts)
+    master = RtuMaster(transport, link, around, wake, wire_time=wire_time, port_errors=counts)
+    if isinstance(transport, PosixSerial):
+        master.pause = transport.pause
+    return master
 
 
 def _no_counts() -> None:

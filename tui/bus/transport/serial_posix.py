@@ -29,12 +29,32 @@ class PosixSerial:
         self._port = port
         self._fd: int | None = port.fileno()
         self._receiver: Receiver | None = None
+        self._resumes: asyncio.TimerHandle | None = None
         os.set_blocking(port.fileno(), False)
 
     def start(self, receiver: Receiver) -> None:
         """Begin to receive in the running loop."""
         self._receiver = receiver
+        self._resume()
+
+    def pause(self, seconds: float) -> None:
+        """Leave what comes in with the system for so long, unless something is sent before.
+
+        Each wake-up of the loop costs more than the bytes that it brings.
+        """
+        if self._fd is None or self._resumes is not None:
+            return
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(self._fd)
+        until = time.monotonic() + seconds
+        self._resumes = loop.call_later(seconds - WAITED_ON_PORT, self._resume, until)
+
+    def _resume(self, until: float = 0.0) -> None:
+        if self._resumes is not None:
+            self._resumes.cancel()
+            self._resumes = None
         if self._fd is not None:
+            time.sleep(max(0.0, until - time.monotonic()))
             asyncio.get_running_loop().add_reader(self._fd, self._take)
 
     def _take(self) -> None:
@@ -62,6 +82,8 @@ class PosixSerial:
 
     async def send(self, data: bytes) -> None:
         """Write all bytes. Raises OSError when the port is gone or takes nothing."""
+        if self._resumes is not None:
+            self._resume()
         while data:
             if self._fd is None:
                 raise OSError("the port is closed")
