@@ -9,11 +9,10 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from contextlib import suppress
 from pathlib import Path
 
 from .messages import Alive, Pulse, packed
-from .place import short_path
+from .place import reached
 
 BEAT_INTERVAL = 0.4
 """Seconds between two beats."""
@@ -54,15 +53,14 @@ class Heartbeat:
 
     def _beat(self, connection: socket.socket | None) -> socket.socket | None:
         """Beat once; returns the connection for the next beat, None if there is none."""
-        made = connection or socket.socket(socket.AF_UNIX)
         try:
             if connection is None:
-                made.settimeout(BEAT_WITHIN)
-                with short_path(self._holder) as address:
-                    made.connect(address)
-            made.sendall(self._greeting if connection is None else _ALIVE)
+                connection = reached(self._holder, BEAT_WITHIN)
+                connection.sendall(self._greeting)
+            else:
+                connection.sendall(_ALIVE)
         except (OSError, ValueError):
-            with suppress(OSError):
-                made.close()
+            if connection is not None:
+                connection.close()
             return None
-        return made
+        return connection

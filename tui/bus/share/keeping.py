@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from contextlib import suppress
 from pathlib import Path
 from time import monotonic, sleep
@@ -12,7 +11,7 @@ import msgspec
 from ..bounds import Number, Text
 from ..program import KEEPER, Program
 from .messages import LENGTH, VERSION, Goodbye, packed
-from .place import Owner, OwnerLock, SharePlace, short_path
+from .place import Owner, OwnerLock, SharePlace, reached
 
 
 class KeeperOrder(msgspec.Struct, frozen=True):
@@ -55,10 +54,7 @@ def ends_unneeded(owner: Owner, lock: OwnerLock) -> bool:
     """
     if owner.program.name != KEEPER:
         return False
-    with suppress(OSError), socket.socket(socket.AF_UNIX) as connection:
-        connection.settimeout(MAKES_WAY_WITHIN)
-        with short_path(Path(owner.socket)) as address:
-            connection.connect(address)
+    with suppress(OSError), reached(Path(owner.socket), MAKES_WAY_WITHIN) as connection:
         connection.sendall(packed(Goodbye()))
         while connection.recv(LENGTH):
             pass

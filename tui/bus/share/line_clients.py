@@ -5,7 +5,6 @@ A program sends LOOK_HEAD in place of a Hello. The answer is JSON, then the conn
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from time import monotonic
@@ -15,7 +14,7 @@ import msgspec
 from ..bounds import Number, Share, Word
 from ..program import LONGEST_NAME, Program, readable
 from ..program_use import use_by_program
-from .place import Owner, short_path
+from .place import Owner, reached
 
 LOOK_HEAD = b"LOOK"
 """Read as the length of a message, this is longer than any."""
@@ -45,10 +44,7 @@ def line_clients(owner: Owner) -> list[LineClient] | None:
     """Ask the holder of a line; None without an answer."""
     data, end = b"", monotonic() + LOOK_WITHIN
     try:
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.settimeout(LOOK_WITHIN)
-            with short_path(Path(owner.socket)) as address:
-                connection.connect(address)
+        with reached(Path(owner.socket), LOOK_WITHIN) as connection:
             connection.sendall(LOOK_HEAD)
             while (part := connection.recv(4096)) and len(data) < LONGEST_LOOK_ANSWER:
                 data += part

@@ -7,7 +7,6 @@ length; then the connection closes. It works on a lost line too.
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
@@ -20,7 +19,7 @@ from ..bounds import MOST_BYTES, MOST_FRAMES
 from ..notes import NOTES_A_LOOK, LineNote
 from ..trace import Frame
 from .messages import LENGTH, LONGEST_MESSAGE, SeenFrame
-from .place import Owner, short_path
+from .place import Owner, reached
 
 PAST_HEAD = b"PAST"
 """Read as the length of a message, this is longer than any."""
@@ -64,10 +63,7 @@ def line_past(owner: Owner) -> tuple[tuple[Frame, ...], tuple[LineNote, ...]]:
     frames: list[Frame] = []
     notes: list[LineNote] = []
     end, received = monotonic() + PAST_WITHIN, False
-    with socket.socket(socket.AF_UNIX) as connection:
-        connection.settimeout(PAST_WITHIN)
-        with short_path(Path(owner.socket)) as address:
-            connection.connect(address)
+    with reached(Path(owner.socket), PAST_WITHIN) as connection:
         connection.sendall(PAST_HEAD)
         with connection.makefile("rb") as pieces:
             while len(frames) < FRAMES_KEPT and (head := pieces.read(LENGTH)):

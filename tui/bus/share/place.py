@@ -259,6 +259,22 @@ def short_path(path: Path) -> Iterator[str]:
         os.close(folder)
 
 
+def reached(path: Path, within: float) -> socket.socket:
+    """A connection to a holder's socket; each step of its use takes `within` seconds at most.
+
+    Raises OSError, ValueError.
+    """
+    connection = socket.socket(socket.AF_UNIX)
+    try:
+        connection.settimeout(within)
+        with short_path(path) as address:
+            connection.connect(address)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
 def has_ended(program: Program) -> bool:
     """Whether a program of this machine surely is no more; in doubt it lives."""
     if program.process[0] != pid_namespace():

@@ -10,14 +10,13 @@ The shell's short way sends it before anything slow is imported: tui.cli.short_s
 from __future__ import annotations
 
 import asyncio
-import socket
 import uuid
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from ..program import Program
 from .messages import NoMessage, StopGiven
-from .place import Peer, short_path
+from .place import Peer, reached
 
 STOP_HEAD = b"STOP"
 """Read as the length of a message, this is longer than any."""
@@ -50,10 +49,7 @@ async def plain_stop(
 
 def send_plain_stop(address: Path, devices: Iterable[int]) -> None:
     """Send such a line to the socket of a holder, and await its answer. Raises OSError."""
-    with socket.socket(socket.AF_UNIX) as connection:
-        connection.settimeout(GIVEN_WITHIN)
-        with short_path(address) as short:
-            connection.connect(short)
+    with reached(address, GIVEN_WITHIN) as connection:
         connection.sendall(b"%s %s\n" % (STOP_HEAD, " ".join(map(str, devices)).encode()))
         if connection.recv(len(GIVEN)) != GIVEN:
             raise OSError(f"{address} does not take a stop")
