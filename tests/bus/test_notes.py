@@ -13,7 +13,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.now = 1000.0
-        self.notes = Notes(lambda: None, lambda: self.now)
+        self.notes = Notes(lambda _: None, lambda: self.now)
 
 
 def test_a_note_is_kept_for_ten_minutes_and_no_longer() -> None:

@@ -12,10 +12,9 @@ import pytest
 
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
-from tui.bus.keep_alive import KeepAlive
-from tui.bus.leases import WriteLease
-from tui.bus.notes import LineNote
 from tui.bus.program import Program
+from tui.bus.share.messages import AnyMessage, Armed, AskedFor, Claim, Granting
+from tui.bus.share.voices import LineVoice
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR, CommandedElsewhere
 from tui.session.drive import DriveSession
@@ -31,41 +30,26 @@ from .fake_clock import FakeClock
 REMOTE = Program("remote", "panel", 77, "", "pts/9")
 
 
-class Told:
+class Heard(LineVoice):
     """The voice of this program, as another one would hear it."""
 
     def __init__(self) -> None:
+        super().__init__(self.hear)
         self.said: list[tuple[object, ...]] = []
 
-    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
-        self.said.append(("stop", devices, by))
+    def hear(self, message: AnyMessage) -> None:
+        match message:
+            case Claim(device=device, take=take):
+                self.said.append(("claim", device, take))
+            case AskedFor(device=device):
+                self.said.append(("ask", device))
+            case Granting(device=device, program=program, yes=yes):
+                self.said.append(("reply", device, program, yes))
+            case Armed(device=device, until=until):
+                self.said.append(("armed", device, until != 0))
 
     def stop_directly(self, devices: tuple[int, ...]) -> None:
         self.said.append(("directly", devices))
-
-    def claim(self, device: int, take: bool) -> None:
-        self.said.append(("claim", device, take))
-
-    def ask(self, device: int) -> None:
-        self.said.append(("ask", device))
-
-    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
-        self.said.append(("reply", device, program, yes))
-
-    def hushed(self, device: int, why: str) -> None:
-        self.said.append(("hushed", device, why))
-
-    def armed(self, device: int, lease: WriteLease) -> None:
-        self.said.append(("armed", device, lease.until != 0))
-
-    def kept_alive(self, one: KeepAlive) -> None:
-        self.said.append(("kept alive", one.device, one.timeout, one.until != 0))
-
-    def told(self, device: int, text: str) -> None:
-        self.said.append(("told", device, text))
-
-    def noted(self, note: LineNote) -> None:
-        self.said.append(("noted", note.device, note.kind))
 
 
 class Bench:
@@ -74,7 +58,7 @@ class Bench:
     def __init__(self) -> None:
         self.line = FakeLine({1: {}})
         self.clock = FakeClock()
-        self.voice = Told()
+        self.voice = Heard()
         self.facts = self.line.facts
         self.facts.set_programs((self.facts.me, REMOTE))
         self.facts.voice = self.voice

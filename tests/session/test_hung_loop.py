@@ -16,7 +16,7 @@ from tui.session.command.stop import Stopper
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 
-from .test_handover import Told
+from .test_handover import Heard
 
 DRIVES = (1, 2, 3)
 
@@ -38,15 +38,15 @@ class HungLine(FakeLine):
         return NeverBegins()
 
 
-def stopped(line: FakeLine) -> Told:
+def stopped(line: FakeLine) -> Heard:
     """What other programs hear of a stop of all drives."""
-    voice = line.facts.voice = Told()
+    voice = line.facts.voice = Heard()
     stopper = Stopper(line, Journal())
     stopper.stop([DriveSession(line, one, library.load("atv71")) for one in DRIVES])
     return voice
 
 
-async def direct_stop(voice: Told) -> tuple[object, ...] | None:
+async def direct_stop(voice: Heard) -> tuple[object, ...] | None:
     """The first stop that goes around the loop, if one does within some seconds."""
     for _ in range(500):
         if found := [one for one in voice.said if one[0] == "directly"]:
@@ -66,7 +66,7 @@ async def test_a_keeper_that_does_not_answer_is_asked_again(
     monkeypatch.setattr(under_way, "AGAIN_AFTER", 0.05)
     tries: list[tuple[int, ...]] = []
 
-    class Silent(Told):
+    class Silent(Heard):
         def stop_directly(self, devices: tuple[int, ...]) -> None:
             tries.append(devices)
             if len(tries) < 3:

@@ -10,7 +10,7 @@ import pytest
 from tui.bus.notes import LineNote
 from tui.bus.program import Program
 from tui.bus.share.messages import LENGTH, AnyMessage, packed, unpacked
-from tui.bus.share.voices import ProgramVoice
+from tui.bus.share.voices import LineVoice
 from tui.bus.shared_facts import SharedFacts
 from tui.drive.profile import library
 from tui.session.event_notes import EVENTS_OF_LINE, EventNotes, LeftEvent
@@ -39,7 +39,7 @@ class LineHolder:
                 for note in self.facts.notes.of(message.device, message.kind):
                     facts.notes.hear(note)
 
-        facts.voice = ProgramVoice(facts, send)
+        facts.voice = LineVoice(send)
         return facts
 
 

@@ -1,55 +1,16 @@
-"""Who hears what other programs on the line do, and how this one tells them."""
+"""Who hears what other programs on the line do."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TypeVar
 
-from .leases import WriteLease
 from .program import Program, readable
-
-if TYPE_CHECKING:
-    from .keep_alive import KeepAlive
-    from .notes import LineNote
 
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-
-
-class LineVoice(Protocol):
-    """Carries what is done here to the other programs; called in any thread."""
-
-    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
-        """Devices are stopped from here."""
-
-    def stop_directly(self, devices: tuple[int, ...]) -> None:
-        """Have another holder of the line stop devices, around a loop that hangs here."""
-
-    def claim(self, device: int, take: bool) -> None:
-        """This program commands a device now, or no longer."""
-
-    def ask(self, device: int) -> None:
-        """This program wants a device that another one commands."""
-
-    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
-        """The answer to a program that asked."""
-
-    def hushed(self, device: int, why: str) -> None:
-        """A device is left alone by this program, or with no reason no longer."""
-
-    def armed(self, device: int, lease: WriteLease) -> None:
-        """This program may write to a device until a time, or no more if that is over."""
-
-    def kept_alive(self, one: KeepAlive) -> None:
-        """This program has a device kept alive, or no more."""
-
-    def told(self, device: int, text: str) -> None:
-        """Something that everybody on the line is to read."""
-
-    def noted(self, note: LineNote) -> None:
-        """A note from here for the next program, or without data a request for some."""
 
 
 StopListener = Callable[[tuple[int, ...], str, Program], None]

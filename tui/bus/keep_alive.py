@@ -20,7 +20,7 @@ from .bounds import MOST_DEVICES, MonotonicTime, RegisterAddress
 from .requests import Identify, Request, read_request
 
 if TYPE_CHECKING:
-    from .facts_heard import LineVoice
+    from .share.messages import AnyMessage
 
 READS_PER_TIMEOUT = 4.0
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.08, 1e6
@@ -53,9 +53,9 @@ class KeepAlive(msgspec.Struct, frozen=True, tag=True):
 class KeepAlives:
     """Those of one line: this program's, and in its holder those of all; for any thread."""
 
-    def __init__(self, me: str, voice: Callable[[], LineVoice | None]) -> None:
+    def __init__(self, me: str, tell: Callable[[AnyMessage], None]) -> None:
         self._me = me
-        self._voice = voice
+        self._tell = tell
         self.kept: Mapping[tuple[str, int], KeepAlive] = MappingProxyType({})
         """By program and device; replaced as a whole."""
         self.changed: Callable[[], None] = lambda: None
@@ -79,8 +79,7 @@ class KeepAlives:
 
     def _say(self, one: KeepAlive) -> None:
         self.hear(self._me, one)
-        if (voice := self._voice()) is not None:
-            voice.kept_alive(one)
+        self._tell(one)
 
     # Of all
 

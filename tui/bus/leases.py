@@ -11,13 +11,10 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from .bounds import MOST_CARE
+from .share.messages import AnyMessage, Armed
 from .stop_counts import StopCounts
-
-if TYPE_CHECKING:
-    from .facts_heard import LineVoice
 
 LEASE_ENDED = 0.0
 """The end of a lease that its program has ended."""
@@ -45,10 +42,10 @@ class WriteLease:
 class WriteLeases:
     """The leases of one line: this program's, and in its holder those of all; for any thread."""
 
-    def __init__(self, me: str, stops: StopCounts, voice: Callable[[], LineVoice | None]) -> None:
+    def __init__(self, me: str, stops: StopCounts, tell: Callable[[AnyMessage], None]) -> None:
         self._me = me
         self._stops = stops
-        self._voice = voice
+        self._tell = tell
         self._leases: Mapping[tuple[str, int], WriteLease] = MappingProxyType({})
         self._lock = threading.Lock()
 
@@ -97,8 +94,7 @@ class WriteLeases:
                 self.end(self._me, device)
 
     def _say(self, device: int, lease: WriteLease) -> None:
-        if (voice := self._voice()) is not None:
-            voice.armed(device, lease)
+        self._tell(Armed(device, lease.stamp, lease.until, lease.care))
 
     # Of all
 

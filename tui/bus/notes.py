@@ -14,7 +14,7 @@ from .bounds import DeviceId
 from .facts_heard import heard, subscribed
 
 if TYPE_CHECKING:
-    from .facts_heard import LineVoice
+    from .share.messages import AnyMessage
 
 NOTES_KEPT = 600.0
 """Seconds for which a note is kept."""
@@ -49,10 +49,10 @@ class Notes:
     """
 
     def __init__(
-        self, voice: Callable[[], LineVoice | None], clock: Callable[[], float] = time.monotonic
+        self, tell: Callable[[AnyMessage], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`voice` finds how other programs are told, None while there is no other."""
-        self._voice = voice
+        """`tell` hands a message on to the other programs, if there are any."""
+        self._tell = tell
         self._clock = clock
         self._lock = threading.Lock()
         self._kept: dict[LineNote, float] = {}
@@ -63,13 +63,11 @@ class Notes:
     def leave(self, note: LineNote) -> None:
         """Leave a note from here."""
         self.keep(note)
-        if (voice := self._voice()) is not None:
-            voice.noted(note)
+        self._tell(note)
 
     def ask(self, device: int, kind: str) -> None:
         """Have the notes of a device and kind given to whoever listens; they come one by one."""
-        if (voice := self._voice()) is not None:
-            voice.noted(LineNote(device, kind))
+        self._tell(LineNote(device, kind))
 
     def on_note(self, listener: NoteListener) -> Callable[[], None]:
         """Call `listener` with notes that were asked for, in the line's thread."""

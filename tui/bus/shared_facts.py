@@ -10,12 +10,15 @@ import threading
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from .facts_heard import FactsHeard, LineVoice, heard
+from .bounds import MOST_NOTICE, MOST_TEXT
+from .facts_heard import FactsHeard, heard
 from .holder_heard import HolderHeard
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
 from .notes import Notes
 from .program import KEEPER, Program
+from .share.messages import AnyMessage, AskedFor, Claim, Granting, Hush, StopGiven, Told
+from .share.voices import LineVoice
 from .stop_counts import GivenStops, StopCounts
 
 DEPARTED_KEPT = 16
@@ -39,11 +42,11 @@ class SharedFacts(FactsHeard):
         """Devices that nobody asks now: by whose id, and why."""
         self.stops = StopCounts()
         """How many stops each device was given, by all programs."""
-        self.leases = WriteLeases(self.me.id, self.stops, lambda: self.voice)
+        self.leases = WriteLeases(self.me.id, self.stops, self._tell)
         """Which program may write to which device."""
-        self.keep_alives = KeepAlives(self.me.id, lambda: self.voice)
+        self.keep_alives = KeepAlives(self.me.id, self._tell)
         """Which devices are kept from their communication timeout."""
-        self.notes = Notes(lambda: self.voice)
+        self.notes = Notes(self._tell)
         """Notes for the next program on the line."""
         self.unkept = ""
         """Why this program holds the line in place of a keeper; empty where that is meant so."""
@@ -112,22 +115,24 @@ class SharedFacts(FactsHeard):
     def tell_all(self, device: int, text: str) -> None:
         """Have every program on the line tell its person something about a device."""
         self.hear_text(device, text)
-        if self.voice is not None:
-            self.voice.told(device, text)
+        self._tell(Told(device, text[:MOST_TEXT]))
+
+    def _tell(self, message: AnyMessage) -> None:
+        """Carry what is done here to the other programs, if there are any; in any thread."""
+        if (voice := self.voice) is not None:
+            voice.send(message)
 
     # Left alone
 
     def hush(self, device: int, why: str) -> None:
         """Let nobody ask a device, but for what belongs to a stop."""
         self.note_hush(device, self.me.id, why)
-        if self.voice is not None:
-            self.voice.hushed(device, why)
+        self._tell(Hush(device, why[:MOST_NOTICE]))
 
     def unhush(self, device: int) -> None:
         """Let a device be asked again."""
         self.note_hush(device, self.me.id, "")
-        if self.voice is not None:
-            self.voice.hushed(device, "")
+        self._tell(Hush(device, ""))
 
     def note_hush(self, device: int, program: str, why: str) -> None:
         """A program leaves a device alone, or with no reason no longer."""
@@ -145,11 +150,12 @@ class SharedFacts(FactsHeard):
     def give_stop(self, devices: Iterable[int], by: str) -> None:
         """Devices are stopped from here: what was meant for them before is void everywhere."""
         stopped = tuple(devices)
-        # counted before the voice is looked for: who finds one later tells the counts
+        # counted before it is told: a program that attaches in between tells the counts
         self.stops.give(self.me.id, stopped, by)
         self._leave_alone_no_more(stopped)
-        if self.voice is not None:
-            self.voice.stop_given(stopped, by)
+        when = max(self.stops.times.get(one, 0.0) for one in stopped) if stopped else None
+        counts = self.stops.of(self.me.id, stopped)
+        self._tell(StopGiven(stopped, counts, by[:MOST_TEXT], self.me, when))
 
     # Who commands
 
@@ -164,8 +170,7 @@ class SharedFacts(FactsHeard):
             if (other := self.commander(device)) is not None:
                 return commanded_by(device, other)
             self.note_commander(device, self.me.id)
-        if self.voice is not None:
-            self.voice.claim(device, True)
+        self._tell(Claim(device, True))
         return ""
 
     def release(self, device: int) -> None:
@@ -174,8 +179,7 @@ class SharedFacts(FactsHeard):
             if self.commanders.get(device) != self.me.id:
                 return
             self.note_commander(device, None)
-        if self.voice is not None:
-            self.voice.claim(device, False)
+        self._tell(Claim(device, False))
 
     def note_commander(self, device: int, program: str | None) -> None:
         """A program commands a device; None: nobody does."""
@@ -192,15 +196,13 @@ class SharedFacts(FactsHeard):
 
     def ask_for(self, device: int) -> None:
         """Ask the program that commands a device to leave it."""
-        if self.voice is not None:
-            self.voice.ask(device)
+        self._tell(AskedFor(device, self.me))
 
     def answer(self, device: int, program: str, *, yes: bool, why: str = "") -> None:
         """Answer a program that asked for a device which is commanded from here."""
         if yes:
             self.release(device)
-        if self.voice is not None:
-            self.voice.reply(device, program, yes, why)
+        self._tell(Granting(device, program, yes, why[:MOST_TEXT]))
 
     def hear_reply(self, device: int, why: str, *, yes: bool) -> None:
         """The program that commands a device has answered."""

@@ -44,7 +44,7 @@ from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .poll_messages import Polled
 from .polls_submitted import PollsSubmitted
-from .voices import ProgramVoice, give_up_own, tell_own
+from .voices import LineVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)
 
@@ -139,7 +139,7 @@ class ShareClient:
     def _greet(self) -> None:
         facts = self._inside.facts
         # first: what is given from here on is told by itself, what was before in the greeting
-        facts.voice = ProgramVoice(facts, self._soon, self._owner.socket)
+        facts.voice = LineVoice(self._soon, self._owner.socket)
         given, times = facts.stops.plain, facts.stops.late_times
         self._tell(Hello(VERSION, facts.me, label(self._inside.link), given, times))
 

@@ -37,7 +37,7 @@ from .place import OwnerLock, SharePlace, has_ended
 from .poll_messages import Subscribe, Unsubscribe
 from .polls_served import PollsServed
 from .signs import SignsOfLife
-from .voices import ProgramVoice
+from .voices import LineVoice
 
 log = logging.getLogger(__name__)
 
@@ -66,7 +66,7 @@ class ShareServer:
         """Listen. Raises OSError where no socket can be made."""
         facts = self._inside.facts
         facts.set_programs((facts.me,))
-        facts.voice = ProgramVoice(facts, self._say)
+        facts.voice = LineVoice(self._say)
         await self._listening.start()
         self._signs.start()
         self._miss_departed(ended=True)

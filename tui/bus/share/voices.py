@@ -1,83 +1,35 @@
-"""How what is done in one program reaches the others; called in any thread."""
+"""How what is done in one program reaches the others."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..bounds import MOST_NOTICE, MOST_TEXT
-from ..keep_alive import KeepAlive
-from ..leases import WriteLease
-from ..notes import LineNote
-from ..shared_facts import SharedFacts
-from .messages import (
-    AnyMessage,
-    Armed,
-    AskedFor,
-    Claim,
-    Granting,
-    Hush,
-    StopGiven,
-    Told,
-)
+from .messages import AnyMessage, Armed, Claim, Hush
 from .plain_stop import send_plain_stop
 
+if TYPE_CHECKING:
+    from ..shared_facts import SharedFacts
 
-class ProgramVoice:
-    """Makes messages of it for whoever hands them on; `send` may be called in any thread.
 
-    `holder` is the socket of another program that holds the line.
-    """
+@dataclass(eq=False, slots=True)
+class LineVoice:
+    """The way to the other programs on a line; used in any thread."""
 
-    def __init__(
-        self, facts: SharedFacts, send: Callable[[AnyMessage], None], holder: str = ""
-    ) -> None:
-        self._holder = holder
-        self._facts = facts
-        self._send = send
-
-    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
-        """Devices are stopped by this program."""
-        me, stops = self._facts.me, self._facts.stops
-        when = max(stops.times.get(one, 0.0) for one in devices) if devices else None
-        self._send(StopGiven(devices, stops.of(me.id, devices), by[:MOST_TEXT], me, when))
+    send: Callable[[AnyMessage], None]
+    """Has a message handed on to them."""
+    holder: str = ""
+    """The socket of another program that holds the line; empty if this one does."""
 
     def stop_directly(self, devices: tuple[int, ...]) -> None:
-        """Have another holder of the line stop devices; raises OSError, waits a moment at most."""
-        if self._holder:
-            send_plain_stop(Path(self._holder), devices)
+        """Have another holder of the line stop devices, around a loop that hangs here.
 
-    def claim(self, device: int, take: bool) -> None:
-        """This program commands a device now, or no longer."""
-        self._send(Claim(device, take))
-
-    def ask(self, device: int) -> None:
-        """This program wants a device that another one commands."""
-        self._send(AskedFor(device, self._facts.me))
-
-    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
-        """This program answers one that asked."""
-        self._send(Granting(device, program, yes, why[:MOST_TEXT]))
-
-    def hushed(self, device: int, why: str) -> None:
-        """A device is left alone by this program, or with no reason no longer."""
-        self._send(Hush(device, why[:MOST_NOTICE]))
-
-    def armed(self, device: int, lease: WriteLease) -> None:
-        """This program may write to a device until a time, or no more if that is over."""
-        self._send(Armed(device, lease.stamp, lease.until, lease.care))
-
-    def kept_alive(self, one: KeepAlive) -> None:
-        """This program has a device kept alive, or no more."""
-        self._send(one)
-
-    def told(self, device: int, text: str) -> None:
-        """This program has something for all to read."""
-        self._send(Told(device, text[:MOST_TEXT]))
-
-    def noted(self, note: LineNote) -> None:
-        """This program leaves a note, or asks for some."""
-        self._send(note)
+        Raises OSError; waits a moment at most.
+        """
+        if self.holder:
+            send_plain_stop(Path(self.holder), devices)
 
 
 def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
