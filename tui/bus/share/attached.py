@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from ..bounds import MOST_BYTES, MOST_FRAMES
+from ..bounds import MOST_FRAMES
 from ..errors import RequestRefused
 from ..holder_heard import LeftListener
 from ..limits import CAUTIOUS, Limits
@@ -26,8 +26,8 @@ from .messages import (
     Failed,
     News,
     NoMessage,
-    SeenFrame,
     packed,
+    seen_frames,
 )
 from .owner_watch import is_stop
 from .request_forms import asked_request
@@ -166,14 +166,9 @@ class Client:
             state = inside.devices.state(device)
             if self.known.get(device) != state:
                 self.known[device] = changed[device] = state
-        frames: tuple[SeenFrame, ...] = ()
         count = inside.around.trace.count
-        if self.trace:
-            new = min(count - self.frames, MOST_FRAMES)
-            last = inside.around.trace.frames()[-new:] if new else ()
-            frames = tuple(
-                (one.time, one.direction, one.data[:MOST_BYTES], one.note) for one in last
-            )
+        new = min(count - self.frames, MOST_FRAMES) if self.trace else 0
+        frames = seen_frames(inside.around.trace.frames()[-new:]) if new else ()
         self.frames = count
         counters = inside.around.tally.frozen()
         counted = {d: one for d, one in counters.devices.items() if self.counted.get(d) != one}

@@ -15,10 +15,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from ..bounds import MOST_BYTES, MOST_FRAMES
+from ..bounds import MOST_FRAMES
 from ..notes import NOTES_A_LOOK, LineNote
 from ..trace import Frame
-from .messages import LENGTH, LONGEST_MESSAGE, SeenFrame
+from .messages import LENGTH, LONGEST_MESSAGE, SeenFrame, seen_frames
 from .place import Owner, reached
 
 PAST_HEAD = b"PAST"
@@ -41,9 +41,7 @@ async def send_past(
     """Send the past in pieces, so that the line has its turns in between; the first is empty."""
     await _send(writer, LinePast())
     for at in range(0, len(frames), MOST_FRAMES):
-        some = frames[at : at + MOST_FRAMES]
-        seen = tuple((one.time, one.direction, one.data[:MOST_BYTES], one.note) for one in some)
-        await _send(writer, LinePast(frames=seen))
+        await _send(writer, LinePast(frames=seen_frames(frames[at : at + MOST_FRAMES])))
     for at in range(0, len(notes), NOTES_A_LOOK):
         await _send(writer, LinePast(notes=tuple(notes[at : at + NOTES_A_LOOK])))
 
@@ -68,10 +66,7 @@ def line_past(owner: Owner) -> tuple[tuple[Frame, ...], tuple[LineNote, ...]]:
         with connection.makefile("rb") as pieces:
             while len(frames) < FRAMES_KEPT and (head := pieces.read(LENGTH)):
                 piece = _piece(pieces.read(min(int.from_bytes(head, "big"), LONGEST_MESSAGE)))
-                frames += [
-                    Frame(time, "out" if direction == "out" else "in", data, note)
-                    for time, direction, data, note in piece.frames
-                ]
+                frames += [Frame(*one) for one in piece.frames]
                 notes += piece.notes
                 received = True
                 connection.settimeout(max(0.01, end - monotonic()))

@@ -6,12 +6,14 @@ Times are those of the machine's monotonic clock, which all its programs share.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
 
 from ..bounds import (
+    MOST_BYTES,
     MOST_DEVICES,
     MOST_FRAMES,
     MOST_PROGRAMS,
@@ -37,7 +39,7 @@ from ..limits import Limits
 from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
 from ..notes import LineNote
 from ..program import Program
-from ..trace import FrameDirection
+from ..trace import Frame, FrameDirection
 from .failures import ErrorForm
 from .poll_messages import Polled, Subscribe, Unsubscribe
 
@@ -48,6 +50,7 @@ LONGEST_MESSAGE = 1 << 22
 LENGTH = 4
 
 SeenFrame = tuple[MonotonicTime, FrameDirection, ByteString, Word]
+"""The fields of a Frame."""
 
 
 class Message(msgspec.Struct, frozen=True, tag=True):
@@ -274,6 +277,11 @@ _DECODER: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessa
 
 class NoMessage(Exception):
     """Bytes that are no message of ours."""
+
+
+def seen_frames(frames: Iterable[Frame]) -> tuple[SeenFrame, ...]:
+    """Frames as messages carry them."""
+    return tuple((one.time, one.direction, one.data[:MOST_BYTES], one.note) for one in frames)
 
 
 def packed(message: AnyMessage) -> bytes:

@@ -28,10 +28,8 @@ class NewsHeard:
             inside.devices.copy(device, state)
         inside.around.tally.copy(news.counters, news.counted)
         inside.pace.others, inside.pace.stretch = news.shares, news.stretch
-        for time, direction, data, note in news.frames:
-            inside.around.trace.append(
-                Frame(time, "out" if direction == "out" else "in", data, note)
-            )
+        for one in news.frames:
+            inside.around.trace.append(Frame(*one))
         if news.state != self._state:
             self._state = news.state
             self._failure = error_of(*news.failure) if news.failure is not None else None
