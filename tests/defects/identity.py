@@ -14,6 +14,14 @@ BYTES = "tests/session/test_byte_order.py"
 
 DEFECTS = (
     Defect(
+        "family-guessed-after-a-sick-minute",
+        "tui/session/connect/identifying.py",
+        "or (healthy and _is_sick(line, device)):",
+        "or (healthy and _is_sick(line, device) and False):",
+        "An ATV71 on a line that has just lost frames is shown as a Leroy-Somer drive.",
+        ("tests/session/test_find_drive.py::test_silence_after_a_sick_minute_infers_no_family",),
+    ),
+    Defect(
         "swapped-bytes-armed",
         "tui/session/arming.py",
         "        if why := self.trouble():\n",

@@ -6,7 +6,14 @@ from typing import Any
 
 import pytest
 
-from tui.bus.api import IdentificationObjects, LineCounters, Priority, Reply
+from tui.bus.api import (
+    DeviceCounters,
+    IdentificationObjects,
+    LastMinute,
+    LineCounters,
+    Priority,
+    Reply,
+)
 from tui.bus.errors import ChecksumFault, ExchangeError, NoAnswer, WrongReply
 from tui.bus.fake import FakeLine
 from tui.bus.requests import Identify, Read, ReportId
@@ -198,3 +205,29 @@ async def test_silence_after_damage_identifies_nothing() -> None:
     line = DamagedThenSilent({1: {STATUS: 0}})
     with pytest.raises(ChecksumFault, match="No identification"):
         await identify_drive(line, 1)
+
+
+@pytest.mark.parametrize(
+    "minute",
+    [LastMinute(damaged=1), LastMinute(foreign=1), LastMinute(strays=1), LastMinute(lost=1)],
+)
+async def test_silence_after_a_sick_minute_infers_no_family(minute: LastMinute) -> None:
+    line = FakeLine({1: {STATUS: 0}})
+    line.counters = LineCounters(minute=minute)
+    line.fail_identify(1, LOST)
+    result = await found(line)
+    assert result.identity is not None
+    assert result.identity.candidates == ()
+    assert "No identification of device 1 came through" in result.error
+    with pytest.raises(ChecksumFault, match="No identification"):
+        await identify_drive(line, 1)
+
+
+async def test_misses_of_the_drive_itself_do_not_hide_its_family() -> None:
+    own = LastMinute(good=2, lost=3)
+    line = FakeLine({1: {STATUS: 0}})
+    line.counters = LineCounters(minute=own, devices={1: DeviceCounters(minute=own)})
+    line.fail_identify(1, LOST)
+    result = await found(line)
+    assert result.identity is not None
+    assert result.identity.candidates == ("powerdrive", "varmeca")

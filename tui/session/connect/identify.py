@@ -87,7 +87,7 @@ async def identify_drive(
         there = await _nameless_families(line, device, priority)
     answer = await ask_identification(
         line, device, partial(_is_intact, line, device, there, priority), priority=priority,
-        tries=left,
+        tries=left, healthy=bool(there.families),
     )  # fmt: skip
     if answer is not None:
         return await identity_told(device, answer)
@@ -136,7 +136,7 @@ async def _identified(
         if answer is None:
             answer = await ask_identification(
                 line, device, control, priority=priority, within=likely, function=function,
-                tries=TRIES if function == IDENTIFY else 1,
+                tries=TRIES if function == IDENTIFY else 1, healthy=bool(there.families),
             )  # fmt: skip
         if answer is not None and (answer.objects.get(REFERENCE) or function == IDENTIFY):
             return ScanResult(device, await identity_told(device, answer), by=how)

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from tui.bus.api import IdentificationObjects, LineCounters, Priority, Reply
+from tui.bus.api import (
+    DeviceCounters,
+    IdentificationObjects,
+    LineCounters,
+    Priority,
+    Reply,
+)
 from tui.bus.errors import (
     ChecksumFault,
     DeviceException,
@@ -76,11 +82,13 @@ async def ask_identification(
     function: int = IDENTIFY,
     tries: int = TRIES,
     silences: int = TRIES,
+    healthy: bool = False,
 ) -> IdentificationObjects | None:
     """The identification of a device that is there; None if it has none.
 
     It has none if it refuses the function, or is silent `silences` times on a line that carried
-    all other frames intact. Raises ChecksumFault or WrongReply if nothing is decided.
+    all other frames intact. With `healthy`, it must have done so for the last minute.
+    Raises ChecksumFault or WrongReply if nothing is decided.
     """
     damage = _damage(line)
     unclear: ExchangeError | None = None
@@ -99,7 +107,7 @@ async def ask_identification(
                 break
     if unclear is not None:
         raise unclear
-    if _damage(line) != damage:
+    if _damage(line) != damage or (healthy and _is_sick(line, device)):
         raise NotIdentified(device, function)
     return None
 
@@ -118,3 +126,14 @@ async def intact(request: Awaitable[object]) -> bool:
 def _damage(line: Askable) -> int:
     """Replies on the line that came damaged, or that were another's."""
     return line.counters.checksum + line.counters.wrong
+
+
+def _is_sick(line: Askable, device: int) -> bool:
+    """True if the last minute of the line explains a silence of this device otherwise.
+
+    What the device itself missed does not count: one without the function misses each request.
+    """
+    counted = line.counters
+    own = counted.devices.get(device, DeviceCounters()).minute.lost
+    minute = counted.minute
+    return bool(minute.damaged or minute.foreign or minute.strays) or minute.lost > own
