@@ -7,12 +7,13 @@ from contextlib import contextmanager
 
 import pytest
 
+from tui.bus.api import DeviceCounters, LastMinute, LineCounters
 from tui.bus.line import Line
 from tui.bus.link import parse_link
 from tui.bus.trace import Frame
 from tui.drive.profile import library
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
-from tui.session.diagnosis.examining import examine_line
+from tui.session.diagnosis.examining import CLEAN_READS, LEAST_READS, clean_reads, examine_line
 from tui.session.diagnosis.measure import Measure, measure_of
 from tui.simulator import DriveSpec, Simulation, troubles_of
 from tui.wire.frames import frame
@@ -150,11 +151,13 @@ def test_a_missing_reply_of_a_slow_drive_is_late() -> None:
 
 
 @contextmanager
-def opened(troubles: Mapping[str, float], scheme: str, served: str = "") -> Iterator[Line]:
+def opened(
+    troubles: Mapping[str, float], scheme: str, served: str = "", seed: int = 0
+) -> Iterator[Line]:
     """A line to an Altivar 71 at address 2 with these troubles."""
     rates, habits = troubles_of(troubles)
     drive = DriveSpec("atv71", 2)
-    with Simulation([drive], faults=rates, habits=habits) as simulation:
+    with Simulation([drive], faults=rates, habits=habits, seed=seed) as simulation:
         tcp = (served or scheme) == "tcp"
         host, port = simulation.serve_tcp() if tcp else simulation.serve_rtu_tcp()
         line = Line(parse_link(f"{scheme}:{host}:{port}"))
@@ -223,6 +226,44 @@ async def test_no_connection_is_made_beside_a_line_that_answers(
 async def test_an_idle_timeout_is_found() -> None:
     with opened({"idle-close": 1}, "tcp") as line:
         assert (await found_on(line)).rung == "idle-close"
+
+
+async def test_reads_end_early_once_clean_ones_exclude_a_poor_line() -> None:
+    with opened({}, "rtu-tcp") as line:
+        measure = (await found_on(line, reads=200)).sight.measure
+        assert measure is not None
+        # the few reads before, and the proof of the step, count too
+        assert CLEAN_READS - 10 <= measure.asked <= CLEAN_READS
+        again = (await found_on(line, reads=200)).sight.measure
+        assert again is not None
+        assert LEAST_READS <= again.asked < measure.asked
+
+
+def test_clean_reads_are_fewer_only_after_a_minute_without_trouble() -> None:
+    own = DeviceCounters(minute=LastMinute(good=99))
+
+    def reads(**line: int) -> int:
+        minute = LastMinute(good=200, **line)
+        return clean_reads(LineCounters(minute=minute, devices={2: own}), 2)
+
+    assert (reads(), reads(foreign=1), reads(strays=1), reads(damaged=1)) == (50, 149, 149, 149)
+    assert clean_reads(LineCounters(), 2) == 149
+
+
+@pytest.mark.parametrize("trouble", ["corrupted", "duplicated"])
+async def test_one_sick_reply_keeps_the_reads_going(trouble: str) -> None:
+    with opened({trouble: 0.02}, "rtu-tcp", seed=3) as line:
+        measure = (await found_on(line, reads=200)).sight.measure
+        assert measure is not None
+        assert measure.worst
+        assert measure.asked > 149
+
+
+async def test_well_gateway_names_the_idle_time_that_was_tried() -> None:
+    with opened({"idle-close": 30}, "tcp") as line:
+        found = await found_on(line)
+    assert found.well
+    assert "for 3 s without a request" in found.text
 
 
 async def test_each_second_request_lost_is_not_well() -> None:

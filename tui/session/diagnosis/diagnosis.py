@@ -52,4 +52,6 @@ def diagnosed(sight: Sight) -> Diagnosis:
     sent = heard.asked + (measure.asked if measure is not None else 0)
     answered = heard.answered + (measure.answered if measure is not None else 0)
     text = f"Address {sight.device} answers: {answered} of {sent} requests{after}."
+    if sight.idle:
+        text += f" The gateway kept the connection for {sight.idle:.0f} s without a request."
     return Diagnosis(ANSWERS, text, (), sight)

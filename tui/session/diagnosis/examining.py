@@ -9,8 +9,9 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from math import ceil, log
 
-from tui.bus.api import LineStatus, ModbusLine
+from tui.bus.api import DeviceCounters, LineCounters, LineStatus, ModbusLine
 from tui.bus.errors import ONE_BEHIND, LineError, LineLost
 from tui.bus.link import SerialLink, TcpLink
 from tui.drive.errors import DriveError
@@ -30,6 +31,11 @@ from .sight import Sight
 SHORT_READS = 200
 MEASURE_WITHIN = 6.0
 """Seconds that the reads may take."""
+EXCLUDED, RISK = 0.02, 0.05
+"""Share of sick replies from which a line is poor, and the risk of missing it in clean reads."""
+CLEAN_READS = ceil(log(RISK) / log(1 - EXCLUDED))
+LEAST_READS = 50
+"""Reads beside the replies that the last minute of the drive has counted."""
 PAUSED_READS, PAUSE, PAUSED_WITHIN = 16, 0.1, 4.0
 """Reads with pauses, in s, that tell copies of replies from those of a second drive."""
 RECONNECTED_WITHIN = 3.0
@@ -108,7 +114,8 @@ async def _measured(line: ModbusLine, sight: Sight, reads: int) -> Sight:
         echoes=bool(sight.heard.echoed),
         unreached=gateway_codes(profile),
     )
-    short = await _read(line, device, profile, reads, MEASURE_WITHIN)
+    clean = clean_reads(line.counters, device)
+    short = await _read(line, device, profile, reads, MEASURE_WITHIN, clean=clean)
     measure = count(short.frames, seconds=short.seconds)
     measure.turns = short.turns
     measure.swapped, measure.straight = short.swapped
@@ -122,7 +129,19 @@ async def _measured(line: ModbusLine, sight: Sight, reads: int) -> Sight:
         measure=measure,
         overheard=others.text if others.requests else "",
         idle_closed=not isinstance(line.link, SerialLink) and await _closes_idle(line),
+        idle=0.0 if isinstance(line.link, SerialLink) else IDLE,
     )
+
+
+def clean_reads(counted: LineCounters, device: int) -> int:
+    """Reads that are enough if all are good: so many replies exclude a poor line.
+
+    Good replies of the last minute count, if there were no others.
+    """
+    line = counted.minute
+    own = counted.devices.get(device, DeviceCounters()).minute
+    well = own.whole_share == 1.0 and line.share == 1.0 and not (line.foreign or line.strays)
+    return max(LEAST_READS, CLEAN_READS - own.good * well)
 
 
 async def _read(
@@ -132,10 +151,11 @@ async def _read(
     reads: int,
     within: float,
     pause: float = 0.0,
+    clean: int | None = None,
 ) -> ShortReads:
     """Short reads, with their frames."""
     short = ShortReads(line, device, profile, last=last_time(line.trace))
-    await short.read(reads, within, pause=pause)
+    await short.read(reads, within, pause=pause, clean=clean)
     await REAL_CLOCK.sleep(FRAMES_COME_WITHIN)
     short.take_frames()
     return short

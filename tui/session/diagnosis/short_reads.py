@@ -69,9 +69,14 @@ class ShortReads:
     last: float = 0.0
     """Time of the last frame that was taken."""
 
-    async def read(self, reads: int, within: float, *, pause: float = 0.0) -> None:
-        """Read so many times, in turns of all shapes, for so long at most."""
-        shapes, held = _shapes(self), self.line.timing.late_reply
+    async def read(
+        self, reads: int, within: float, *, pause: float = 0.0, clean: int | None = None
+    ) -> None:
+        """Read so many times, in turns of all shapes, for so long at most.
+
+        `clean` reads are enough if nothing at all was wrong with them.
+        """
+        shapes, held, sick = _shapes(self), self.line.timing.late_reply, _sick(self.line)
         began, misses = REAL_CLOCK.monotonic(), 0
         for number in range(reads):
             now = REAL_CLOCK.monotonic()
@@ -80,6 +85,8 @@ class ShortReads:
                 or misses >= MISSES_IN_A_ROW
                 or self.line.state.status is LineStatus.CLOSED
             ):
+                break
+            if number == clean and _sick(self.line) == sick and not self.swapped[0]:
                 break
             free = [one for one in shapes if now - one.missed >= held]
             shape = min(free, key=lambda one: one.times) if free else _longest_ago(shapes)
@@ -147,6 +154,13 @@ class ShortReads:
             for at, raw in enumerate(raws)
             if at > 1
         )
+
+
+def _sick(line: ModbusLine) -> int:
+    """The number of replies on the line so far that were not as they must be, or refusals."""
+    now = line.counters
+    missed = now.timeouts + now.checksum + now.wrong + now.exceptions
+    return missed + now.stale + now.resyncs + now.framing + now.parity + now.breaks
 
 
 def _delays(frames: Sequence[Frame], device: int) -> Iterator[float]:

@@ -108,7 +108,7 @@ SICK_RUNGS: tuple[Rung, ...] = (
     Rung(
         "idle-close",
         lambda s: s.idle_closed,
-        lambda s: "The gateway closes a connection on which nothing is sent for some seconds.",
+        lambda s: f"The gateway closes a connection on which nothing is sent for {s.idle:.0f} s.",
         steps.keep_connection,
         lambda _: LIKELY,
         ("Its network was cut at that moment.", "It serves one client, and another one came."),

@@ -64,6 +64,8 @@ class Sight:
     """True if the line was named as one whose replies are one behind."""
     idle_closed: bool = False
     """True if the connection was closed as nothing was sent."""
+    idle: float = 0.0
+    """Seconds for which no request was sent, to see that; 0 if it was not tried."""
     neighbours: tuple[int, ...] = ()
     """Other addresses of this line that answer."""
 
