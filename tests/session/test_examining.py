@@ -9,12 +9,14 @@ import pytest
 
 from tui.bus.api import DeviceCounters, LastMinute, LineCounters
 from tui.bus.line import Line
-from tui.bus.link import parse_link
+from tui.bus.link import RtuTcpLink, parse_link
 from tui.bus.trace import Frame
 from tui.drive.profile import library
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
 from tui.session.diagnosis.examining import CLEAN_READS, LEAST_READS, clean_reads, examine_line
+from tui.session.diagnosis.heard import Heard
 from tui.session.diagnosis.measure import Measure, measure_of
+from tui.session.diagnosis.sight import Sight
 from tui.simulator import DriveSpec, Simulation, troubles_of
 from tui.wire.frames import frame
 
@@ -269,6 +271,19 @@ async def test_well_gateway_names_the_idle_time_that_was_tried() -> None:
 async def test_each_second_request_lost_is_not_well() -> None:
     with opened({"lost-every": 2}, "rtu-tcp") as line:
         assert (await found_on(line, reads=12)).rung == "lost"
+
+
+async def test_two_drives_are_not_named_as_one_behind() -> None:
+    with opened({"twin": 1}, "rtu-tcp", seed=8) as line:
+        assert (await found_on(line, None)).rung == "two-drives"
+
+
+@pytest.mark.parametrize(("second", "rung"), [(0, "behind"), (1, "behind"), (5, "two-drives")])
+def test_surplus_replies_contradict_a_line_one_behind(second: int, rung: str) -> None:
+    measure = Measure(asked=8, answered=4, damaged=4, second=second)
+    heard = Heard(asked=3, answered=3)
+    sight = Sight(RtuTcpLink("h", 1), 2, heard=heard, measure=measure, behind=True)
+    assert diagnosed(sight).rung == rung
 
 
 async def test_a_line_one_behind_is_named() -> None:

@@ -33,6 +33,14 @@ def _works(sight: Sight) -> Works:
     return sight.works
 
 
+def _is_behind(sight: Sight) -> bool:
+    """True if the line or the reads say so; no line that is one behind has surplus replies."""
+    count = sight.measure
+    if count is None:
+        return sight.behind
+    return count.one_behind or (sight.behind and not count.two_drives)
+
+
 def _says_behind(sight: Sight) -> str:
     count = sight.measure
     if sight.behind or count is None:
@@ -69,7 +77,7 @@ GATEWAY_RUNGS = (
     ),
     Rung(
         "behind",
-        lambda s: s.behind or (s.measure is not None and s.measure.one_behind),
+        _is_behind,
         _says_behind,
         steps.restart_converter,
         _sureness_of_behind,
