@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from textual.widgets import OptionList
 
+from tui.bus.link import RtuTcpLink
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.keys.finding import find
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.wiring.screen import WiringScreen
+from tui.session.diagnosis import examining
+from tui.session.diagnosis.heard import Heard
+from tui.session.diagnosis.measure import Measure
+from tui.session.diagnosis.sight import Sight
 
 from .test_frame import Panel, panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
@@ -31,6 +38,32 @@ async def test_the_page_of_the_open_drive_with_its_model() -> None:
         await made.until(lambda: "kW" in made.shown("title"))
         await made.pilot.press("escape")
         await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
+
+
+async def test_verdict_of_n_is_the_first_section_until_the_drive_is_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = [Sight(RtuTcpLink("h", 1), 1, heard=Heard(asked=40, answered=30), measure=Measure(
+        asked=40, answered=30, lost=10, seconds=2.0))]  # fmt: skip
+    seen.append(replace(seen[0], measure=Measure(asked=40, answered=40)))
+
+    async def examined(*_: object, **__: object) -> Sight:
+        return seen.pop(0)
+
+    monkeypatch.setattr(examining, "examine_line", examined)
+    async with panel() as made:
+        await wiring(made)
+        assert made.shown("page").splitlines()[0] == " Warnings"
+        await made.pilot.press("N")
+        await made.until(lambda: "10 of 40 requests got no reply" in made.shown("reasons"))
+        await made.pilot.press("escape")
+        await made.until(lambda: made.shown("page").startswith(" Trouble, measured at"))
+        assert "10 of 40 requests got no reply" in made.shown("page")
+        assert "Check the wires" in made.shown("page")
+        await made.pilot.press("N")
+        await made.until(lambda: "answers: 70 of 80" in made.shown("reasons"))
+        await made.pilot.press("escape")
+        await made.until(lambda: made.shown("page").startswith(" Warnings"))
 
 
 @pytest.mark.sweep

@@ -14,6 +14,7 @@ from .dialogs.why_target import WhyTarget
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
+    from tui.session.console import DriveConsole
     from tui.session.diagnosis.diagnosis import Diagnosis
 
     from .app_port import Panel
@@ -36,12 +37,12 @@ def ask_why(app: Panel) -> None:
 
     label = target.opened.label if target.opened is not None else target.text
     about = f"Why no answer? Address {target.device} on {label}"
-    app.push_screen(WhyScreen(about, partial(_looked, target)))
+    app.push_screen(WhyScreen(about, partial(_kept, app, target)))
 
 
 def _open_drive(app: Panel) -> WhyTarget | None:
-    """The drive that is open."""
-    console = app.chosen
+    """The drive that a screen is about, else the one that is open."""
+    console: DriveConsole | None = getattr(app.screen, "console", None) or app.chosen
     if console is None or app.opened is None:
         return None
     session, found = console.session, app.fleet.found if app.fleet is not None else {}
@@ -52,6 +53,16 @@ def _open_drive(app: Panel) -> WhyTarget | None:
         session.profile.id,
         tuple(one for one in found if one != session.device),
     )
+
+
+async def _kept(app: Panel, target: WhyTarget) -> Diagnosis:
+    """The diagnosis, which the drive keeps for its Wiring page."""
+    found = await _looked(target)
+    fleet = app.fleet
+    console = fleet.console(target.device) if fleet is not None else None
+    if target.opened is not None and target.opened is app.opened and console is not None:
+        console.diagnosis, console.diagnosed_at = found, app.clock.wall()
+    return found
 
 
 async def _looked(target: WhyTarget) -> Diagnosis:

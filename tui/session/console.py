@@ -22,6 +22,7 @@ from .teaching.teacher import Teacher
 if TYPE_CHECKING:
     from .blocks.editor import BlockEditor
     from .counters.watch import CounterWatch
+    from .diagnosis.diagnosis import Diagnosis
     from .settings.editor import Editor
 
 
@@ -33,6 +34,10 @@ class DriveConsole:
     journal: Journal
     proved: str = ""
     """What the last proof of its communication loss came to, in a few words."""
+    diagnosis: Diagnosis | None = None
+    """The last verdict on why it does not answer, or not well; None before the first."""
+    diagnosed_at: float = 0.0
+    """Wall time of that verdict."""
 
     def __post_init__(self) -> None:
         self.monitor = Monitor(self.session)

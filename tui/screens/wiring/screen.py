@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from textual.app import ComposeResult
+from textual.events import ScreenResume
 
 from tui.bus.errors import LineError
 from tui.drive.family_page import PageLine, family_page, page_lines
@@ -17,7 +18,7 @@ from tui.widgets.lines import Lines
 
 from ..base import PanelScreen
 from ..keys.table import WIRING, bindings
-from .view import section_tops, wiring_lines
+from .view import section_tops, trouble_sections, wiring_lines
 
 
 class WiringScreen(PanelScreen):
@@ -33,7 +34,8 @@ class WiringScreen(PanelScreen):
         self._profile: Profile = console.session.profile
         self._sections = family_page(self._profile)
         self._page: list[PageLine] = []
-        self._width = 0
+        self._drawn: tuple[int, float] = (0, 0.0)
+        """Width of the page, and the time of the verdict on it."""
         self._model = ""
         self._top = 0
 
@@ -45,6 +47,11 @@ class WiringScreen(PanelScreen):
     def on_mount(self) -> None:
         """Ask the drive for its model, once."""
         self.run_worker(self._ask_model(), group="model")
+
+    def on_screen_resume(self, event: ScreenResume) -> None:
+        """Show the verdict of N, whose dialog has closed."""
+        super().on_screen_resume(event)
+        self.call_after_refresh(self.look)
 
     async def _ask_model(self) -> None:
         codes = model_codes(self._profile)
@@ -61,9 +68,13 @@ class WiringScreen(PanelScreen):
     def draw(self, width: int) -> None:
         """The page from where the person has scrolled to."""
         super().draw(width)
-        if width != self._width:
-            self._page = page_lines(self._sections, width - 1)
-            self._width = width
+        at = self.console.diagnosed_at
+        if (width, at) != self._drawn:
+            if at != self._drawn[1]:
+                self._top = 0
+            found = trouble_sections(self.console.diagnosis, at)
+            self._page = page_lines([*found, *self._sections], width - 1)
+            self._drawn = width, at
         room = self._room()
         self._top = max(0, min(self._top, len(self._page) - room))
         named = f"{self._profile.vendor} {self._profile.name}"

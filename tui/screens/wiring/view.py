@@ -2,12 +2,31 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from tui.drive.family_page import PageLine
+from tui.drive.family_page import PageLine, PageRow, PageSection
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+
+if TYPE_CHECKING:
+    from tui.session.diagnosis.diagnosis import Diagnosis
+
+
+def trouble_sections(found: Diagnosis | None, wall: float) -> list[PageSection]:
+    """The verdict of N with its steps, measured at this time; none if the drive answers well."""
+    if found is None or found.well:
+        return []
+    rows = [PageRow("!", found.text, warns=True)]
+    if found.others:
+        rows.append(PageRow("Certainty", f"{found.certainty}. It could also be:"))
+        rows += [PageRow("", other) for other in found.others]
+    heads = ["Next steps", *("" for _ in found.steps)]
+    rows += [PageRow(head, step) for head, step in zip(heads, found.steps, strict=False)]
+    at = time.strftime("%H:%M:%S", time.localtime(wall))
+    return [PageSection(f"Trouble, measured at {at}", tuple(rows))]
 
 
 def wiring_lines(page: Sequence[PageLine]) -> list[Text]:
