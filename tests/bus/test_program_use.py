@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,10 +14,10 @@ import pytest
 
 from tui.bus.bounds import MOST_PROGRAMS
 from tui.bus.line import Line
-from tui.bus.model import LineCounters
+from tui.bus.model import LastMinute, LineCounters
 from tui.bus.program import KEEPER, Program
 from tui.bus.program_use import USE_WINDOW, ProgramUse, use_by_program
-from tui.bus.share.line_clients import LineClient, line_clients, look_answer
+from tui.bus.share.line_clients import LineClient, LineLook, line_look, look_answer
 from tui.bus.share.place import Owner, owner_of_lock
 
 from .conftest import Share
@@ -69,8 +70,11 @@ def test_a_request_of_no_program_leaves_the_counters_a_message() -> None:
 
 def test_answer_to_a_look_names_programs_and_not_the_keeper() -> None:
     programs = [Program("k", KEEPER, 1), Program("a", "watch\n", 3), Program("b", "serve", 2)]
-    found = msgspec.json.decode(look_answer(programs, {"b": 0.5, "k": 0.1}), type=list[LineClient])
-    assert found == [LineClient("serve", 2, 0.5), LineClient("watch?", 3, 0.0)]
+    minute = LastMinute(good=9, lost=1)
+    answer = look_answer(programs, {"b": 0.5, "k": 0.1}, minute)
+    found = msgspec.json.decode(answer, type=LineLook)
+    assert found.clients == [LineClient("serve", 2, 0.5), LineClient("watch?", 3, 0.0)]
+    assert found.minute == minute
 
 
 async def test_attached_programs_and_a_look_have_the_shares(share: Share) -> None:
@@ -90,18 +94,39 @@ async def test_attached_programs_and_a_look_have_the_shares(share: Share) -> Non
         found = {one for one, _ in use_by_program(owner.facts.programs, shares)}
         assert {one.id for one in found} == ids
         answer = await asyncio.to_thread(clients, lines)
-        assert {one.program for one in answer} == {"serve", "panel"}
-        assert all(one.share > 0.0 for one in answer)
+        assert {one.program for one in answer.clients} == {"serve", "panel"}
+        assert all(one.share > 0.0 for one in answer.clients)
+        assert answer.minute is not None
+        assert answer.minute.good >= 5
 
 
-def clients(lines: SharedLines) -> list[LineClient]:
+def clients(lines: SharedLines) -> LineLook:
     """The answer to a program that looks at the line."""
     (lock,) = (lines.folder / "lines").glob("*.lock")
     owner = owner_of_lock(lock)
     assert owner is not None
-    found = line_clients(owner)
+    found = line_look(owner)
     assert found is not None
     return found
+
+
+def test_look_at_a_holder_of_an_older_version_has_no_minute(tmp_path: Path) -> None:
+    old = msgspec.json.encode([LineClient("watch", 3, 0.5)])
+
+    def answer() -> None:
+        connection, _ = listening.accept()
+        with connection:
+            connection.recv(4)
+            connection.sendall(old)
+
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        thread = threading.Thread(target=answer)
+        thread.start()
+        found = line_look(Owner(1, Program("k", KEEPER, 1), str(tmp_path / "s")))
+        thread.join()
+    assert found == LineLook([LineClient("watch", 3, 0.5)])
 
 
 def test_look_without_an_answer_returns_none(tmp_path: Path) -> None:
@@ -110,6 +135,6 @@ def test_look_without_an_answer_returns_none(tmp_path: Path) -> None:
         listening.bind(str(tmp_path / "s"))
         listening.listen()
         begun = time.monotonic()
-        assert line_clients(Owner(1, holder, str(tmp_path / "s"))) is None
+        assert line_look(Owner(1, holder, str(tmp_path / "s"))) is None
         assert time.monotonic() - begun < 5
-    assert line_clients(Owner(1, holder, str(tmp_path / "none"))) is None
+    assert line_look(Owner(1, holder, str(tmp_path / "none"))) is None

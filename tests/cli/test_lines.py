@@ -12,8 +12,14 @@ from click.shell_completion import ShellComplete
 from tests.adapters import Adapters, adapters
 from tests.programs import drivepanel
 from tests.sweeps import kept
+from tui.bus.model import LastMinute
+from tui.bus.program import Program
+from tui.bus.share import line_clients
+from tui.bus.share.line_clients import LineLook
+from tui.bus.share.place import Owner
 from tui.cli.main import main
 from tui.cli.shared.lines import is_line
+from tui.session.connect import share_place
 from tui.session.connect.known_lines import load_memory
 from tui.session.connect.named_lines import settings_file
 
@@ -297,3 +303,20 @@ def test_a_name_opens_the_panel_and_a_word_that_is_none_does_not() -> None:
     settings("[broken")
     assert is_line("pump")
     assert "settings.toml:1" in refused(2, "pump")
+
+
+def test_open_line_shows_the_replies_of_its_last_minute(monkeypatch: pytest.MonkeyPatch) -> None:
+    owners = {
+        "tcp:a:502": LineLook([], LastMinute(good=19, lost=1)),
+        "tcp:b:502": LineLook([]),
+        "tcp:c:502": None,
+    }
+    held = [Owner(1, Program("k", "keeper", 7), "", line=line) for line in owners]
+    monkeypatch.setattr(share_place, "owners", lambda: held)
+    monkeypatch.setattr(line_clients, "line_look", lambda owner: owners[owner.line])
+    minutes = [one["last_minute"] for one in json.loads(run(0, "lines", "--json"))["open"]]
+    assert minutes[1:] == [None, None]
+    assert (minutes[0]["share"], minutes[0]["good"], minutes[0]["lost"]) == (0.95, 19, 1)
+    text = run(0, "lines")
+    assert text.count("replies good") == 1
+    assert "19 of 20 replies good in the last minute" in text

@@ -83,8 +83,10 @@ class Greeting:
                 await self._hear_stop(reader, writer)
                 return None
             if head == LOOK_HEAD and not self._is_stranger(writer):
-                shares = self._inside.around.tally.use.shares
-                writer.write(look_answer(self._inside.facts.programs, shares))
+                tally = self._inside.around.tally
+                minute = tally.minute.total(tally.clock())
+                programs = self._inside.facts.programs
+                writer.write(look_answer(programs, tally.use.shares, minute))
                 return None
             if head == PAST_HEAD and not self._is_stranger(writer):
                 frames = self._inside.around.trace.frames()

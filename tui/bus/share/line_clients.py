@@ -1,4 +1,4 @@
-"""The programs on a line, asked for without being attached: each with its share of the line.
+"""The programs and the last minute of a line, asked for without being attached.
 
 A program sends LOOK_HEAD in place of a Hello. The answer is JSON, then the connection closes.
 """
@@ -12,6 +12,7 @@ from time import monotonic
 import msgspec
 
 from ..bounds import Number, Share, Word
+from ..model import LastMinute
 from ..program import LONGEST_NAME, Program, readable
 from ..program_use import use_by_program
 from .place import Owner, reached
@@ -30,17 +31,26 @@ class LineClient(msgspec.Struct, frozen=True):
     share: Share
 
 
-def look_answer(programs: Iterable[Program], shares: Mapping[str, float]) -> bytes:
+class LineLook(msgspec.Struct, frozen=True):
     """The answer to a program that looks."""
-    return msgspec.json.encode(
-        [
-            LineClient(readable(one.name, LONGEST_NAME), one.pid, round(share, 3))
-            for one, share in use_by_program(programs, shares)
-        ]
-    )
+
+    clients: list[LineClient]
+    minute: LastMinute | None = None
+    """None from a holder of an older version."""
 
 
-def line_clients(owner: Owner) -> list[LineClient] | None:
+def look_answer(
+    programs: Iterable[Program], shares: Mapping[str, float], minute: LastMinute
+) -> bytes:
+    """The answer to a program that looks."""
+    clients = [
+        LineClient(readable(one.name, LONGEST_NAME), one.pid, round(share, 3))
+        for one, share in use_by_program(programs, shares)
+    ]
+    return msgspec.json.encode(LineLook(clients, minute))
+
+
+def line_look(owner: Owner) -> LineLook | None:
     """Ask the holder of a line; None without an answer."""
     data, end = b"", monotonic() + LOOK_WITHIN
     try:
@@ -49,6 +59,8 @@ def line_clients(owner: Owner) -> list[LineClient] | None:
             while (part := connection.recv(4096)) and len(data) < LONGEST_LOOK_ANSWER:
                 data += part
                 connection.settimeout(max(0.01, end - monotonic()))
-        return msgspec.json.decode(data, type=list[LineClient])
+        # a holder of an older version answers its clients alone
+        found = msgspec.json.decode(data, type=LineLook | list[LineClient])
+        return found if isinstance(found, LineLook) else LineLook(found)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,7 +13,7 @@ from ..shared.options import json_option
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.bus.share.line_clients import LineClient
+    from tui.bus.share.line_clients import LineClient, LineLook
     from tui.bus.share.place import Owner
     from tui.session.connect.known_lines import LineMark
     from tui.session.connect.named_lines import NamedLine
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 def lines(as_json: bool) -> None:
     """List the lines that the settings file names, and the adapters and drives remembered.
 
-    Lines that are open now are listed with the process that holds each, and with the programs on
-    it. A motor that may still
-    run although the program that started it has exited is listed too. The settings file is
-    checked: each fault is told with its file, line and key, and the status is 2 then.
+    Lines that are open now are listed with the process that holds each, with the programs on it,
+    and with the good replies of the last minute. A motor that may still run although the program
+    that started it has exited is listed too. The settings file is checked: each fault is told with
+    its file, line and key, and the status is 2 then.
     """
-    from tui.bus.share.line_clients import line_clients
+    from tui.bus.share.line_clients import line_look
     from tui.session.connect.known_lines import load_memory
     from tui.session.connect.named_lines import line_settings
     from tui.session.connect.share_place import owners
@@ -38,7 +38,7 @@ def lines(as_json: bool) -> None:
     from ..shared.output import print_json
 
     settings, memory, left = line_settings(), load_memory(), left_on_lines()
-    held = [(one, line_clients(one)) for one in owners()]
+    held = [(one, line_look(one)) for one in owners()]
     named = list(settings.lines.values())
     places = settings.places.items()
     found = (f"{at}: {fault}" for name, at in places for fault in _faults(settings.lines[name]))
@@ -65,9 +65,13 @@ def lines(as_json: bool) -> None:
             say(f"Remembered: {key}{f' ({mark.adapter})' if mark.adapter else ''}")
             for device, drive_mark in mark.drives.items():
                 say(f"  {device:>3} {drive_mark.text}")
-        for owner, clients in held:
-            say(f"Open: {owner.line}, held by {owner.program.text}.")
-            for client in clients or ():
+        for owner, look in held:
+            minute = look.minute if look is not None else None
+            good = "" if minute is None or not minute.replies else (
+                f" {minute.good} of {minute.replies} replies good in the last minute."
+            )  # fmt: skip
+            say(f"Open: {owner.line}, held by {owner.program.text}.{good}")
+            for client in look.clients if look is not None else ():
                 say(f"  {client.share:>4.0%} of the line: {client.program} (pid {client.pid})")
         for motor in left:
             say(f"{motor.record.line} device {motor.record.device}: {motor.text}.")
@@ -104,12 +108,16 @@ def _named_json(one: NamedLine) -> dict[str, Any]:
     return {"name": one.name, "line": one.line, "device": one.device, "profile": one.profile}
 
 
-def _open_json(owner: Owner, clients: Sequence[LineClient] | None) -> dict[str, Any]:
+def _open_json(owner: Owner, look: LineLook | None) -> dict[str, Any]:
+    from ..shared.output import minute_json
+
+    minute = look.minute if look is not None else None
     return {
         "line": owner.line,
         "program": owner.program.name,
         "pid": owner.program.pid,
-        "clients": None if clients is None else [_client_json(one) for one in clients],
+        "clients": None if look is None else [_client_json(one) for one in look.clients],
+        "last_minute": None if minute is None else minute_json(minute, minute.share),
     }
 
 

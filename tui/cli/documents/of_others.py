@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from .counter_parts import LastMinuteField
 from .of_drives import DocumentTold
 from .parts import LeftBehindDocument
 
@@ -75,6 +76,8 @@ class OpenLineDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True)
     pid: int
     clients: list[LineClientDocument] | None
     """The programs on the line; null without an answer of its holder."""
+    last_minute: LastMinuteField | None
+    """Its health; null without an answer, or from a holder of an older version."""
 
 
 class LinesTold(DocumentTold, kw_only=True):
