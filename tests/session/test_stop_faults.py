@@ -48,6 +48,8 @@ BOTTOM = {"TcpTransport.send"}
 """Where nothing can be sent at all: by every way the frame comes to this."""
 SOME = 12
 """Every so many functions outside the sweeps, which take all."""
+PARTS = 3
+"""Tests that the functions of a room are divided among in the sweeps: each has a time limit."""
 AT_ONCE = 1.0
 FRAME_WITHIN = 12.0
 FAMILY, COMMAND = "atv71", 8501
@@ -178,11 +180,14 @@ def room_of(place: Place) -> str:
 
 
 @pytest.mark.parametrize(
-    ("once", "every"),
+    ("once", "first", "every"),
     [
-        pytest.param(False, SOME, id="some-each-call"),
-        pytest.param(False, 1, id="each-call", marks=pytest.mark.sweep),
-        pytest.param(True, 1, id="first-call", marks=pytest.mark.sweep),
+        pytest.param(False, 0, SOME, id="some-each-call"),
+        *(
+            pytest.param(once, part, PARTS, id=f"{name}-{part}", marks=pytest.mark.sweep)
+            for once, name in ((False, "each-call"), (True, "first-call"))
+            for part in range(PARTS)
+        ),
     ],
 )
 @pytest.mark.parametrize("attached", [False, True], ids=["direct", "attached"])
@@ -192,14 +197,15 @@ def test_an_error_anywhere_on_the_way_of_a_stop_keeps_no_frame_from_the_drive(
     room: str,
     attached: bool,
     once: bool,
+    first: int,
     every: int,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     folder = tmp_path_factory.mktemp("stop")
-    places = [one for one in passed(wire, attached, folder) if room_of(one) == room][::every]
+    places = [one for one in passed(wire, attached, folder) if room_of(one) == room]
     assert places
     wrong = []
-    for number, place in enumerate(places):
+    for number, place in enumerate(places[first::every]):
         made = Bench(wire, tmp_path_factory.mktemp(f"error{number}"), attached=attached)
         try:
             made.open()
