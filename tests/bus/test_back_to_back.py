@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from random import Random
+from statistics import fmean
+
+import pytest
+
 from tui.bus.limits import CAUTIOUS
 from tui.bus.model import Priority
 from tui.bus.requests import Read
@@ -76,6 +81,38 @@ def test_polls_go_out_while_client_pauses() -> None:
     bench = Bench(polls=True)
     bench.client(50, 0.1)
     assert len(bench.sent) - bench.served > 2 * bench.served
+
+
+@pytest.mark.parametrize("longest", [0.1, 0.4, 1.5])
+def test_read_after_random_pause_takes_less_than_1_3_times_its_time_beside_polls(
+    longest: float,
+) -> None:
+    bench, chance, times = Bench(polls=True), Random(1), []
+    for _ in range(600):
+        pause = chance.uniform(0.0, longest)
+        begun = bench.now + pause
+        bench.client(1, pause)
+        times.append(bench.now - begun)
+    polls = len(bench.sent) - bench.served
+    assert fmean(times) < 1.3 * EXCHANGE
+    assert polls * EXCHANGE > 2 * POLLS_SHARE * bench.now
+
+
+def test_polls_fill_the_line_again_after_client_has_left() -> None:
+    bench = Bench(polls=True)
+    bench.client(10, 0.2)
+    bench.wait(0.5)
+    before, begun = len(bench.sent), bench.now
+    bench.wait(1.0)
+    assert (len(bench.sent) - before) * EXCHANGE > 0.95 * (bench.now - begun)
+
+
+def test_a_few_reads_of_a_person_leave_the_line_to_polls() -> None:
+    bench = Bench(polls=True)
+    bench.client(2, 0.2)
+    before, begun = len(bench.sent), bench.now
+    bench.wait(1.0)
+    assert (len(bench.sent) - before) * EXCHANGE > 0.9 * (bench.now - begun)
 
 
 def test_poll_waits_for_a_moment_only_when_client_has_left() -> None:

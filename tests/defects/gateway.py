@@ -161,6 +161,14 @@ DEFECTS = (
         ("tests/bus/test_back_to_back.py",),
     ),
     Defect(
+        "no-gap-between-polls",
+        "tui/bus/schedule/back_to_back.py",
+        "max(self._free_until, self._gap_until)",
+        "self._free_until",
+        "A read at a random moment waits for half a poll on a full line.",
+        ("tests/bus/test_back_to_back.py",),
+    ),
+    Defect(
         "foreign-stop-unheard",
         "tui/session/gateway/commanding.py",
         'self._line.facts.give_stop([device], f"Modbus TCP client {client}")',

@@ -1,4 +1,4 @@
-"""Keeps the line free for a moment for a program that asks again as soon as it has its answer."""
+"""Keeps the line free for moments in which a program that asks again and again may ask next."""
 
 from __future__ import annotations
 
@@ -15,6 +15,10 @@ MARGIN, TRIP = 1.25, 0.003
 """Share of the longest pause, and seconds for its way to here, for which the line is kept free."""
 POLLS_SHARE = 0.15
 """Share of the time that polls have beside it."""
+REST_AT_MOST = 2.0
+"""Seconds from an answer to the next request up to which a program asks again and again."""
+GAP, LONGEST_GAP = 0.85, 0.1
+"""Share of a poll's time for which the line is then left to such a program; in seconds at most."""
 
 
 class BackToBack:
@@ -22,6 +26,10 @@ class BackToBack:
 
     A poll that is begun just before that read would make it wait for a whole exchange. So would
     any request that is begun between what is read for a stop and its word. In the line's loop.
+
+    A program that pauses for longer may ask at any moment. On a line that is full of polls it
+    would wait for half of one on average. While it asks again and again, gaps between polls
+    make that less.
     """
 
     def __init__(self) -> None:
@@ -32,6 +40,9 @@ class BackToBack:
         self._pauses = deque[float](maxlen=PAUSES)
         self._polled = self._read = 0.0
         """Seconds that the last poll took, and all reads since."""
+        self._rests = deque[float](maxlen=PAUSES)
+        """Pauses before the last reads of any program."""
+        self._gap_until = 0.0
 
     def count(self, job: Job, begun: float, now: float) -> None:
         """A request has had the line from then until now."""
@@ -40,10 +51,18 @@ class BackToBack:
             self._stop_until = 0.0 if job.request.changes else now + LONGEST_PAUSE
         if job.priority >= Priority.POLL:
             self._polled, self._read = now - begun, 0.0
-        if job.priority is not Priority.OPERATOR_READ:
-            return
+        if job.priority is Priority.OPERATOR_READ:
+            self._count_read(job, begun, now)
+        if job.priority is Priority.OPERATOR_READ or job.priority >= Priority.POLL:
+            self._gap_until = now + self._gap(now)
+
+    def _count_read(self, job: Job, begun: float, now: float) -> None:
         self._read += now - begun
         pause = job.asked - self._ended
+        if pause > REST_AT_MOST:
+            self._rests.clear()
+        else:
+            self._rests.append(pause)
         if job.program != self._program or pause > LONGEST_PAUSE:
             self._pauses.clear()
         else:
@@ -52,10 +71,18 @@ class BackToBack:
         hold = MARGIN * max(self._pauses) + TRIP if self._pauses else 0.0
         self._free_until = now + hold
 
+    def _gap(self, now: float) -> float:
+        """Seconds for which no poll begins, as a program may ask."""
+        longest = max(self._rests, default=0.0)
+        if len(self._rests) < PAUSES or longest <= LONGEST_PAUSE or now > self._ended + 2 * longest:
+            return 0.0
+        return min(GAP * self._polled, LONGEST_GAP)
+
     def not_before(self, job: Job) -> float:
         """When a request may go out at the earliest."""
         if job.priority <= Priority.FEED:
             return 0.0
         owed = self._read * POLLS_SHARE > self._polled * (1 - POLLS_SHARE)
-        free_until = 0.0 if job.priority < Priority.POLL or owed else self._free_until
+        free_until = max(self._free_until, self._gap_until)
+        free_until = 0.0 if job.priority < Priority.POLL or owed else free_until
         return max(free_until, self._stop_until)
