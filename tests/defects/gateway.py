@@ -169,6 +169,14 @@ DEFECTS = (
         ("tests/bus/test_back_to_back.py",),
     ),
     Defect(
+        "reads-in-vain-go-first",
+        "tui/session/gateway/line.py",
+        "hurry = self.turns.may_hurry(host)",
+        "hurry = True",
+        "A client that repeats command words keeps all polls from the line.",
+        ("tests/session/test_gateway_stops.py",),
+    ),
+    Defect(
         "foreign-stop-unheard",
         "tui/session/gateway/commanding.py",
         'self._line.facts.give_stop([device], f"Modbus TCP client {client}")',

@@ -198,6 +198,30 @@ async def test_stop_waits_for_no_read_before_another_stop() -> None:
     assert order == [("stop", 9), *pairs]
 
 
+async def test_flood_of_words_that_are_no_stop_leaves_line_to_polls_and_stops(wire: Wire) -> None:
+    """What is read for each of them goes before polls only as long as few were in vain."""
+    await wire.known()
+    wire.client.host = "10.0.0.9"
+    halt = struct.pack(">BHH", 6, CMD, 0x010F)  # stops in some states only, not in that of now
+
+    async def flood() -> None:
+        while True:
+            assert (await wire.ask(halt))[0] & 0x80
+
+    task, before = asyncio.create_task(flood()), len(wire.requests())
+    try:
+        async with asyncio.timeout(30):
+            for _ in range(20):
+                await wire.line.read(1, ACC)
+            assert len(wire.requests()) - before < 20 * 30
+            other, before = TcpClient(2, "10.0.0.8:5000", "10.0.0.8"), len(wire.requests())
+            assert await wire.gateway.answer(TcpRequest(other, 1, STOP)) == STOP
+            assert STOP in wire.requests()[before : before + 4]
+    finally:
+        task.cancel()
+    assert halt not in wire.requests()
+
+
 async def test_like_stops_that_wait_are_sent_once(wire: Wire) -> None:
     await wire.known()
     before = len(wire.requests())

@@ -124,14 +124,20 @@ class GatewayDrives:
         self._sure.pop(device, None)
         self._asked.pop(device, None)
 
-    async def read_deciding(self, session: DriveSession, codes: Sequence[str]) -> Mapping[str, int]:
-        """Raw values of words, read before all else; without those that cannot be read."""
+    async def read_deciding(
+        self, session: DriveSession, codes: Sequence[str], *, hurry: bool
+    ) -> Mapping[str, int]:
+        """Raw values of words, read before all else if in a `hurry`.
+
+        Without those that cannot be read.
+        """
+        priority = Priority.STOP if hurry else Priority.OPERATOR_WRITE
         chart, raws = chart_codes(session.profile), {}
         for code in codes:
             # a state may be another one already; which chart holds changes with a write only
             age = CHART_AGE if code in chart else 0.0
             try:
-                raws[code] = await self._read_raw(session, code, Priority.STOP, age)
+                raws[code] = await self._read_raw(session, code, priority, age)
             except LineError as error:
                 log.info("%s, which decides about a stop, was not read: %s", code, error)
         return raws

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
@@ -15,6 +16,8 @@ READS_EACH_HOST = 8
 
 READING, DECIDING, STOPPING = "read", "read before a stop", "stop"
 SLOTS = {READING: READS_EACH_HOST, DECIDING: 1, STOPPING: 1}
+MOST_IN_VAIN, IN_VAIN_LASTS = 5, 10.0
+"""Words of a host that turned out to be no stop, in so many seconds, until its reads wait."""
 
 
 class HostTurns:
@@ -29,6 +32,8 @@ class HostTurns:
         """By host and kind of request, with the count of those that use or want one."""
         self._waiting: dict[tuple[str, Hashable], asyncio.Future[Any]] = {}
         """Stops, and reads before them, that have not been sent yet."""
+        self._in_vain: dict[str, deque[float]] = {}
+        """By host, when something was read for words that turned out to be no stop."""
 
     @asynccontextmanager
     async def reading(self, host: str) -> AsyncIterator[None]:
@@ -48,6 +53,18 @@ class HostTurns:
             slots, users = self._slots.pop(which)
             if users > 1:
                 self._slots[which] = slots, users - 1
+
+    def may_hurry(self, host: str) -> bool:
+        """False if reads before stops of this host were often in vain: they go as commands do."""
+        last = self._in_vain.get(host, deque[float]())
+        now = asyncio.get_running_loop().time()
+        return len(last) < MOST_IN_VAIN or now - last[0] > IN_VAIN_LASTS
+
+    def note_in_vain(self, host: str) -> None:
+        """Count a read before a command of this host."""
+        now = asyncio.get_running_loop().time()
+        self._in_vain = {h: t for h, t in self._in_vain.items() if now - t[-1] <= IN_VAIN_LASTS}
+        self._in_vain.setdefault(host, deque(maxlen=MOST_IN_VAIN)).append(now)
 
     async def deciding(
         self, host: str, codes: Hashable, read: Callable[[], Coroutine[Any, Any, T]]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from types import MappingProxyType
 
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError
 from tui.drive.chart import read_chart
+from tui.drive.foreign_write import ForeignWord, WordKind, foreign_words, stop_deciding_codes
 
 from ..command.stop_report import StopSummary
 from ..drive import DriveSession
@@ -50,6 +52,22 @@ class GatewayLine:
         self.commanding.close()
         self.drives.close()
         return summary
+
+    async def told_apart(
+        self, host: str, session: DriveSession, words: Mapping[int, int]
+    ) -> list[ForeignWord]:
+        """Sort the words of a client by kind, by a read if necessary."""
+        found = foreign_words(session.profile, words, {})
+        codes = tuple(stop_deciding_codes(session.profile, words))
+        if not codes or not any(one.kind is WordKind.COMMAND for one in found):
+            return found
+        hurry = self.turns.may_hurry(host)
+        read = partial(self.drives.read_deciding, session, codes, hurry=hurry)
+        raws = await self.turns.deciding(host, (session.device, codes), read)
+        found = foreign_words(session.profile, words, raws)
+        if not any(one.kind is WordKind.STOP for one in found):
+            self.turns.note_in_vain(host)
+        return found
 
     def keep_resting(self, session: DriveSession) -> None:
         """A drive has answered a client's stop: it must not trip while its motor rests."""

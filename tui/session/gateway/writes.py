@@ -83,7 +83,7 @@ class GatewayWrite:
         """
         if not self._may_go_first():
             await self._request.turn()
-        words = await self._told_apart()
+        words = await self._line.told_apart(self._host, self._session, self._asked.words)
         stops = [one for one in words if one.kind is WordKind.STOP]
         if len(stops) == len(words):
             return await self._send(Priority.STOP)
@@ -107,19 +107,6 @@ class GatewayWrite:
         deciding = [profile.find(one) for one in codes if one not in own]
         registers = {one.address + i for one in deciding for i in range(word_count(one))}
         return not self._line.pending.changes_before(self._write, registers)
-
-    async def _told_apart(self) -> list[ForeignWord]:
-        """What each word does; what decides about a stop is read where it is not sure yet."""
-        profile, words = self._session.profile, self._asked.words
-        found = foreign_words(profile, words, {})
-        if not any(one.kind is WordKind.COMMAND for one in found):
-            return found
-        codes = tuple(stop_deciding_codes(profile, words))
-        if not codes:
-            return found
-        read = partial(self._line.drives.read_deciding, self._session, codes)
-        raws = await self._line.turns.deciding(self._host, (self._session.device, codes), read)
-        return foreign_words(profile, words, raws)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
         """Words that surely are as they are told now."""
