@@ -14,8 +14,9 @@ from tui.bus.errors import LineError, LineLost
 from tui.bus.limits import Limits
 from tui.bus.line import Line, LineStatus, Timing
 from tui.bus.link import RtuTcpLink
-from tui.bus.requests import Read
-from tui.bus.result import ExchangeResult, ResultKind
+from tui.bus.requests import Read, WriteOne
+from tui.bus.result import ExchangeResult, Piece, ResultKind
+from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.in_step import InStep
 from tui.bus.schedule.outcomes import Outcomes
 from tui.bus.schedule.patience import Devices
@@ -308,3 +309,79 @@ def test_connection_that_buffers_proves_its_step_every_ten_seconds(
         counts.append((job.form or Read(1, 0, 2)).count)
     assert probes == 1, "a longer read costs no exchange"
     assert sum(count > 2 for count in counts) == longer
+
+
+class _Line:
+    """A drive's replies without a wire; the clock stands still."""
+
+    def __init__(self, *, gateway: bool = False) -> None:
+        self.now = 1.0
+        timing = Timing()
+        self.devices = Devices(timing, mistakable=not gateway)
+        self.outcomes = Outcomes(
+            self.devices, Tally(), timing, lambda: self.now, SharedFacts(), gateway=gateway
+        )
+        self.steps = InStep(self.devices, self.outcomes, lambda: self.now, timing, False, gateway)
+
+    def note(self, job: Job, kind: ResultKind, *earlier: bytes, code: int = 0) -> None:
+        strays = [Piece(one, whole=True) for one in earlier]
+        result = ExchangeResult(kind, sent=self.now, strays=strays, exception=code)
+        self.outcomes.hear_gateway(job, result)
+        assert job.expectation is not None
+        self.steps.note(job, job.expectation, result)
+
+
+def test_write_after_probes_that_are_refused_is_sent_at_last() -> None:
+    """A drive may refuse the echo that its profile gives it."""
+    line = _Line()
+    write = Job(WriteOne(1, 1, 7), Priority.OPERATOR_WRITE, WIDE)
+    probes = 0
+    while (probe := line.steps.prepare(write)) is not None:
+        probes += 1
+        assert probes < 10, "it would never be sent"
+        line.steps.note(write, probe.expectation(), ExchangeResult(ResultKind.EXCEPTION))
+
+
+def test_lost_request_of_a_drive_with_few_forms_does_not_break_the_next_connection() -> None:
+    line = _Line()
+    few = replace(SINGLE, functions=frozenset({3}))
+    line.note(Job(Read(1, 100, 1), Priority.POLL, few), ResultKind.NOTHING)
+    job = Job(Read(1, 101, 1), Priority.POLL, few)
+    assert line.steps.prepare(job) is None
+    line.steps.opened()
+    line.note(job, ResultKind.REPLY)
+
+
+def test_gateway_that_missed_a_reply_must_prove_its_step_again() -> None:
+    """The reply that it gave up may be given to the next request."""
+    line = _Line(gateway=True)
+    line.note(Job(Read(1, 100, 2), Priority.POLL, NO_ECHO), ResultKind.REPLY)
+    line.note(Job(Read(1, 100, 1), Priority.POLL, NO_ECHO), ResultKind.REPLY)
+    line.note(Job(Read(1, 101, 1), Priority.POLL, NO_ECHO), ResultKind.EXCEPTION, code=11)
+    job = Job(Read(1, 102, 1), Priority.POLL, NO_ECHO)
+    line.steps.prepare(job)
+    assert job.form is not None
+
+
+def test_late_reply_some_time_after_the_drain_does_not_name_the_line() -> None:
+    """The first exchange after it brought nothing: no reply was held back."""
+    line = _Line()
+    jobs = [Job(Read(1, 100, count), Priority.POLL, NO_ECHO) for count in (1, 2, 3, 4, 5)]
+    late = [reply(bytes([1]) + job.pdu + bytes(2)) for job in jobs]
+    line.note(jobs[0], ResultKind.NOTHING)
+    line.note(jobs[1], ResultKind.WRONG, late[0])
+    line.note(jobs[2], ResultKind.WRONG, late[1])
+    line.now = line.steps.quiet_until + 0.1
+    line.note(jobs[3], ResultKind.NOTHING)
+    line.note(jobs[4], ResultKind.WRONG, late[3])
+    assert not line.steps.behind
+
+
+def test_read_that_keeps_a_drive_alive_does_not_wait_for_the_drain() -> None:
+    timing = Timing()
+    devices = Devices(timing, mistakable=True)
+    dispatcher = Dispatcher(devices, Tally(), timing, lambda: 1.0, gateway=False)
+    dispatcher.steps.quiet_until = 5.0
+    read = Read(1, 100, 1)
+    assert dispatcher._not_before(Job(read, Priority.FEED, WIDE)) <= 1.0
+    assert dispatcher._not_before(Job(read, Priority.POLL, WIDE)) == 5.0

@@ -303,7 +303,7 @@ DEFECTS = (
     Defect(
         "replies-behind-trusted-on-contact",
         "tui/bus/schedule/in_step.py",
-        "        return self._probe(job, 1) if own == before[-1] else None\n",
+        "        return self._probes.find(job, 1) if own == before[-1] else None\n",
         "        return None\n",
         "A converter that is one reply behind shows another register's value of an Altivar 21.",
         (f"{IN_STEP}::test_drive_with_few_forms_shows_no_wrong_value",),
@@ -311,7 +311,7 @@ DEFECTS = (
     Defect(
         "replies-behind-trusted-after-a-loss",
         "tui/bus/schedule/in_step.py",
-        "            self._proved.discard(device)\n        for piece",
+        "            self._distrust(device)\n        for piece",
         "            pass\n        for piece",
         "A converter that falls one reply behind shows another register's value.",
         (f"{IN_STEP}::test_converter_that_falls_behind_later_shows_no_wrong_value",),
@@ -327,14 +327,14 @@ DEFECTS = (
     Defect(
         "stop-refused-on-a-line-that-is-behind",
         "tui/bus/schedule/in_step.py",
-        "if not self.behind or (stops and request.changes):",
+        "if not self.behind or is_stop_word(job):",
         "if not self.behind:",
         "A stop is not sent on a line whose replies are one behind.",
         (f"{IN_STEP}::test_stop_is_sent_on_a_line_that_is_behind",),
     ),
     Defect(
         "longer-read-of-a-length-that-may-come",
-        "tui/bus/schedule/in_step.py",
+        "tui/bus/schedule/probes.py",
         "        return free <= max(now, self._devices.quiet_until)\n",
         "        return True\n",
         "The late reply to a longer read is taken for that of another one.",

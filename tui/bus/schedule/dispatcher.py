@@ -22,6 +22,7 @@ from .in_step import UNANSWERED, InStep
 from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
 from .patience import Devices
+from .probes import may_be_silent
 from .queue import Job, JobQueue
 from .step_proof import StepProof
 from .unsent import ends_unsent, refusal_of
@@ -52,7 +53,7 @@ class Dispatcher:
         self._back_to_back = BackToBack()
         self._wake = asyncio.Event()
         self._outcomes = Outcomes(devices, tally, timing, clock, self.facts, gateway=gateway)
-        self.steps = InStep(devices, self._outcomes, clock, timing, buffers=buffers)
+        self.steps = InStep(devices, self._outcomes, clock, timing, buffers, gateway)
         """Decides which replies belong to the requests that they follow."""
         self.proof = StepProof(devices, self._outcomes, clock, self.submit, self.steps)
         """Decides which replies are trusted after another process has used the line."""
@@ -123,7 +124,7 @@ class Dispatcher:
             due = self._alive_reads.put_due()
             if master.failure is not None:
                 raise LineLost(str(master.failure))
-            if self.steps.reopen:
+            if self.steps.reopen and not self._queue.stops:
                 raise LineBehind(self.steps.behind)
             if len(self._queue):
                 # the choice is made after the silence, so that a stop that comes in meanwhile
@@ -148,11 +149,10 @@ class Dispatcher:
         now = self._clock()
         if job.priority is not Priority.STOP and self.held_back():
             return now + HELD_LOOK
-        if job.priority is not Priority.STOP:
-            if self.steps.behind:
-                return 0.0  # taken out at once, to fail
-            if self.steps.quiet_until > now:
-                return self.steps.quiet_until
+        if self.steps.behind and job.priority is not Priority.STOP:
+            return 0.0  # taken out at once, to fail
+        if self.steps.quiet_until > now and job.priority > Priority.FEED:
+            return self.steps.quiet_until
         if (trusted := self.proof.not_before(job, now)) > now:
             return trusted
         if (free := self._back_to_back.not_before(job)) > now:
@@ -250,7 +250,7 @@ class Dispatcher:
             result = await self.steps.prove(master, job, probe)
         finally:
             self.in_flight = False
-        silent = self.steps.may_be_silent(job, probe)
+        silent = result.kind is ResultKind.NOTHING and may_be_silent(job, probe)
         if result.kind not in UNANSWERED or silent or job not in self._queue.waiting():
             return
         self._queue.remove(job)
@@ -258,6 +258,7 @@ class Dispatcher:
             self._repeat(job, result)
 
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
+        self._outcomes.hear_gateway(job, result)
         if job.expectation is not None:
             self.steps.note(job, job.expectation, result)
         self._back_to_back.count(job, begun, self._clock())

@@ -7,25 +7,19 @@ proves the step if no recent request to its drive has one of its form: its lengt
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator
-from secrets import randbelow
+from collections.abc import Callable
 
 from ..errors import ONE_BEHIND, LineBehind, NoAnswer
 from ..expectation import EXCEPTION, IDENTIFY, REPORT_ID, Expectation
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
-from ..requests import Diagnose, Identify, Read, Request
+from ..requests import Diagnose, Read, Request
 from ..result import ExchangeResult, Piece, ResultKind
-from .forms import FORM_TRIES, Forms, shorter
 from .outcomes import Outcomes
 from .patience import Devices
+from .probes import LOOKED_BACK, Probes, may_be_silent
 from .queue import Job
 
-ECHO = 0
-"""The sub-function that every device echoes, if it has function 8."""
-LOOKED_BACK = 4
-"""Requests to a drive whose replies have a form of their own."""
 CHECK_EVERY, CHECK_SHARE = 10.0, 0.01
 """Seconds from one proof to the next on a connection that buffers, and their longest share."""
 SUSPECT = 2
@@ -36,6 +30,8 @@ REOPENINGS = 3
 RETRY = 10.0
 PROBE_AGAIN = 0.2
 """Seconds until a probe is tried again, if a late reply could be taken for that of any."""
+LONGEST_FREE = 3.0
+"""Seconds after which a probe unlike the last request alone is sent."""
 PROBES = 2
 """Requests that show whether an opened line is in step."""
 BEHIND = (
@@ -54,31 +50,31 @@ class InStep:
         outcomes: Outcomes,
         clock: MonotonicClock,
         timing: Timing,
-        *,
         buffers: bool,
+        gateway: bool = False,
     ) -> None:
-        """`buffers`: the connection may come out of step with no request lost."""
+        """`buffers`: the connection may come out of step with no request lost. `gateway`: the
+        address in a reply is that of the request, whoever replied."""
         self._devices = devices
         self._outcomes = outcomes
         self._clock = clock
         self._timing = timing
         self._buffers = buffers
-        self._forms = Forms()
-        self._sent: dict[int, deque[Expectation]] = {}
-        self._good: dict[int, dict[int, Read]] = {}
-        """By device and length, the read that was answered last."""
-        self._silences: dict[int, int] = {}
-        """By device, the longer reads that met silence, and may always do so."""
-        self._heard = False
-        """True once a reply came that the adapter's own echo cannot be."""
+        self._gateway = gateway
+        self._probes = Probes(devices, clock, gateway=gateway)
+        self.lengthen = self._probes.lengthen
         self._proved: set[int] = set()
         self._weak: set[int] = set()
         """Drives whose next reply proves its step if it is unlike the last one alone."""
+        self._missed: dict[int, bytes] = {}
+        """By device, the last request if nothing came: a reply to it is as good for its repeat."""
         self._next_check = 0.0
         self._shifts = 0
         self._witness: Job | None = None
-        self._rounds = self._probes = 0
-        self._next_try = 0.0
+        self._rounds = self._tries = 0
+        self._next_try = self._waited = 0.0
+        self._last = -1
+        """The device of the last exchange."""
         self.quiet_until = 0.0
         """Until then the line is left to drain; 0 if it is not."""
         self.behind = ""
@@ -91,16 +87,18 @@ class InStep:
     def opened(self) -> None:
         """Trust no drive on a new connection before it has proved its step."""
         self._proved.clear()
-        self._heard = False
-        self._shifts, self._probes, self._next_try = 0, 0, 0.0
-        self.quiet_until, self.reopen = 0.0, False
+        self._weak.clear()
+        self._missed.clear()
+        self._probes.heard = False
+        self._shifts, self._tries, self._next_try = 0, 0, 0.0
+        self._waited, self.quiet_until, self.reopen = 0.0, 0.0, False
         if not self.behind:
-            self._sent.clear()
+            self._probes.forget_sent()
 
     def refuses(self, job: Job) -> bool:
         """Fail a request on a line that is behind, unless it is the word of a stop."""
         stops, request = job.priority is Priority.STOP, job.request
-        if not self.behind or (stops and request.changes):
+        if not self.behind or is_stop_word(job):
             return False
         place = (request.device, request.function, request.register)
         # a stop that cannot read goes on without: a lost line would end it
@@ -110,68 +108,27 @@ class InStep:
     def prepare(self, job: Job) -> Request | None:
         """Give a job a form that proves the step, if it needs one; else the probe to send first."""
         device, own = job.request.device, job.expectation
-        stops = job.priority is Priority.STOP
-        if own is None or (stops and job.request.changes) or own.function in (IDENTIFY, REPORT_ID):
+        if own is None or is_stop_word(job) or own.function in (IDENTIFY, REPORT_ID):
             return None
         if not self._timing.probes or job.within is not None:
             return None  # who says how long is waited looks whether anybody answers at all
         if self._buffers and self._clock() >= self._next_check:
             self._proved.discard(device)
-        before = self._sent.get(device)
+        before = self._probes.sent(device)
         if device in self._proved or (before and own not in before and not job.request.changes):
             return None
-        if (before and self.lengthen(job)) or stops:
+        if job.repeats and self._missed.get(device) == job.pdu:
             return None
-        if (probe := self._probe(job)) is not None or not before:
+        if (before and self.lengthen(job)) or job.priority is Priority.STOP:
+            return None
+        if job.probes >= LOOKED_BACK:
+            return None  # what refuses so many is not going to prove anything
+        job.probes += 1
+        if (probe := self._probes.find(job)) is not None or not before:
             return probe
         # few forms: one that differs from the last request's is the best there is
         self._weak.add(device)
-        return self._probe(job, 1) if own == before[-1] else None
-
-    def lengthen(self, job: Job) -> bool:
-        """Have a read sent longer, so that no earlier reply can be taken for its own."""
-        if not isinstance(job.request, Read) or not job.limits.answers_all:
-            return False
-        forms = self._forms.longer(job.request, job.limits)
-        form = next((one for one in forms if self._is_new(job, one)), None)
-        if form is not None:
-            job.take_form(form)
-        return form is not None
-
-    def _is_new(self, job: Job, form: Request, depth: int = LOOKED_BACK) -> bool:
-        device, expectation, now = form.device, form.expectation(), self._clock()
-        recent = list(self._sent.get(device, ()))[-depth:]
-        if expectation in recent or expectation == job.expectation:
-            return False
-        free = self._devices.not_before(device, expectation, Priority.POLL, now)
-        return free <= max(now, self._devices.quiet_until)
-
-    def _probe(self, job: Job, depth: int = LOOKED_BACK) -> Request | None:
-        """A request that changes nothing, with a reply unlike those to so many before."""
-        return next((one for one in self._probes_of(job) if self._is_new(job, one, depth)), None)
-
-    def _probes_of(self, job: Job) -> Iterator[Request]:
-        request, limits = job.request, job.limits
-        if isinstance(request, Read):
-            yield from shorter(request, limits)
-        yield from self._good.get(request.device, {}).values()
-        if isinstance(request, Read) and self._silences.get(request.device, 0) < FORM_TRIES:
-            yield from self._forms.longer(request, limits)
-        if self._heard and Diagnose.function in limits.functions and ECHO in limits.subfunctions:
-            yield Diagnose(request.device, ECHO, randbelow(1 << 16))
-        if IDENTIFY in limits.functions and limits.answers_all:
-            yield Identify(request.device)
-        if Read.function in limits.functions and not isinstance(request, Read):
-            yield (read := Read(request.device, request.register, 1))
-            yield from self._forms.longer(read, limits)
-
-    @staticmethod
-    def may_be_silent(job: Job, probe: Request) -> bool:
-        """True if a drive that would answer the job may be silent to the probe."""
-        read = job.request
-        if not isinstance(probe, Read) or not isinstance(read, Read) or job.limits.answers_all:
-            return False
-        return probe.count > read.count
+        return self._probes.find(job, 1) if own == before[-1] else None
 
     async def prove(self, master: Master, job: Job, probe: Request) -> ExchangeResult:
         """Send a probe for a job. Raises LineLost."""
@@ -180,15 +137,16 @@ class InStep:
         result = None
         try:
             result = await master.exchange(Sending(device, probe.pdu(), expectation, time_out))
+            self._outcomes.hear_gateway(job, result)
         finally:
             if result is None or result.kind in UNANSWERED:
                 sent = begun if result is None else result.sent
                 self._devices.may_come(device, expectation, sent, self._clock())
         self.note(job, expectation, result, number=isinstance(probe, Diagnose))
         if isinstance(probe, Read):
-            self._forms.note(probe, result)
-        if result.kind in UNANSWERED and self.may_be_silent(job, probe):
-            self._silences[device] = self._silences.get(device, 0) + 1
+            self._probes.forms.note(probe, result)
+        if result.kind is ResultKind.NOTHING and may_be_silent(job, probe):
+            self._probes.silent.add(device)
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._outcomes.count_beside(device, result)
             self._outcomes.note_strays(result.strays, result.end)
@@ -208,34 +166,58 @@ class InStep:
     ) -> None:
         """Note the end of an exchange, of a job or of a probe for it, maybe with a number."""
         device, now = job.request.device, self._clock()
-        before = self._sent.setdefault(device, deque(maxlen=LOOKED_BACK))
+        before = self._probes.sent(device)
         proves = number or (bool(before) and expectation not in before)
         proves = proves or (device in self._weak and expectation != before[-1])
         self._weak.discard(device)
+        self._missed.clear() if self._gateway else self._missed.pop(device, None)
+        if result.kind is ResultKind.NOTHING and expectation == job.expectation:
+            self._missed[device] = job.pdu
         frames = result.strays if result.instead is None else [result.instead]
-        self._heard |= result.kind is ResultKind.REPLY and not number
+        read, replied = job.form or job.request, result.kind is ResultKind.REPLY
+        self._probes.heard |= replied and not number
         shifted = result.kind in UNANSWERED and any(map(self._is_earlier, frames))
         before.append(expectation)
-        read, replied = job.form or job.request, result.kind is ResultKind.REPLY
         if replied and isinstance(read, Read) and read.expectation() == expectation:
-            self._good.setdefault(device, {})[read.count] = read
+            self._probes.note_good(read)
+            if device in self._probes.silent:
+                self._probes.forms.note_device(device)
+        self._probes.silent.discard(device)
         if replied and proves:
             self._proved.add(device)
             self._next_check = now + max(CHECK_EVERY, (now - result.sent) / CHECK_SHARE)
             self._fall_in()
         elif result.kind in UNANSWERED:
-            self._proved.discard(device)
+            self._distrust(device)
         for piece in result.strays:
-            self._proved.discard(piece.device)
+            self._distrust(piece.device)
         if shifted:
             self._witness = self._witness if self.behind else job
             self._shift(result.sent, now)
+        elif self._is_cleared(device, result):
+            self._shifts, self.quiet_until = 0, 0.0
+        self._last = device
+
+    def _distrust(self, device: int) -> None:
+        """A reply may come late, to any device behind a gateway."""
+        if self._gateway:
+            self._proved.clear()
+        self._proved.discard(device)
+
+    def _is_cleared(self, device: int, result: ExchangeResult) -> bool:
+        """True if an exchange that brought no earlier reply ends the suspicion.
+
+        A reply that is held back comes with the next exchange, whatever that is.
+        """
+        if result.kind is ResultKind.REPLY and device != self._last and not self._gateway:
+            return True
+        return bool(self.quiet_until) and result.sent >= self.quiet_until
 
     def _is_earlier(self, piece: Piece) -> bool:
         """True if a frame may be the reply to an earlier request."""
         function = piece.pdu[0] & ~EXCEPTION
         refused = function != piece.pdu[0]
-        sent = self._sent.get(piece.device, ())
+        sent = self._probes.sent(piece.device)
         return any(one.function == function if refused else one.fits(piece.pdu) for one in sent)
 
     def _shift(self, sent: float, now: float) -> None:
@@ -264,7 +246,7 @@ class InStep:
         """Note the end of a longer read; True if it was refused, and the job waits again."""
         if job.form is None:
             return False
-        self._forms.note(job.form, result)
+        self._probes.forms.note(job.form, result)
         if result.kind is ResultKind.EXCEPTION:
             device, expectation = job.request.device, job.form.expectation()
             self._devices.may_come(device, expectation, result.sent, self._clock())
@@ -280,22 +262,32 @@ class InStep:
         now = self._clock()
         if now < self._next_try:
             return self._next_try - now
-        if self._probes >= PROBES:
+        if self._tries >= PROBES:
             self.reopen = True
             return 0.0
         assert self._witness is not None
-        probe = self._probe(self._witness)
-        if probe is None and (probe := self._probe(self._witness, 1)) is None:
+        waits = self._waited < LONGEST_FREE
+        probe = self._probes.find_alone(self._witness, LOOKED_BACK if waits else 1)
+        if probe is None and self._waited < LONGEST_DRAIN:
+            self._waited += PROBE_AGAIN
             return PROBE_AGAIN
-        await master.quiet()
-        self._probes += 1
-        result = await self.prove(master, self._witness, probe)
-        if result.kind in UNANSWERED:
-            self._outcomes.note_strays(result.strays, result.end)
-        if self.behind and self._probes >= PROBES:
+        if probe is None:
+            self._tries = PROBES  # few forms: the line is opened again all the same
+        else:
+            await master.quiet()
+            self._tries += 1
+            result = await self.prove(master, self._witness, probe)
+            if result.kind in UNANSWERED:
+                self._outcomes.note_strays(result.strays, result.end)
+        if self.behind and self._tries >= PROBES:
             self._rounds += 1
-            if not self._shifts:
+            if not self._shifts and probe is not None:
                 self._fall_in()  # nothing speaks for it any more
             drain = self._timing.first_timeout
             self._next_try = self._clock() + (drain if self._rounds < REOPENINGS else RETRY)
         return 0.0
+
+
+def is_stop_word(job: Job) -> bool:
+    """True if a request stops a motor, also when it is repeated: nothing holds it back."""
+    return job.request.changes and job.priority <= Priority.FEED

@@ -70,6 +70,11 @@ class Outcomes:
         # a long reply at 1200 baud is on the wire for longer than that
         return result.turnaround + self._clock() - result.end > longest + STILL
 
+    def hear_gateway(self, job: Job, result: ExchangeResult) -> None:
+        """Take a gateway's word that a device behind it was silent for that silence."""
+        if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
+            result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
+
     def conclude(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> bool:
         """Note what became of a request, and hand it back; True where it is to be sent again.
 
@@ -80,8 +85,6 @@ class Outcomes:
             self.note_strays(result.strays, result.end)
             job.finish(b"", result.sent)
             return False
-        if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
-            result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._count_good(request.device, result, now)
             exchanged = (job.pdu, result.pdu)

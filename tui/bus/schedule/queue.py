@@ -32,6 +32,8 @@ class Job:
     pdu: bytes = b""
     form: Read | None = None
     """The longer read that is sent for it."""
+    probes: int = 0
+    """Requests that were sent before it so that its drive proves its step."""
     begun: bool = False
     """True if it was taken from the queue once, so that it cannot be withdrawn any more."""
     expectation: Expectation | None = None
@@ -173,6 +175,11 @@ class JobQueue:
                 return job, None
             earliest = ready if earliest is None else min(earliest, ready)
         return None, earliest
+
+    @property
+    def stops(self) -> bool:
+        """True if a stop waits."""
+        return any(job.priority is Priority.STOP and job.request.changes for job in self._jobs)
 
     def count(self, job: Job, begun: float, now: float, *, acknowledged: bool) -> None:
         """A job that was taken has kept the line since `begun`."""

@@ -14,9 +14,10 @@ from ..master import Master, MonotonicClock, Sending
 from ..model import Priority
 from ..requests import BROADCAST, Diagnose, Read, Request
 from ..result import ExchangeResult, ResultKind
-from .in_step import ECHO, InStep
+from .in_step import InStep
 from .outcomes import Outcomes
 from .patience import Devices
+from .probes import ECHO
 from .queue import Job
 
 MOST_TRIES = 3

@@ -1,0 +1,113 @@
+"""Requests with replies unlike those before: none of these can be mistaken for their reply."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from secrets import randbelow
+
+from ..expectation import IDENTIFY, Expectation
+from ..master import MonotonicClock
+from ..model import Priority
+from ..requests import Diagnose, Identify, Read, Request
+from .forms import Forms, shorter
+from .patience import MISSES, Devices
+from .queue import Job
+
+ECHO = 0
+"""The sub-function that every device echoes, if it has function 8."""
+LOOKED_BACK = 4
+"""Requests to a drive whose replies have a form of their own."""
+
+
+class Probes:
+    """Finds a form of its own for a reply; lives in the line's loop."""
+
+    def __init__(self, devices: Devices, clock: MonotonicClock, *, gateway: bool) -> None:
+        """`gateway`: the address in a reply is that of the request, whoever replied."""
+        self._devices = devices
+        self._clock = clock
+        self._gateway = gateway
+        self.forms = Forms(clock)
+        self._sent: dict[int, deque[Expectation]] = {}
+        self.heard = False
+        """True once a reply came that the adapter's own echo cannot be."""
+        self.silent: set[int] = set()
+        """Drives that were silent to a longer read just now, and may always be."""
+        self._good: dict[int, dict[int, Read]] = {}
+        """By device and length, the read that was answered last."""
+
+    def sent(self, device: int) -> deque[Expectation]:
+        """Replies that are due or may come late, and could be taken for one of this device."""
+        return self._sent.setdefault(0 if self._gateway else device, deque(maxlen=LOOKED_BACK))
+
+    def forget_sent(self) -> None:
+        """No earlier reply can come: the connection is a new one."""
+        self._sent.clear()
+
+    def note_good(self, read: Read) -> None:
+        """A read was answered: it can be a probe."""
+        self._good.setdefault(read.device, {})[read.count] = read
+
+    def lengthen(self, job: Job) -> bool:
+        """Have a read sent longer, so that no earlier reply can be taken for its own."""
+        if not isinstance(job.request, Read) or not job.limits.answers_all:
+            return False
+        forms = self.forms.longer(job.request, job.limits)
+        found = (one for one in forms if one.expectation() != job.expectation)
+        form = next((one for one in found if self._is_new(one)), None)
+        if form is not None:
+            job.take_form(form)
+        return form is not None
+
+    def find(self, job: Job, depth: int = LOOKED_BACK) -> Request | None:
+        """A request that changes nothing, with a reply unlike those to so many before, and to the
+        job."""
+        found = (one for one in self._of(job) if one.expectation() != job.expectation)
+        return next((one for one in found if self._is_new(one, depth)), None)
+
+    def find_alone(self, job: Job, depth: int) -> Request | None:
+        """The same where the job itself is not sent; it may be the job."""
+        return next((one for one in self._alone(job) if self._is_new(one, depth)), None)
+
+    def _alone(self, job: Job) -> Iterator[Request]:
+        yield from self._of(job, away=False)
+        if isinstance(job.request, Read):
+            yield job.request
+
+    def _is_new(self, form: Request, depth: int = LOOKED_BACK) -> bool:
+        device, expectation, now = form.device, form.expectation(), self._clock()
+        if expectation in list(self.sent(device))[-depth:]:
+            return False
+        free = self._devices.not_before(device, expectation, Priority.POLL, now)
+        return free <= max(now, self._devices.quiet_until)
+
+    def _is_away(self, device: int) -> bool:
+        """True if a drive that may be silent to longer reads is to be sent none."""
+        silent = device in self.silent or self._devices[device].failures >= MISSES
+        return silent or not self.forms.may_be_longer(device)
+
+    def _of(self, job: Job, *, away: bool | None = None) -> Iterator[Request]:
+        request, limits = job.request, job.limits
+        if away is None:
+            away = not limits.answers_all and self._is_away(request.device)
+        if isinstance(request, Read):
+            yield from shorter(request, limits)
+        yield from self._good.get(request.device, {}).values()
+        if isinstance(request, Read) and not away:
+            yield from self.forms.longer(request, limits)
+        if self.heard and Diagnose.function in limits.functions and ECHO in limits.subfunctions:
+            yield Diagnose(request.device, ECHO, randbelow(1 << 16))
+        if IDENTIFY in limits.functions and limits.answers_all:
+            yield Identify(request.device)
+        if Read.function in limits.functions and not isinstance(request, Read):
+            yield (read := Read(request.device, request.register, 1))
+            yield from self.forms.longer(read, limits)
+
+
+def may_be_silent(job: Job, probe: Request) -> bool:
+    """True if a drive that would answer the job may be silent to the probe."""
+    read = job.request
+    if not isinstance(probe, Read) or not isinstance(read, Read) or job.limits.answers_all:
+        return False
+    return probe.count > read.count
