@@ -53,8 +53,8 @@ class InStep:
         buffers: bool,
         gateway: bool = False,
     ) -> None:
-        """`buffers`: the connection may come out of step with no request lost. `gateway`: the
-        address in a reply is that of the request, whoever replied."""
+        """`buffers`: the connection may come out of step with no request lost. `gateway`: a
+        reply has the address of its request, also if another drive replied."""
         self._devices = devices
         self._outcomes = outcomes
         self._clock = clock

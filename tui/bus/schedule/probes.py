@@ -24,7 +24,7 @@ class Probes:
     """Finds a form of its own for a reply; lives in the line's loop."""
 
     def __init__(self, devices: Devices, clock: MonotonicClock, *, gateway: bool) -> None:
-        """`gateway`: the address in a reply is that of the request, whoever replied."""
+        """`gateway`: a reply has the address of its request, also if another drive replied."""
         self._devices = devices
         self._clock = clock
         self._gateway = gateway
