@@ -29,6 +29,9 @@ COSTLY_FIRST = {"ui": 0, "session": 1, "cli": 2, "bus": 3, "tests": 4}
 """Rooms whose tests take long; all others come after them."""
 FOLDERS = count()
 
+# nothing that is imported or collected is garbage; looked for again once all is collected
+gc.disable()
+
 # The same examples in each run: a push fails for what it changed. To look for new examples, run
 # with --hypothesis-profile=search.
 settings.register_profile("drivepanel", deadline=None, derandomize=True)
@@ -62,10 +65,18 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 10)
+    gc.enable()
 
 
-def pytest_sessionfinish() -> None:
-    """Look for garbage once more: pytest's five looks at the end find all that lives put aside."""
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Look for garbage once more: pytest's five looks at the end find all that lives put aside.
+
+    No worker lists the pictures that it did not compare: that took seconds of each, and nobody
+    reads it.
+    """
+    plugins = session.config.pluginmanager
+    if hasattr(session.config, "workerinput") and plugins.has_plugin("syrupy"):
+        plugins.unregister(name="syrupy")
     gc.collect()
     gc.freeze()
 
