@@ -13,6 +13,7 @@ from textual.pilot import Pilot
 from textual.screen import ModalScreen
 from textual.widgets import OptionList
 
+from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.connection.screen import ConnectionScreen
@@ -307,7 +308,7 @@ async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_
         await until(pilot, lambda: motor.redrawn > before)
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+@pytest.mark.parametrize("size", kept([(80, 24), (120, 40)], (80, 24)))
 async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=size) as pilot:

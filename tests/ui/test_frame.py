@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 import pytest
 from textual.pilot import Pilot
 
+from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.screens.dialogs.question import Question
 from tui.screens.faults.screen import FaultsScreen
@@ -72,7 +73,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-@pytest.mark.parametrize("key", ["1", "2", "3", "4", "5", "6", "7", "m"])
+@pytest.mark.parametrize("key", kept(["1", "2", "3", "4", "5", "6", "7", "m"], "1", "3"))
 async def test_the_strip_tells_the_motor_on_every_screen(key: str) -> None:
     async with panel() as made:
         await made.on(key)
@@ -80,7 +81,9 @@ async def test_the_strip_tells_the_motor_on_every_screen(key: str) -> None:
         assert "1 Line" in made.shown("tabs")
 
 
-@pytest.mark.parametrize("key", ["3", "4", "z", "question_mark", "ctrl+p"])
+@pytest.mark.parametrize(
+    "key", kept(["3", "4", "z", "question_mark", "ctrl+p"], "3", "question_mark")
+)
 async def test_a_trip_is_told_there_and_over_dialogs(key: str) -> None:
     async with panel() as made:
         await made.pilot.press(key)

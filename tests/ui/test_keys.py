@@ -17,6 +17,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input
 
 from tests.sources import PACKAGE, modules, nodes_of
+from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.screens.command.control import Control
 from tui.screens.dialogs.confirm import Confirm
@@ -206,7 +207,7 @@ def notices(made: Bench) -> str:
     return newest.text if newest else ""
 
 
-@pytest.mark.parametrize("key", "123567")
+@pytest.mark.parametrize("key", kept("123567", "1", "3"))
 async def test_what_is_typed_behind_the_slash_is_searched_for_and_nothing_else(key: str) -> None:
     """Typed at once on a slow machine, it was a key of the screen below: `a` armed."""
     async with bench("atv71") as made:

@@ -79,7 +79,7 @@ LONG_REFUSAL = (
 )
 
 
-@BOTH_SIZES
+@SIZES
 @pytest.mark.parametrize("screen", OVER_MONITOR)
 def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int]) -> None:
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)

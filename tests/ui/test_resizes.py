@@ -64,7 +64,7 @@ def random_sizes(count: int, seed: int) -> list[tuple[int, int]]:
 PLACES = [*SCREENS, *DIALOGS]
 
 
-@pytest.mark.parametrize("place", kept(PLACES, *PLACES[::3]))
+@pytest.mark.parametrize("place", kept(PLACES, *PLACES[::6]))
 async def test_awkward_sizes_end_no_screen(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     await resizes(monkeypatch, [*AWKWARD, *random_sizes(3, PLACES.index(place))], place)
 
