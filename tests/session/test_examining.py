@@ -7,9 +7,10 @@ from contextlib import contextmanager
 
 import pytest
 
+from tests.bus.peer import PtyPeer
 from tui.bus.api import DeviceCounters, LastMinute, LineCounters
 from tui.bus.line import Line
-from tui.bus.link import RtuTcpLink, parse_link
+from tui.bus.link import RtuTcpLink, SerialLink, parse_link
 from tui.bus.trace import Frame
 from tui.drive.profile import library
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
@@ -289,3 +290,22 @@ def test_surplus_replies_contradict_a_line_one_behind(second: int, rung: str) ->
 async def test_a_line_one_behind_is_named() -> None:
     with opened({"behind": 1}, "rtu-tcp") as line:
         assert (await found_on(line, None, 12)).rung == "behind"
+
+
+async def test_good_replies_of_the_last_minute_prove_the_format() -> None:
+    """All collide just now, as of two drives at one address: no other format is suggested."""
+    collided = False
+
+    def script(request: bytes, _count: int) -> Sequence[bytes | float]:
+        good = frame(2, bytes.fromhex("03020637"))
+        return [b"\xff" + good[1:] + b"\x40"] if collided else [good]
+
+    with PtyPeer(script) as peer:
+        line = Line(SerialLink(peer.path))
+        line.open(wait=5)
+        try:
+            assert (await line.read(2, 3201)).words == (0x0637,)
+            collided = True
+            assert (await found_on(line, reads=12)).rung == "checksum"
+        finally:
+            line.close()

@@ -98,7 +98,7 @@ async def open_master(
     else:
         counts = _no_counts
     master = RtuMaster(transport, link, around, wake, wire_time=wire_time, port_errors=counts)
-    if isinstance(transport, PosixSerial):
+    if isinstance(transport, PosixSerial | ThreadedSerial):
         master.pause = transport.pause
     return master
 

@@ -72,6 +72,9 @@ class ThreadedSerial:
         """Let the loop hand over what the thread has read."""
         await asyncio.sleep(0)
 
+    def pause(self, seconds: float) -> None:
+        """Read on: the thread that waits for bytes cannot be paused."""
+
     def errors(self) -> PortErrors | None:
         """Nothing: where ports are read by threads the system tells no counts."""
         return None

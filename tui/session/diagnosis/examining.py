@@ -87,7 +87,9 @@ async def _examined(
     unreached = heard.nothing or not (heard.answered or set(heard.exceptions) - GATEWAY_REFUSALS)
     if not isinstance(line.link, SerialLink) and (cut or (heard.asked and unreached)):
         return replace(sight, works=await probed(line, device, beside=not heard.exceptions))
-    if heard.answered or heard.functions or heard.misshapen:
+    # a good reply of the last minute: the baud and the format are right, however few come now
+    good = line.counters.devices.get(device, DeviceCounters()).minute.good
+    if heard.answered or heard.functions or heard.misshapen or (good and not heard.nothing):
         return await _measured(line, sight, reads)
     return sight
 
