@@ -207,11 +207,13 @@ async def test_stop_in_the_name_of_another_program_ends_the_connection_only(shar
         owner, other = lines.open("panel"), lines.open("watch")
         await owner.read(1, 1)
         for victim in (owner, other):
+            before = [line.facts.stops.stamp(3) for line in (owner, other)]
             forged = StopGiven((3,), (HIGHEST // 2,), "a key", victim.facts.me)
             with raw(lines) as connection, suppress(OSError):
                 connection.sendall(packed(Hello(VERSION, STRANGER, "", {})) + packed(forged))
                 while connection.recv(4096):
                     pass
+            assert [line.facts.stops.stamp(3) for line in (owner, other)] == before
             await voided_and_stopped(lines, peer, victim, owner if victim is other else other)
         with raw(lines) as connection, suppress(OSError):
             connection.sendall(packed(Hello(VERSION, owner.facts.me, "", {})))

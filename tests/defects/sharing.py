@@ -300,7 +300,7 @@ DEFECTS = (
         "StopCount = Annotated[int, Meta(ge=0, lt=STOPS_WRAP)]",
         "StopCount = int",
         "One message on the socket of a line ends every later stop with an error.",
-        (f"{BOUNDS}::test_stop_counts_of_a_greeting_block_no_later_stop",),
+        (f"{BOUNDS}::test_message_fields_all_have_bounds",),
     ),
     Defect(
         "stop-count-raised-by-others",
