@@ -70,7 +70,7 @@ def test_without_json_standard_output_stays_empty() -> None:
 
 def test_the_statuses_stand_in_the_help() -> None:
     told = invoked("--help").stdout
-    for status in ("0  done", "1  different", "70  an error", "130  ended by Ctrl-C"):
+    for status in ("0  done", "1  a difference", "70  internal error", "130  ended by Ctrl-C"):
         assert status in told
 
 

@@ -19,36 +19,36 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 COMMANDS = {
-    "backup": ("backup", "Write the settings of a drive to a file."),
-    "block": ("block", "Show or change a drive's blocks or scanner."),
-    "bundle": ("bundle", "Collect all about a line in one file."),
-    "compare": ("compare", "Compare the settings of files, drives, or the factory."),
-    "counters": ("counters", "Count the frames to a drive, and ask for its own counts."),
-    "demo": ("panel", "Open the panel on five simulated drives that run."),
-    "hold": ("hold", "Ask drives on, against their communication time-out."),
-    "identify": ("identify", "Ask a drive who it is."),
-    "journal": ("journal", "Show what was written to drives from here."),
-    "lines": ("lines", "List the lines that have a name, and what is known of them."),
-    "listen": ("listen", "Tell what others say on a line, sending nothing."),
-    "ports": ("ports", "List the serial ports of this machine."),
-    "profiles": ("profiles", "List the profiles, show one, or check a file."),
-    "prove": ("prove", "Prove that a drive reacts to a silent line."),
-    "publish": ("publish", "Publish values of drives to an MQTT broker."),
-    "read": ("read", "Read parameters of a drive."),
+    "backup": ("backup", "Back up a drive's settings to a file."),
+    "block": ("block", "Show or change a drive's indirect block or scanner."),
+    "bundle": ("bundle", "Collect all evidence about a line in one file."),
+    "compare": ("compare", "Compare settings of files, drives or factory defaults."),
+    "counters": ("counters", "Compare frame counts with the drive's own counters."),
+    "demo": ("panel", "Open the panel on five running simulated drives."),
+    "hold": ("hold", "Keep polling drives so that they do not time out."),
+    "identify": ("identify", "Show a drive's vendor, model and version."),
+    "journal": ("journal", "Show writes made to drives by Drive Panel."),
+    "lines": ("lines", "List named and remembered lines."),
+    "listen": ("listen", "Monitor traffic on a line; send nothing."),
+    "ports": ("ports", "List the serial ports of this computer."),
+    "profiles": ("profiles", "List, show or check drive profiles."),
+    "prove": ("prove", "Test how a drive reacts to communication loss."),
+    "publish": ("publish", "Publish drive values to an MQTT broker."),
+    "read": ("read", "Read parameters from a drive."),
     "reference": ("single_orders", "Set a drive's reference."),
     "report": ("report", "Write a report on a drive to a file."),
     "reset": ("single_orders", "Reset a drive's fault."),
-    "restore": ("restore", "Write a parameter set back to a drive."),
+    "restore": ("restore", "Restore a parameter set to a drive."),
     "run": ("run", "Run a motor until this command ends."),
-    "scan": ("scan", "Find the drives on a line."),
-    "serve": ("serve", "Own lines without a screen, and serve them by Modbus TCP."),
+    "scan": ("scan", "Scan a line for drives."),
+    "serve": ("serve", "Run headless and serve lines over Modbus TCP."),
     "simulate": ("simulate", "Serve simulated drives to any Modbus client."),
-    "status": ("status", "Tell a drive's state, control source and fault."),
-    "stop": ("stop", "Stop a drive, or every drive of a line."),
-    "teach": ("teach", "Teach a raw value's scale from the drive's display."),
-    "watch": ("watch", "Watch parameters of drives, cycle by cycle."),
-    "why": ("why", "Tell why a drive does not answer, and what to look at next."),
-    "write": ("write", "Write settings of a drive."),
+    "status": ("status", "Show a drive's state, control source and fault."),
+    "stop": ("stop", "Stop one drive, or every drive on a line."),
+    "teach": ("teach", "Learn a raw value's scale from the drive's display."),
+    "watch": ("watch", "Poll parameters and print every cycle."),
+    "why": ("why", "Diagnose why a drive does not answer."),
+    "write": ("write", "Write settings to a drive."),
 }
 
 LINE_HELP = """
@@ -59,20 +59,20 @@ LINE is one of
   rtu-tcp:HOST:PORT                          RTU frames over TCP
   sim:PROFILE[@ADDRESS][,...]                simulated drives
   NAME                                       a line of the settings file
-Left out, it is that of DRIVEPANEL_LINE.
+Default: $DRIVEPANEL_LINE.
 
--v may stand anywhere. With --json errors are printed as JSON on standard output too.
+-v is accepted anywhere. With --json, errors are also printed as JSON on standard output.
 
 \b
 Exit status:
     0  done
-    1  different: compare, block verify, counters, a contradicting teach
-    2  usage: options, files, codes, profiles
-    3  no answer, or trouble on the line
-    4  the drive refused
-    5  refused here: nothing was written
+    1  a difference was found
+    2  a usage error: an option, a file, a code or a profile
+    3  no answer, or a line error
+    4  refused by the drive
+    5  refused by Drive Panel: nothing was written
     6  ended after something was written; the message names it
-   70  an error of drivepanel itself; its log has more
+   70  internal error; see the log
   130  ended by Ctrl-C
 """
 AS_JSON = "drivepanel.json"
