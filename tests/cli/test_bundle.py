@@ -164,7 +164,7 @@ def test_other_lines_and_old_entries_are_not_in_the_journal(tmp_path: Path) -> N
 def test_file_is_private_and_replaced_by_force_only(tmp_path: Path) -> None:
     file = tmp_path / "a.zip"
     file.write_bytes(b"before")
-    assert "Use another name" in ended(2, "bundle", "sim:atv312", "--output", file).stderr
+    assert "Choose another name" in ended(2, "bundle", "sim:atv312", "--output", file).stderr
     assert file.read_bytes() == b"before"
     ended(0, "bundle", "sim:atv312", "--output", file, "--force")
     assert zipfile.is_zipfile(file)

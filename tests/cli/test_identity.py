@@ -67,7 +67,7 @@ def test_forced_it_reads_watches_and_writes_and_says_so(atv71: str) -> None:
     put(atv71, ACC, 30)
     for words in (("read", atv71, "ETA"), ("watch", atv71, "ETA", "--count", "1")):
         done = ended(0, *words, "-p", "atv312", "--force-profile")
-        assert "By --force-profile it is taken as one all the same" in done.stderr
+        assert "--force-profile uses this profile anyway" in done.stderr
         assert "ETA" in done.stdout
     done = ended(0, "write", atv71, "ACC=4s", "-p", "atv312", "--force-profile", "--arm")
     assert "says it is ATV71HU15M3" in done.stderr
@@ -82,7 +82,7 @@ def test_2_what_moves_or_keeps_goes_by_the_drives_own_only(atv71: str, command: 
     more = {"reference": ["20Hz"], "restore": ["x"], "backup": ["x"], "report": ["x"]}
     words = [command, atv71, *more.get(command, ["factory"] if command == "compare" else [])]
     said = refused(2, *words, "-p", "atv312", "--force-profile")
-    assert f"--force-profile is not for {command}" in said
+    assert f"--force-profile does not apply to {command}" in said
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "varmeca"])

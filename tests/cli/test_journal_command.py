@@ -44,7 +44,7 @@ def test_what_was_written_is_listed_and_damage_told(journal: Path) -> None:
     assert "2/tcp:host:502" in second
     assert "by ␛[2J" in second
     assert "FAULT ObF Overbraking" in trip
-    assert f"{journal}, line 4 is no entry" in done.stderr
+    assert f"{journal}, line 4 is not a valid entry" in done.stderr
     assert "\x1b" not in done.output
 
 
@@ -54,8 +54,8 @@ def test_drive_and_time_select(journal: Path) -> None:
     assert len(run(0, "journal", "--drive", "tcp:HOST").splitlines()) == 2
     assert len(run(0, "journal", "--since", "2h").splitlines()) == 2
     assert run(0, "journal", "--since", "1m") == "No entry of the journal fits.\n"
-    assert "300 is no slave address" in refused(2, "journal", "--drive", "300")
-    assert "'soon' is no time" in refused(2, "journal", "--since", "soon")
+    assert "300 is not a slave address" in refused(2, "journal", "--drive", "300")
+    assert "'soon' is not a time" in refused(2, "journal", "--since", "soon")
 
 
 @pytest.mark.parametrize("kind", get_args(get_type_hints(Entry)["kind"]))

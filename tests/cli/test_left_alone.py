@@ -1,4 +1,4 @@
-"""What every command says at its end of a communication time-out that it leaves running."""
+"""What every command says at its end of a communication timeout that it leaves running."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ def test_it_is_told_which_drive_how_long_what_follows_and_what_to_do(
     words = (READING | OTHERS)[command]
     done = ended(0, *(one.format(line=atv21, folder=tmp_path) for one in words))
     assert (
-        "Device 1, Altivar 21: its communication time-out F803 runs. After 3 s without a request:"
+        "Device 1, Altivar 21: its communication timeout F803 runs. After 3 s without a request:"
         " Switches the output off and trips with Err5; the motor coasts.\n"
-        f"To ask it on: drivepanel hold {atv21} -d 1." in done.stderr
+        f"To keep polling it: drivepanel hold {atv21} -d 1." in done.stderr
     )
     assert done.stderr.endswith("After a trip: drivepanel reset.\n")
 
@@ -76,7 +76,7 @@ def test_it_is_told_where_the_command_failed(atv21: str) -> None:
 
 
 def test_a_drive_that_was_never_heard_leaves_nothing_running(atv21: str) -> None:
-    assert "time-out" not in refused(3, "read", atv21, "FD01", "-d", "9", "-p", "atv21")
+    assert "timeout" not in refused(3, "read", atv21, "FD01", "-d", "9", "-p", "atv21")
 
 
 def test_none_where_it_is_off() -> None:
@@ -90,7 +90,7 @@ def test_a_drive_that_refuses_the_words_fails_no_command() -> None:
         done = ended(0, "read", line, "FD01", "--json")
         told = json.loads(done.stdout)["timeout"]
         assert set(told.values()) == {None}
-        assert "it does not tell its communication time-out; it may act" in done.stderr
+        assert "its communication timeout cannot be read; it may react" in done.stderr
 
 
 def test_a_watch_that_begins_with_a_command_is_told_of_once_one_was_written() -> None:
@@ -100,7 +100,7 @@ def test_a_watch_that_begins_with_a_command_is_told_of_once_one_was_written() ->
         assert json.loads(done.stdout)["timeout"]["begun"] is False
         put(line, CMD, 6)  # by somebody else
         done = ended(0, "read", line, "ETA", "--json")
-        assert "time-out TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
+        assert "timeout TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
         assert json.loads(done.stdout)["timeout"]["begun"] is True
 
 
@@ -117,21 +117,21 @@ def test_a_lost_line_that_goes_unnoticed_is_not_told_as_an_act() -> None:
 def test_what_no_document_says_is_not_told_as_sure() -> None:
     with tcp_line("atv31@1") as line:
         said = ended(0, "read", line, "ETA").stderr
-        assert "time-out ttO runs (when it begins is in no document). After 10 s" in said
+        assert "timeout ttO runs (when it begins is in no document). After 10 s" in said
 
 
 def test_a_family_that_was_named_is_named_again() -> None:
     with tcp_line("powerdrive@1", "--set", "11.63=20") as line:
         said = ended(0, "read", line, "10.40", "-p", "powerdrive").stderr
         assert f"drivepanel hold {line} -d 1 -p powerdrive." in said
-        assert "time-out 11.63 runs" in said
+        assert "timeout 11.63 runs" in said
 
 
 def test_run_does_not_end_in_a_trip_without_a_word() -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         done = drivepanel("run", line, "--reference", "10Hz", "--for", "0.5", "--arm", "--json")
         assert done.returncode == 0, done.stderr
-        assert "time-out TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
+        assert "timeout TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
         told: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
         last = {"seconds": 30.0, "reaction": "Freewheel", "fault": "SLF1", "begun": True}
         assert told[-1]["timeout"] == last
@@ -144,7 +144,7 @@ def test_commands_are_told_of(command: str) -> None:
         more = ["10Hz"] if command == "reference" else []
         done = drivepanel(command, line, *more, "--arm")
         # a reset of no fault is refused, and nothing was written
-        assert ("time-out TTO runs" in done.stderr) is (command == "reference")
+        assert ("timeout TTO runs" in done.stderr) is (command == "reference")
 
 
 # Holding
@@ -173,11 +173,11 @@ SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) -> None:
     with tcp_line("atv21@1", "atv71@2") as line:
         hold = (*DRIVEPANEL, "hold", line, "-d", "1", "-d", "2")
-        with served(hold, ready="Device 2, Altivar 71: kept from") as program:
+        with served(hold, ready="Device 2, Altivar 71: kept alive") as program:
             status, said = program.end(number)
         assert status == SIGNALS[number], said
-        assert "the communication time-out protects nobody" in said
-        assert "Device 1, Altivar 21: its communication time-out F803 runs. After 3 s" in said
+        assert "the communication timeout gives no protection" in said
+        assert "Device 1, Altivar 21: its communication timeout F803 runs. After 3 s" in said
         assert "Device 2" not in said, "nobody has commanded it"
 
 

@@ -114,7 +114,7 @@ def test_the_environment_may_hold_a_name(line: str, monkeypatch: pytest.MonkeyPa
 def test_a_name_that_is_none_is_told_with_those_there_are(line: str) -> None:
     named(line)
     told = refused(2, "read", "pumb", "ACC")
-    assert "pumb is no LINE, and none of those in" in told
+    assert "'pumb' is not a LINE or a name from" in told
     assert "pump, fan" in told
 
 

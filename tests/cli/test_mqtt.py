@@ -113,7 +113,7 @@ def test_the_password_comes_out_of_a_file_or_the_environment(
     assert broker_of("mqtts://me@h", file) == Broker(
         "h", 8883, True, "me", "from a file", broker_of("mqtt://h", None).root
     )
-    with pytest.raises(click.UsageError, match="goes with a user"):
+    with pytest.raises(click.UsageError, match="requires a user"):
         broker_of("mqtt://h", file)
     monkeypatch.setenv(PASSWORD_SETTING, "from outside")
     assert broker_of("mqtt://me@h:1/x", None).password == "from outside"
@@ -211,7 +211,7 @@ async def test_everything_is_retained_anew_after_a_lost_connection(
     assert clients.made[3].retained["plant/status"] == "offline"
     said = capsys.readouterr().err
     assert said.count("It is tried on.") == 2
-    assert said.count("is there again.") == 2
+    assert said.count("is connected again.") == 2
     assert ": Connection refused. It is tried on." in said
     assert "Errno" not in said
 

@@ -233,7 +233,7 @@ def test_a_set_does_not_round_in_silence(line: str, tmp_path: Path) -> None:
     planned = run(0, "restore", line, file, "-d", "2", "--dry-run")
     assert "leave  ACC" in planned
     told = run(0, "restore", line, file, "-d", "2", "--arm")
-    assert "3.55 s is held as 3.6 s. --round writes that all the same" in told
+    assert "3.55 s is held as 3.6 s. Use --round to write it anyway" in told
     assert "3.56 s is held as 3.6 s" in told
     assert "1 written and read back" in told
     assert "write  ACC" in run(0, "restore", line, file, "-d", "2", "--dry-run", "--round")
@@ -264,7 +264,7 @@ def test_2_a_bad_file_is_told_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     run(0, "backup", "sim:powerdrive", file, "-p", "powerdrive")
     text = file.read_text(encoding="utf-8")
-    assert "is there already" in refused(2, "backup", "sim:powerdrive", file, "-p", "powerdrive")
+    assert "already exists" in refused(2, "backup", "sim:powerdrive", file, "-p", "powerdrive")
     assert file.read_text(encoding="utf-8") == text
     run(0, "backup", "sim:powerdrive", file, "-p", "powerdrive", "--force")
     file.write_text(text[: len(text) // 2], encoding="utf-8")
@@ -377,7 +377,7 @@ def test_a_report(line: str, tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text.startswith("# Altivar 312 at tcp:")
     assert "| ACC | 3.0 s | 9.0 s | ok | setting |" in text
-    assert "is there already" in refused(2, "report", line, file, "-d", "2")
+    assert "already exists" in refused(2, "report", line, file, "-d", "2")
     assert file.read_text(encoding="utf-8") == text
     run(0, "report", line, file, "-d", "2", "--force")
 

@@ -158,7 +158,7 @@ def test_a_time_out_that_the_drive_does_not_tell_is_not_called_none() -> None:
     both = ("powerdrive@1", "--protect", "15.07,11.63", "--any-settings")
     with tcp_line(*both) as line:
         said = ended(0, "status", line, "-p", "powerdrive").stdout
-    assert "not told by this drive: it may act when nobody asks it" in said
+    assert "cannot be read: the drive may react when polling stops" in said
     with tcp_line("powerdrive@1", "--protect", "15.07", "--any-settings") as line:
         said = ended(0, "status", line, "-p", "powerdrive").stdout
     assert "none: it goes on without communication" in said

@@ -68,7 +68,7 @@ def test_a_drive_that_is_not_there_hides_no_other(named: tuple[str, str]) -> Non
     done = ended(3, "status", "pump@9,1", "fan", "--json")
     assert [one.get("profile") for one in listed(done.stdout)] == [None, "atv71", "atv71"]
     assert "drivepanel: pump: Device 9 did not answer" in done.stderr
-    assert "drivepanel: pump: Nobody answers at 9." in ended(
+    assert "drivepanel: pump: No answer at 9." in ended(
         3, "status", "pump@9", "fan", "--all", "--addresses", "5"
     ).stderr  # fmt: skip
 
@@ -78,5 +78,5 @@ def test_drives_of_several_lines_are_asked_on(named: tuple[str, str]) -> None:
 
 
 def test_2_what_is_no_line_opens_none(named: tuple[str, str]) -> None:
-    assert "nonsense is no LINE" in refused(2, "status", "pump", "nonsense")
+    assert "'nonsense' is not a LINE" in refused(2, "status", "pump", "nonsense")
     assert "1 to 247" in refused(2, "status", "pump@300", "fan")

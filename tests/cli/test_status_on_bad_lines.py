@@ -47,7 +47,7 @@ def lose(
 @pytest.mark.parametrize(
     ("seconds", "status", "watch"),
     [
-        (0.01, 0, "not told by this drive"),
+        (0.01, 0, "cannot be read: the drive may"),
         (60.0, 3, "not known: TTO was not read"),
     ],
     ids=["no answer", "hangs"],

@@ -111,7 +111,7 @@ def test_a_file_is_replaced_or_continued_only_as_told(tmp_path: Path) -> None:
     watch = ("watch", *LINE, "ETA", *SHORT, "1", "--csv", file)
     run(0, *watch)
     text = file.read_text("utf-8")
-    assert "is there already" in refused(2, *watch)
+    assert "already exists" in refused(2, *watch)
     assert file.read_text("utf-8") == text
     run(0, *watch, "--append")
     assert file.read_text("utf-8").startswith(text)

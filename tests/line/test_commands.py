@@ -66,7 +66,7 @@ def stands(simulation: Simulation, device: int = 1) -> bool:
 
 def besides(said: str) -> str:
     """What standard error has beside the communication time-out that a command leaves running."""
-    told = ("communication time-out", "To ask it on: drivepanel hold")
+    told = ("communication timeout", "To keep polling it: drivepanel hold")
     return "".join(line for line in said.splitlines(True) if not any(t in line for t in told))
 
 
@@ -288,7 +288,7 @@ def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(
             give_back(simulation)
             out, _ = program.process.communicate(timeout=PATIENCE)
             assert program.process.returncode == 0
-            assert out.rstrip().endswith(("Device 1: stopped.", "Device 1: it stands."))
+            assert out.rstrip().endswith(("Device 1: stopped.", "Device 1 is at standstill."))
             assert stands(simulation)
 
 
@@ -497,7 +497,7 @@ def test_silent_addresses_of_a_search_are_no_failures() -> None:
     with bench(DriveSpec("atv71", 2, run_hz=20.0)) as (simulation, line):
         done = drivepanel("stop", line, "--all")
         assert done.returncode == 0, done.stderr
-        assert "Nobody answers at 1,3-10." in done.stderr
+        assert "No answer at 1,3-10." in done.stderr
         assert "NOT STOPPED" not in done.stderr
         assert stands(simulation, 2)
 
@@ -665,7 +665,7 @@ def test_status_of_every_family(family: str) -> None:
     titles = [line[:17].strip() for line in done.stdout.splitlines()]
     assert titles[:9] == [
         "Device", "State", "Direction", "Fault", "Alarms", "Commanded by", "Reference from",
-        "From here", "Comm. time-out",
+        "Commands", "Comm. timeout",
     ]  # fmt: skip
 
 

@@ -205,7 +205,7 @@ def test_a_broker_that_comes_back_is_told_everything_anew(
     status, said = made.program.end()
     assert status == 0
     assert "It is tried on." in said
-    assert "is there again." in said
+    assert "is connected again." in said
 
 
 def test_publish_beside_serve_takes_the_codes_that_are_named(

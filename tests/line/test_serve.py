@@ -196,7 +196,7 @@ def test_it_warns_where_other_computers_reach_it() -> None:
         with served(command, ready="reads and commands") as program:
             status, said = program.end()
         assert status == 0
-        assert "Modbus TCP knows no password: whoever reaches 0.0.0.0:" in said
+        assert "Modbus TCP has no password: anyone who can reach 0.0.0.0:" in said
 
 
 # Its end, and the end of others

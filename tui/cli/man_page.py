@@ -29,11 +29,11 @@ VARIABLES = (
     ("DRIVEPANEL_CONFIG", "The configuration folder, in place of that in $XDG_CONFIG_HOME."),
     ("DRIVEPANEL_STATE", "The state folder, in place of that in $XDG_STATE_HOME."),
     ("DRIVEPANEL_MQTT_PASSWORD", "The password for the broker of serve and publish."),
-    ("NO_COLOR", "Draw without colours."),
+    ("NO_COLOR", "Draw without colors."),
 )
 CAUTION = (
-    "The panel is no safety device; the emergency stop of the machine is. Run commands turn motors:"
-    " nothing is written without --arm, and stop needs none."
+    "The panel is not a safety device: use the emergency stop of the machine. Run commands turn"
+    " motors: nothing is written without --arm, but stop does not need it."
 )
 
 

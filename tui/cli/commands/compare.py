@@ -33,7 +33,7 @@ FACTORY = "factory"
     type=click.Choice(["text", "markdown", "csv"]),
     default="text",
     show_default=True,
-    help="Format of the table.",
+    help="Show the table in this format.",
 )
 @json_option
 @profile_of("Profile of the drives.")
@@ -73,8 +73,8 @@ def compare(
         raise click.UsageError("One of A and B must be a file or a drive.")
     if len(ids) > 1:
         raise Failure(
-            f"A and B are of different families ({', '.join(sorted(ids))}).\n'drivepanel restore"
-            " --dry-run' tells what can be carried from one to the other.",
+            f"A and B are of different families ({', '.join(sorted(ids))}).\n"
+            "'drivepanel restore --dry-run' shows which settings fit the other family.",
             USAGE,
         )
     profile = library.load(ids.pop())

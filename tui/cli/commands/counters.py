@@ -47,7 +47,7 @@ COUNTER_TITLES = 18
     type=click.IntRange(0, MOST_FRAMES),
     default=FRAMES_SENT,
     show_default=True,
-    help="Frames that are sent to be counted; they change nothing.",
+    help="Send this many frames to count; they change nothing.",
 )
 @click.option(
     "--for",
@@ -55,7 +55,7 @@ COUNTER_TITLES = 18
     type=seconds_range(),
     default=0.0,
     metavar="SECONDS",
-    help="Count for so long, too: what other programs on the line send.",
+    help="Count frames of other programs for S seconds.",
 )
 @click.option("--reset-drive", is_flag=True, help="Set the drive's own counters to 0 before.")
 @arm_option
@@ -136,7 +136,7 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
     yield "Counted by", f"{by}; for {found.seconds:.1f} s"
     yield "Sent", f"{ours.requests} frames, {ours.bytes_out} bytes, {ours.repeats} of them repeats"
     yield "Answered", f"{ours.replies}, {ours.bytes_in} bytes"
-    lost = f"{ours.timeouts} time-outs, {ours.checksum} damaged, {ours.wrong} strange"
+    lost = f"{ours.timeouts} timeouts, {ours.checksum} damaged, {ours.wrong} unexpected"
     yield "Not answered", lost
     yield "Last minute", _minute_text(found)
     yield "Refused", ", ".join(f"exception {c}: {n}" for c, n in ours.exceptions.items()) or "0"

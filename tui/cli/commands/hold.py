@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from tui.session.timeout_told import Timeout
 
 DISARMS = (
-    "While this runs, the communication time-out protects nobody: if whoever commands the drive"
-    " is lost, the motor runs on. Ctrl-C ends it."
+    "While this runs, the communication timeout gives no protection: if the program or master"
+    " that commands the drive fails, the motor keeps running. Press Ctrl-C to end."
 )
 
 
@@ -125,13 +125,11 @@ def held_text(session: DriveSession, found: Timeout) -> str:
     """What a drive is kept from."""
     who = f"Device {session.device}, {session.profile.name}"
     if not found.known:
-        return f"{who}: it does not tell its communication time-out; it is asked often."
+        return f"{who}: its communication timeout cannot be read; it is polled often."
     if (watch := found.watch) is None:
-        return (
-            f"{who}: it has no communication time-out, or it is off; it is asked on all the same."
-        )
+        return f"{who}: its communication timeout is off or does not exist; it is polled anyway."
     does = watch.reaction.does.rstrip(".") if watch.reaction else "its own reaction follows"
-    return f"{who}: kept from its communication time-out of {watch.timeout:g} s ({does})."
+    return f"{who}: kept alive within its communication timeout of {watch.timeout:g} s ({does})."
 
 
 def _teller(_event: str, _device: int, text: str, _found: Timeout | None = None) -> None:

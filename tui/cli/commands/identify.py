@@ -73,8 +73,8 @@ def identify(
             told = drive_json(line_text, session)
         elif hold:
             raise Failure(
-                f"Device {drive.device} does not say what it is, so nothing is known to ask it on"
-                " by. 'drivepanel hold' with -p does.",
+                f"Device {drive.device} does not identify itself, so it cannot be kept alive."
+                " Use 'drivepanel hold' with -p.",
                 REFUSED_HERE,
             )
         told |= {key: getattr(identity, key) for key in IDENTITY_KEYS}

@@ -36,7 +36,7 @@ def _wanted_drive(_ctx: click.Context, _option: click.Parameter, text: str) -> W
     if not number.isdecimal() or (slash and not line):
         return WantedDrive(line=text)
     if not 1 <= (device := int(number[:9])) <= 247:
-        raise click.BadParameter(f"{number[:9]} is no slave address: they are 1 to 247.")
+        raise click.BadParameter(f"{number[:9]} is not a slave address. Use 1 to 247.")
     return WantedDrive(device, line)
 
 
@@ -46,8 +46,7 @@ def _begin(_ctx: click.Context, _option: click.Parameter, text: str | None) -> d
         return None
     if (found := since(text, datetime.now().astimezone())) is None:
         raise click.BadParameter(
-            f"{text!r} is no time. Write it like 2h, 30m, 7d, 08:30, 2026-03-01 or"
-            " 2026-03-01T08:30."
+            f"{text!r} is not a time. Examples: 2h, 30m, 7d, 08:30, 2026-03-01, 2026-03-01T08:30."
         )
     return found
 
@@ -74,14 +73,14 @@ def since(text: str, now: datetime) -> datetime | None:
     callback=_wanted_drive,
     default="",
     metavar="D/LINE",
-    help="Of one drive only: its slave address, like 2, or with its line, like 2/LINE.",
+    help="Show one drive only: its address 2, or with its line 2/LINE.",
 )
 @click.option(
     "--since",
     "begin",
     callback=_begin,
     metavar="TIME",
-    help="From a time on: 2h, 30m or 7d ago, 08:30, 2026-03-01, 2026-03-01T08:30.",
+    help="Start at: 2h, 30m, 7d, 08:30 or 2026-03-01T08:30.",
 )
 @json_option
 @told
@@ -123,7 +122,7 @@ def _say(entries: list[Entry], damaged: list[DamagedLine], path: str, *, filtere
         say("No entry of the journal fits." if filtered else f"The journal is empty: {path}")
     for line in damaged:
         say(
-            f"drivepanel: {line.file}, line {line.number} is no entry"
+            f"drivepanel: {line.file}, line {line.number} is not a valid entry"
             f" (cut off or damaged): {line.text[:60]}",
             err=True,
         )

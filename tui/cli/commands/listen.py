@@ -36,26 +36,26 @@ LAST_ADDRESS_HEARD = 255
     multiple=True,
     metavar="[ADDRESS=]ID",
     shell_complete=complete_profile,
-    help="Profile of all drives, or of the one at an address; several times for several drives.",
+    help="Use this profile for all drives, or for one; repeatable.",
 )
 @click.option(
     "--pcap",
     "pcap_path",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Also write the frames to a pcapng file, as Modbus/TCP with the device id.",
+    help="Write the frames to a pcapng file as Modbus/TCP.",
 )
 @click.option(
     "--raw",
     is_flag=True,
-    help="Write them as they are on the line, with checksum; it is said how tshark reads that.",
+    help="Write RTU frames with checksum, and show tshark options.",
 )
 @click.option("--force", is_flag=True, help="Replace a file that exists.")
 @click.option(
     "--every",
     type=seconds(1.0),
     metavar="S",
-    help="Tell what it comes to every S seconds, and not only at the end.",
+    help="Show the summary every S seconds too.",
 )
 @click.option(
     "--for",
@@ -83,7 +83,7 @@ def listen(
     reading only, and for this program alone. A sim: LINE has a master of its own that asks.
     """
     if pcap_path is None and (raw or force):
-        raise click.UsageError("--raw and --force go with --pcap FILE.")
+        raise click.UsageError("--raw and --force require --pcap FILE.")
     named = profiles_named(profile_ids)
     from tui.bus.errors import LineError
     from tui.session.connect.strangers import known_profiles
@@ -163,7 +163,9 @@ def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> Cap
     try:
         return CaptureFile(path, line, raw=raw, force=force)
     except FileExistsError:
-        raise Failure(f"{path} is there already. Use another name, or --force.", USAGE) from None
+        raise Failure(
+            f"{path} already exists. Choose another name or use --force.", USAGE
+        ) from None
     except OSError as error:
         text = f"{path} cannot be written: {error.strerror or error}."
         raise Failure(text, USAGE) from error

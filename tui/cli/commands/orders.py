@@ -46,7 +46,7 @@ LEARNT_WITHIN = 10.0
 meet silence, and a small computer is slow."""
 
 arm_option = click.option(
-    "--arm", is_flag=True, help="Arm the drive for this command; without it nothing is written."
+    "--arm", is_flag=True, help="Arm the drive for this command. Required for writing."
 )
 
 
@@ -171,7 +171,7 @@ def _way_on(error: Exception | None) -> str:
     from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 
     refused = isinstance(error, StartNotRecorded) and not isinstance(error, StartOvertaken)
-    return " --unrecorded runs it all the same." if refused else ""
+    return " Use --unrecorded to run it anyway." if refused else ""
 
 
 async def _until(holds: Callable[[], bool]) -> None:

@@ -28,23 +28,26 @@ on_hangup_option = click.option(
     type=click.Choice([STOP, LEAVE_RUNNING]),
     default=STOP,
     show_default=True,
-    help="What the loss of the terminal, or of the panel, means for motors started from here.",
+    help="Set what happens to its motors if the panel is lost.",
 )
 low_bandwidth_option = click.option(
     "--low-bandwidth", is_flag=True, help="Send as little as possible, for a slow link."
 )
 mouse_option = click.option(
-    "--mouse", is_flag=True, help="Let the terminal report the mouse; the keys do all without."
+    "--mouse", is_flag=True, help="Use the mouse; every function also has a key."
 )
 
 
 bell_option = click.option(
-    "--bell/--no-bell", default=True, show_default=True, help="Ring the bell once for a new fault."
+    "--bell/--no-bell",
+    default=True,
+    show_default=True,
+    help="Report a new fault by the terminal bell.",
 )
 ascii_option = click.option(
     "--ascii/--no-ascii",
     default=None,
-    help="Draw with ASCII characters only; unless given, as the locale says.",
+    help="Show ASCII characters only (default: by locale).",
 )
 
 
@@ -83,7 +86,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
     multiple=True,
     callback=one_device,
     metavar="ADDRESS",
-    help="Slave address of the drive to open; without it the line is searched.",
+    help="Open the drive at this address instead of scanning the line.",
 )
 @share_group_option
 @read_only_option

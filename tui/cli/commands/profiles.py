@@ -32,15 +32,14 @@ if TYPE_CHECKING:
     "file",
     type=click.Path(path_type=Path),
     metavar="FILE...",
-    help="Check profile files: every fault is told with its line.",
+    help="Check profile files and list each error with its line.",
 )
-@click.option("--from", "origin", metavar="ID", help="With new: the profile to copy.")
+@click.option("--from", "origin", metavar="ID", help="Copy this profile; for new.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
 @click.option(
     "--wiring",
     is_flag=True,
-    help="Of the profile: safety warnings, discharge time, terminals, line rules, addresses,"
-    " LEDs, command words, and errata of the manuals.",
+    help="Show warnings, wiring, LEDs, command words and errata.",
 )
 @json_option
 @told
@@ -143,7 +142,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise click.UsageError(f"{path} is there already; nothing was written.") from None
+        raise click.UsageError(f"{path} already exists; nothing was written.") from None
     if as_json:
         print_json({"id": new_id, "from": source.id, "file": str(path)})
         return

@@ -41,12 +41,10 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 @click.option(
     "--turning",
     is_flag=True,
-    help="Prove it with the motor turning: it may coast, and a hoist falls. It is stopped after.",
+    help="Test with the motor turning: it may coast; a hoist falls.",
 )
-@click.option("--yes", is_flag=True, help="With --turning: prove it without being asked.")
-@click.option(
-    "--reset", is_flag=True, help="Reset the fault in which the proof has left the drive."
-)
+@click.option("--yes", is_flag=True, help="Skip the question of --turning.")
+@click.option("--reset", is_flag=True, help="Reset the fault that the test has caused.")
 @read_only_option
 @json_option
 @told
@@ -64,7 +62,7 @@ def prove(
     Ends with 0 where it reacted as it is set to, with 1 otherwise. Nobody else on the line asks the
     drive meanwhile. The motor is at rest, unless --turning.
     """
-    need_arming(arm, "prove lets the drive trip on its communication time-out")
+    need_arming(arm, "prove lets the drive trip on its communication timeout")
 
     async def work(opened: OpenLine) -> bool:
         async with watched(opened, target) as (fleet, console):

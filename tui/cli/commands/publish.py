@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     "url",
     required=True,
     metavar="URL",
-    help="The broker: mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS.",
+    help="Use broker mqtt[s]://[USER@]HOST[:PORT][/TOPIC].",
 )
 @mqtt_password_option
 @every_option

@@ -247,7 +247,7 @@ def say_plan_left_out(plan: RestorePlan, messages: Messages) -> None:
     reasons: dict[str, list[str]] = {}
     for item in plan.of_kind("skip"):
         if item.reason == "rounding":
-            messages.tell(f"left out: {item.text.rstrip('.')}. --round writes that all the same.")
+            messages.tell(f"left out: {item.text.rstrip('.')}. Use --round to write it anyway.")
         elif item.reason != "no setting":
             reasons.setdefault(item.reason, []).append(item.code)
     for item in plan.of_kind("write"):

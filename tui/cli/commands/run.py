@@ -29,7 +29,7 @@ from .orders import arm_option, need_arming
     "seconds",
     type=seconds_range(above=True),
     metavar="S",
-    help="End after S seconds.",
+    help="Stop the motor after S seconds.",
 )
 @arm_option
 @click.option(
@@ -38,12 +38,12 @@ from .orders import arm_option, need_arming
 @click.option(
     "--unrecorded",
     is_flag=True,
-    help="Run even if the start cannot be recorded in the state folder.",
+    help="Start even if the start cannot be recorded.",
 )
 @click.option(
     "--take-control",
     is_flag=True,
-    help="Take the control from the drive's terminals first; their stop has no effect then.",
+    help="Take control from the terminals; their stop is disabled.",
 )
 @read_only_option
 @json_option

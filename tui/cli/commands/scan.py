@@ -25,18 +25,17 @@ ALL_ADDRESSES = "1-247"
     default=ALL_ADDRESSES,
     show_default=True,
     metavar="LIST",
-    help="Slave addresses to ask: 1-31, or 1,3,5-7.",
+    help="Scan these slave addresses: 1-31, or 1,3,5-7.",
 )
 @click.option(
     "--all-settings",
     is_flag=True,
-    help="Then try every other baud and format that drives can have, likely ones first and those"
-    " below 1200 baud, which take longest, last. The line is not shared meanwhile.",
+    help="Try every baud rate and format that drives can have.",
 )
 @click.option(
     "--yes",
     is_flag=True,
-    help="Try other settings although drives that were found act when they are asked no more.",
+    help="Try them even if drives found react when polling stops.",
 )
 @hold_option
 @read_only_option

@@ -41,7 +41,7 @@ from ..shared.signals import BY_SIGNAL, never_suspended
     "maps",
     multiple=True,
     metavar="IDS=LINE[@DEVICE]",
-    help="Which ids are drives of which line, counted from 1: 101-131=2@1.",
+    help="Map unit ids to drives of a line: 101-131=2@1.",
 )
 @click.option(
     "--fresh",
@@ -51,31 +51,31 @@ from ..shared.signals import BY_SIGNAL, never_suspended
     help="Answer by what was read up to S seconds ago.",
 )
 @click.option(
-    "--allow-writes", metavar="CODES|all", help="Settings that Modbus TCP clients may write."
+    "--allow-writes", metavar="CODES|all", help="Allow Modbus TCP clients to write these settings."
 )
 @click.option(
     "--allow-commands",
     is_flag=True,
-    help="Modbus TCP clients may start motors and give references, while no panel does.",
+    help="Allow Modbus TCP clients to command drives.",
 )
 @click.option(
     "--metrics",
     metavar="HOST:PORT",
-    help="Serve the values of the drives for Prometheus there; loopback where no host is named.",
+    help="Serve drive values to Prometheus (default host: loopback).",
 )
 @click.option(
     "--mqtt",
     metavar="URL",
-    help="Publish the values of the drives to a broker: mqtt://[USER@]HOST[:PORT][/TOPIC], mqtts:.",
+    help="Publish to mqtt[s]://[USER@]HOST[:PORT][/TOPIC].",
 )
 @mqtt_password_option
 @click.option(
     "--every",
     type=seconds(SHORTEST_CYCLE),
     metavar="S",
-    help="Cycle time in seconds of what goes to --metrics and --mqtt; 1 unless told otherwise.",
+    help="Poll for --metrics and --mqtt every S seconds (default: 1).",
 )
-@devices_option("Id of a drive that does not say who it is; -p names its profile.")
+@devices_option("Serve this drive, which does not identify itself; needs -p.")
 @profile_of("Profile of the drives of -d.")
 @json_option
 @told
@@ -109,10 +109,10 @@ def serve(
     if tcp is None:
         if maps or fresh or allow_writes or allow_commands:
             raise click.UsageError(
-                "--map, --fresh, --allow-writes, --allow-commands go with --tcp."
+                "--map, --fresh, --allow-writes, --allow-commands require --tcp."
             )
         if devices and plant is None:
-            raise click.UsageError("-d and -p go with --tcp, --metrics and --mqtt.")
+            raise click.UsageError("-d and -p require --tcp, --metrics or --mqtt.")
     wish = _wish(len(served), tcp, maps, fresh, allow_writes, allow_commands)
     served = with_named(served, wish, devices, profile_id)
     if plant is not None:

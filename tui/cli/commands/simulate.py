@@ -39,18 +39,20 @@ USUAL = (19200, "8E1")
 @click.option("--tcp", metavar="HOST:PORT", help="Serve Modbus TCP.")
 @click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="Serve RTU over TCP.")
 @click.option(
-    "--baud", type=click.IntRange(min=300), help="Baud rate; by default that of the first drive."
+    "--baud",
+    type=click.IntRange(min=300),
+    help="Use this baud rate (default: that of the first drive).",
 )
 @click.option(
     "--format",
     "form",
     metavar="8E1|8N2|...",
-    help="Character format; by default that of the first drive.",
+    help="Use this format (default: that of the first drive).",
 )
 @click.option(
     "--any-settings",
     is_flag=True,
-    help="Answer whatever baud rate and stop bits a client sets on the pseudo-terminal.",
+    help="Answer at any baud rate and stop bits of a client.",
 )
 @click.option("--real-time", is_flag=True, help="Keep the transmission times of the line.")
 @click.option(
@@ -58,14 +60,14 @@ USUAL = (19200, "8E1")
     "sets",
     multiple=True,
     metavar="[ADDRESS:]CODE=RAW",
-    help="Raw value from power-up; a measured word keeps it.",
+    help="Set a raw value at power-up; a measured word keeps it.",
 )
 @click.option(
     "--protect",
     "protects",
     multiple=True,
     metavar="[ADDRESS:]CODE,...",
-    help="Parameters that the drive refuses over the line.",
+    help="Refuse writes of these parameters over the line.",
 )
 @click.option(
     "--line-fault",
@@ -74,14 +76,16 @@ USUAL = (19200, "8E1")
     metavar="KIND=VALUE",
     help="Add a trouble to the line, such as lost=0.1 (docs/cli.md).",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the line faults.")
+@click.option(
+    "--seed", type=int, default=0, show_default=True, help="Use this seed for line faults."
+)
 @click.option(
     "--run",
     "run_hz",
     type=FiniteRange(-1000, 1000),
     default=0.0,
     metavar="HZ",
-    help="Motors run at this frequency, by terminals or as another master left them.",
+    help="Run the motors at this frequency from the start.",
 )
 @json_option
 @told

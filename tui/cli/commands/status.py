@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 @drives_options
 @force_profile_option
 @hold_option
-@click.option("--all", "every", is_flag=True, help="Every drive that answers, a line each.")
+@click.option("--all", "every", is_flag=True, help="Show every drive that answers, one line each.")
 @click.option(
     "--addresses",
     metavar="LIST",
-    help=f"With --all: where to look, like 1-31 or 1,2,31; {USUAL_SEARCH} unless told.",
+    help=f"Scan these addresses with --all (default: {USUAL_SEARCH}).",
 )
 @read_only_option
 @json_option
@@ -60,7 +60,7 @@ def status(
     With --all it says where to look on that line.
     """
     if addresses and not every:
-        raise click.UsageError("--addresses goes with --all.")
+        raise click.UsageError("--addresses requires --all.")
     wishes = lines_wished(target, more)
     if every:  # a profile of the settings file is that of one drive
         wishes = [one.with_profile(target.profile_id) for one in wishes]

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 USUAL_ADDRESSES = "1-10"
 STOP_POLL_INTERVAL = 0.05
 NAMES_NO_FAMILY = (
-    "Device {}: NOT STOPPED: it does not say who it is. Name its profile with -p (drivepanel"
+    "Device {}: NOT STOPPED: it does not identify itself. Name its profile with -p (see drivepanel"
     " profiles), or stop it at the machine."
 )
 
@@ -52,16 +52,14 @@ NAMES_NO_FAMILY = (
 @click.option(
     "--addresses",
     metavar="LIST",
-    help=f"With --all: where to look, like 1-10 or 1,2,31; {USUAL_ADDRESSES} unless told"
-    " otherwise, or the drives of a simulated line.",
+    help=f"Scan these addresses with --all (default: {USUAL_ADDRESSES}).",
 )
 @click.option("--quick", is_flag=True, help="Stop by the drive's quick stop.")
 @click.option("--freewheel", is_flag=True, help="Stop by freewheel: the motor coasts.")
 @click.option(
     "--give-back",
     is_flag=True,
-    help="Then give the control back to the terminals; a run command waiting there starts the"
-    " motor, so this needs --arm.",
+    help="Give control back to the terminals. Requires --arm.",
 )
 @click.option("--arm", is_flag=True, help="Arm the drive for --give-back; no stop needs it.")
 @read_only_option
@@ -82,11 +80,11 @@ def stop(
     if quick and freewheel:
         raise click.UsageError("Either --quick or --freewheel.")
     if addresses and not every:
-        raise click.UsageError("--addresses goes with --all.")
+        raise click.UsageError("--addresses requires --all.")
     if give_back and (every or target.others):
         raise click.UsageError("--give-back is for one drive, not for several.")
     if read_only:
-        raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
+        raise Failure("The line is read-only: nothing is written, not even a stop.", REFUSED_HERE)
     from tui.bus.api import LineStatus
 
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"

@@ -31,11 +31,13 @@ if TYPE_CHECKING:
 @click.argument("value", required=False)
 @click.argument("unit", required=False)
 @drive_options
-@click.option("--forget", is_flag=True, help="Forget the scale of CODE: it is shown raw again.")
+@click.option(
+    "--forget", is_flag=True, help="Delete the learned scale of CODE and show it raw again."
+)
 @click.option(
     "--reference",
     is_flag=True,
-    help="Confirm that CODE, once taught, takes the drive's reference.",
+    help="Use CODE to write the drive's reference.",
 )
 @click.option(
     "--no-reference", is_flag=True, help="Set the reference by no taught parameter any more."

@@ -57,7 +57,7 @@ class CsvWish:
         """Raise Failure where a file would be lost, UsageError for options without a file."""
         if self.path is None:
             if self.append or self.force or self.rotate is not None:
-                raise click.UsageError("--append, --force and --rotate go with --csv FILE.")
+                raise click.UsageError("--append, --force and --rotate require --csv FILE.")
             return
         if self.append and self.force:
             raise click.UsageError("Either --append or --force.")
@@ -80,22 +80,23 @@ class CsvWish:
 @click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options
 @every_option
-@click.option("--count", type=click.IntRange(min=1), metavar="N", help="End after N cycles.")
+@click.option(
+    "--count", type=click.IntRange(min=1), metavar="N", help="Stop polling after N cycles."
+)
 @click.option(
     "--csv",
     "csv_path",
     type=click.Path(dir_okay=False, writable=True, path_type=Path),
     metavar="FILE",
-    help="Also write the engineering values to a CSV file.",
+    help="Write the engineering values to a CSV file too.",
 )
-@click.option("--append", is_flag=True, help="Continue a CSV file that exists.")
+@click.option("--append", is_flag=True, help="Add to a CSV file that exists.")
 @click.option("--force", is_flag=True, help="Replace a CSV file that exists.")
 @click.option(
     "--rotate",
     callback=rotation,
     metavar="SIZE|day",
-    help="Rename the CSV file, with the time in its name, at this size (10MB) or when the day ends,"
-    " and begin a new one.",
+    help="Start a new CSV file at this size (10MB) or each day.",
 )
 @force_profile_option
 @read_only_option

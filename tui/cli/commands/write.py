@@ -135,7 +135,7 @@ async def _staged(
     try:
         edits, retrying = await stage_typed(session, pairs, rounded=rounded)
     except WouldRound as loss:
-        raise ValueRefused(f"{loss} --round writes that all the same.") from loss
+        raise ValueRefused(f"{loss} Use --round to write it anyway.") from loss
     for edit in edits.asked:
         if edit.remark:
             messages.tell(edit.remark)

@@ -44,7 +44,7 @@ mqtt_password_option = click.option(
     "password_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE",
-    help=f"The password for the broker, on the first line; else that of {PASSWORD_SETTING}.",
+    help="Read the broker password from the first line of a file.",
 )
 
 
@@ -69,7 +69,7 @@ def broker_of(url: str, password_file: Path | None) -> Broker:
     password = _password(password_file)
     if password is not None and user is None:
         if password_file is not None:
-            raise click.UsageError("A password goes with a user: mqtt://USER@HOST.")
+            raise click.UsageError("A password requires a user: mqtt://USER@HOST.")
         password = None
     need_mqtt()
     host, tls = parts.hostname, parts.scheme == "mqtts"

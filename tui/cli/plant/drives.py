@@ -171,7 +171,7 @@ class PlantDrive:
 
         if self._sign(self.device) is not None:
             # who it is was not asked before: nothing feeds a motor whose client may have died
-            self._error = f"Device {self.device} is not asked who it is: a client runs its motor."
+            self._error = f"Device {self.device} was not identified: a client runs its motor."
             return None
         try:
             await self._answers()
@@ -267,7 +267,7 @@ async def _learn_timeout(session: DriveSession) -> None:
     try:
         session.timeout = await read_timeout(Reader(session), Priority.POLL)
     except LineError as error:
-        log.info("device %s did not tell its time-out: %s", session.device, error)
+        log.info("the timeout of device %s was not read: %s", session.device, error)
 
 
 def _is_orphan(session: DriveSession) -> bool:

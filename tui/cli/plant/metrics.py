@@ -99,7 +99,7 @@ METRICS: Mapping[str, MetricHead] = {
     "drive_cycle_wished_seconds": MetricHead("gauge", "The same as --every asks for it."),
     "drive_state": MetricHead("gauge", "1 for the state that the drive is in."),
     "drive_fault_info": MetricHead("gauge", "The fault that the drive is in now."),
-    "drive_alarm": MetricHead("gauge", "Whether the drive tells an alarm."),
+    "drive_alarm": MetricHead("gauge", "1 while the drive reports an alarm."),
     "drive_requests_total": MetricHead("counter", "Frames that were sent to the drive."),
     "drive_replies_total": MetricHead("counter", "Whole and right replies of the drive."),
     "drive_timeouts_total": MetricHead("counter", "Requests that the drive did not answer."),

@@ -91,7 +91,7 @@ class MqttPublisher:
         async with self._client() as client:
             self.connected = True
             if self._trouble:
-                say(f"drivepanel: {self._broker.place} is there again.", err=True)
+                say(f"drivepanel: {self._broker.place} is connected again.", err=True)
                 self._trouble = ""
             lost = asyncio.create_task(_until_lost(client))
             lost.add_done_callback(lambda _: self._news.set())

@@ -31,10 +31,10 @@ def plant_wish(
 ) -> PlantWish | None:
     """What the options ask for; None for nothing. Raises UsageError."""
     if password_file is not None and mqtt is None:
-        raise click.UsageError("--mqtt-password-file goes with --mqtt.")
+        raise click.UsageError("--mqtt-password-file requires --mqtt.")
     if metrics is None and mqtt is None:
         if every is not None:
-            raise click.UsageError("--every goes with --metrics and --mqtt.")
+            raise click.UsageError("--every requires --metrics or --mqtt.")
         return None
     broker = broker_of(mqtt, password_file) if mqtt is not None else None
     place = host_port(metrics) if metrics is not None else None
@@ -71,8 +71,9 @@ def warn_of_strangers(host: str, port: int) -> None:
     """Say what it means that other computers read the metrics."""
     if not is_loopback(host):
         say(
-            "drivepanel: metrics know no password: whoever reaches"
-            f" {written_host_port(host, port)} reads these drives. Let a firewall decide who does.",
+            "drivepanel: metrics have no password: anyone who can reach"
+            f" {written_host_port(host, port)} can read these drives."
+            " Restrict access by a firewall.",
             err=True,
         )
 

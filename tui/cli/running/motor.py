@@ -185,7 +185,7 @@ class Run:
         if fault := fault_text(latest.state):
             text = f"{who} tripped: {fault}. Look at the machine; reset it when its cause is gone."
             return text, DRIVE_REFUSED
-        by = "by itself or from elsewhere"
+        by = "by the drive or by another source"
         if session.work.stops:
             by = f"by {session.work.stopped_by}"
         elif lost := self.console.commander.given.changed_words():
@@ -210,7 +210,7 @@ class Run:
                 return self.telling.tell("stopped", f"Device {session.device}: stopped.")
             bad = await self._line_was_bad(ordered)
             if self._stands():
-                return self.telling.tell("stopped", f"Device {session.device}: it stands.")
+                return self.telling.tell("stopped", f"Device {session.device} is at standstill.")
             # a ramp may be longer than a stop is followed
             if not bad and latest_of(self.console).state.kind != "stopping":
                 failed += 1
@@ -248,7 +248,7 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
 
     def gone() -> None:
         with suppress(RuntimeError):  # the loop has ended: nothing runs any more
-            loop.call_soon_threadsafe(ending.end, "nobody reads the output any more")
+            loop.call_soon_threadsafe(ending.end, "its output is no longer read")
 
     voice = Voice(gone)
     starts = StartKeeper("run")

@@ -74,7 +74,7 @@ class ScanTelling:
         text = watching_text(found)
         if not text:
             return
-        told = f"{text} What is found is asked on until this command ends."
+        told = f"{text} Drives found are polled until this command ends."
         if self._as_json:
             rows = [
                 {"profile": f.id, "name": f.name, "timeout": f.code, "sure": f.sure} for f in found

@@ -225,16 +225,15 @@ class Scan:
         if others := self.opened.line.facts.others:
             return f"{NONE_TRIED}: {others[0].text} uses the line now."
         acting = [text for one in self.sessions if (text := await self._acts(one))]
-        acting += [f"Device {one}: what it does when it is asked no more is not known." for one in
+        acting += [f"Device {one}: its timeout reaction is not known." for one in
                    self.unknown]  # fmt: skip
         if not acting:
             return ""
         told = "\n".join(acting)
         if not (self.yes or may_ask()):
-            return (
-                f"{NONE_TRIED}: none of these would be asked on. --yes tries all the same.\n{told}"
-            )
-        self.tell.note(f"At other settings none of these is asked any more.\n{told}")
+            why = "polling of these drives would stop. Use --yes to try anyway."
+            return f"{NONE_TRIED}: {why}\n{told}"
+        self.tell.note(f"At other settings these drives are not polled.\n{told}")
         if self.yes or await says_yes("Try the other settings?"):
             return ""
         return f"{NONE_TRIED}."

@@ -40,7 +40,7 @@ class Service:
             if alive():
                 self._tell("WATCHDOG=1")
             else:
-                log.error("the line stands still: systemd is given no sign of life")
+                log.error("the line loop hangs: systemd gets no heartbeat")
             await asyncio.sleep(self._limit / SHARE_OF_WATCHDOG)
 
     @property

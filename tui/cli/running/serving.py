@@ -183,11 +183,11 @@ def _warn(wish: GatewayWish, host: str, port: int) -> None:
     """Say what it means to listen where other computers reach it."""
     if is_loopback(host):
         return
-    more = ", and may do what the options allow" if _allows(wish.rules) else ""
+    more = ", and do what the options allow" if _allows(wish.rules) else ""
     say(
-        f"drivepanel: Modbus TCP knows no password: whoever reaches"
-        f" {written_host_port(host, port)} reads these drives and stops their motors{more}."
-        " Let a firewall decide who does.",
+        f"drivepanel: Modbus TCP has no password: anyone who can reach"
+        f" {written_host_port(host, port)} can read these drives and stop their motors{more}."
+        " Restrict access by a firewall.",
         err=True,
     )
 

@@ -63,7 +63,7 @@ class StopTelling:
         if status:
             complain(f"NOT STOPPED: no answer at {', '.join(map(str, devices))}.")
         else:
-            complain(f"Nobody answers at {addresses_text(devices)}.")
+            complain(f"No answer at {addresses_text(devices)}.")
         for device in devices if status else ():
             self._keep(device, None, "No answer.", status)
 

@@ -41,7 +41,7 @@ def complete_line(_: click.Context, __: click.Parameter, incomplete: str) -> Ite
 
 def complete_side(context: click.Context, option: click.Parameter, incomplete: str) -> Items:
     """What `compare` compares: a file, a LINE, or the factory."""
-    factory = [CompletionItem("factory", help="the factory settings")]
+    factory = [CompletionItem("factory", help="Compare with the factory settings.")]
     found = [item for item in factory if item.value.startswith(incomplete)]
     return found or complete_line(context, option, incomplete) or [FILE]
 

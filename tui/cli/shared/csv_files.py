@@ -38,7 +38,7 @@ def rotation(_: click.Context, option: click.Parameter, text: str | None) -> int
 def refuse_unasked(path: Path, *, append: bool, force: bool) -> None:
     """Raise Failure where a file exists and is neither to be continued nor replaced."""
     if path.exists() and not (append or force):
-        raise Failure(f"{path} is there already. Use another name, --append or --force.", USAGE)
+        raise Failure(f"{path} already exists. Choose another name, --append or --force.", USAGE)
 
 
 class CsvFile:

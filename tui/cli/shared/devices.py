@@ -29,7 +29,7 @@ device_option = click.option(
     default=(1,),
     show_default=True,
     metavar="ADDRESS",
-    help="Slave address of the drive.",
+    help="Use the drive at this slave address.",
 )
 several_devices_option = click.option(
     "-d",
@@ -39,7 +39,7 @@ several_devices_option = click.option(
     default=(1,),
     show_default=True,
     metavar="ADDRESS",
-    help="Slave address of the drive; several times for several drives.",
+    help="Use the drive at this slave address; repeatable.",
 )
 
 

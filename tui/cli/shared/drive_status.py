@@ -195,9 +195,9 @@ def _refused(session: DriveSession) -> str:
     raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
     if chart is None:
-        return "What decides about its commands could not be read."
+        return "Its command source could not be read."
     if not chart.orders:
-        return f"This drive is not commanded from here: {chart.name}."
+        return f"Drive Panel does not command this drive: {chart.name}."
     if session.line.read_only:
         return "The line is read-only: nothing is written."
     held = held_back(session.profile, chart, "forward", raws)
@@ -266,8 +266,8 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         *(found if of_alarm else []),
         *status.channels.items(),
         *(("Besides", text) for text in status.switches),
-        ("From here", status.refused or "commands can have an effect"),
-        ("Comm. time-out", _time_out_text(status)),
+        ("Commands", status.refused or "commands can have an effect"),
+        ("Comm. timeout", _time_out_text(status)),
         *control_row(status.session),
         *shown_values(profile, status.readings).items(),
         *([("Not read", ", ".join(status.unread))] if status.unread else []),
@@ -279,7 +279,7 @@ def _time_out_text(status: Status) -> str:
     if rules is not None and rules.timeout in status.unread:
         return f"not known: {rules.timeout} was not read"
     if not status.timeout.known:
-        return "not told by this drive: it may act when nobody asks it"
+        return "cannot be read: the drive may react when polling stops"
     return watch_text(status.watch)
 
 

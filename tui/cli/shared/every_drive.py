@@ -32,6 +32,6 @@ async def every_drive(opened: OpenLine, target: Target, addresses: str | None) -
 
     await Search(devices, patient=opened.simulation is not None).run(opened.line, take)
     if not found:
-        raise Failure(f"Nobody answers at {addresses or USUAL_SEARCH}.", LINE_TROUBLE)
+        raise Failure(f"No answer at {addresses or USUAL_SEARCH}.", LINE_TROUBLE)
     first, *others = sorted(found)
     return target._replace(device=first, others=tuple(others))

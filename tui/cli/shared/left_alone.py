@@ -75,8 +75,8 @@ def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
     who = f"Device {session.device}, {session.profile.name}"
     if not found.known:
         return (
-            f"{who}: it does not tell its communication time-out; it may act when nobody asks it."
-            f"\nTo ask it on: {hold_text(session, line_text)}."
+            f"{who}: its communication timeout cannot be read; it may react when polling stops."
+            f"\nTo keep polling it: {hold_text(session, line_text)}."
         )
     watch = found.watch
     if watch is None or not watch.active:
@@ -85,8 +85,8 @@ def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
     runs = "" if watch.sure else " (when it begins is in no document)"
     after = " After a trip: drivepanel reset." if watch.trips else ""
     return (
-        f"{who}: its communication time-out {watch.code} runs{runs}. After {watch.timeout:g} s"
-        f" without a request: {does}.\nTo ask it on: {hold_text(session, line_text)}.{after}"
+        f"{who}: its communication timeout {watch.code} runs{runs}. After {watch.timeout:g} s"
+        f" without a request: {does}.\nTo keep polling it: {hold_text(session, line_text)}.{after}"
     )
 
 
@@ -126,6 +126,6 @@ async def say_farewells(opened: OpenLine) -> None:
     """Say what each drive does that was asked, the line being open yet."""
     for device, farewell in list(opened.farewells.items()):
         if device in opened.line.pace.others:
-            log.info("device %s is asked on by another program on the line", device)
+            log.info("device %s is polled by another program on the line", device)
         else:
             await farewell.tell()

@@ -129,7 +129,7 @@ def named_line_of(text: str, *, stops: bool = False) -> NamedLine | None:
     settings = named_lines.line_settings()
     if found is None and settings.lines and not os.path.exists(text):
         names = ", ".join(one.name for one in settings.lines.values())
-        raise click.UsageError(f"{text} is no LINE, and none of those in {settings.path}: {names}.")
+        raise click.UsageError(f"{text!r} is not a LINE or a name from {settings.path} ({names}).")
     if found is not None and text.casefold() not in settings.lines:
         for fault in settings.faults:
             say(f"drivepanel: {fault}", err=True)
@@ -174,7 +174,7 @@ _accept_option = click.option(
     is_flag=True,
     expose_value=False,
     callback=_note_accepted,
-    help="Take the line as it is now: another adapter, or other drives, than before.",
+    help="Accept a changed line: another adapter or other drives.",
 )
 
 
@@ -188,7 +188,7 @@ share_group_option = click.option(
     metavar="GROUP",
     expose_value=False,
     callback=_note_group,
-    help="Let users of this group attach to the line; unless told, this user alone may.",
+    help="Share the line with users of this group (default: only you).",
 )
 
 

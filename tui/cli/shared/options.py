@@ -42,7 +42,7 @@ every_option = click.option(
     default=1.0,
     show_default=True,
     metavar="S",
-    help="Target cycle time in seconds.",
+    help="Set the target cycle time in seconds.",
 )
 
 
@@ -64,7 +64,7 @@ rated_current_option = click.option(
     "rated_current",
     type=FiniteRange(0, 10000, min_open=True),
     metavar="A",
-    help="Rated current of the drive in A, for families that tell currents in %.",
+    help="Set the rated current in A, if currents are in %.",
 )
 
 
@@ -91,7 +91,7 @@ force_profile_option = click.option(
     FORCE_PROFILE,
     "force_profile",
     is_flag=True,
-    help="Use the profile of -p although the drive identifies as another.",
+    help="Use the profile of -p even if the drive contradicts it.",
 )
 """For commands that read, watch or write; it reaches them in their Target."""
 
@@ -99,8 +99,7 @@ hold_option = click.option(
     "--hold",
     type=seconds(above=True),
     metavar="S",
-    help="Then ask the drive on for S seconds, so that its communication time-out does not run"
-    " out; its own protection against a lost line is off meanwhile.",
+    help="Keep polling S seconds more; its timeout does not act.",
 )
 
 
@@ -110,8 +109,8 @@ def never_forced(command: CommandFunction) -> CommandFunction:
     def refuse(context: click.Context, _option: click.Parameter, given: bool) -> None:
         if given:
             raise click.UsageError(
-                f"{FORCE_PROFILE} is not for {context.info_name}: it goes by the drive's own"
-                " profile only. It is for read, watch and write."
+                f"{FORCE_PROFILE} does not apply to {context.info_name}, which uses the drive's own"
+                " profile only. Use it with read, watch and write."
             )
 
     return click.option(
@@ -269,7 +268,7 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
         raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
     session.arming.barred = ""
     say(
-        f"drivepanel: {session.contradiction} By {FORCE_PROFILE} it is taken as one all the same:"
+        f"drivepanel: {session.contradiction} {FORCE_PROFILE} uses this profile anyway:"
         " values, units and names may be wrong.",
         err=True,
     )
@@ -302,7 +301,7 @@ def unidentified(identity: DriveIdentity) -> click.UsageError:
     """The error for a drive that no profile was named for and none fits."""
     from tui.drive.profile import library
 
-    who = f"as {identity.reference!r}" if identity.reference else "but does not say who it is"
+    who = f"as {identity.reference!r}" if identity.reference else "but does not identify itself"
     fits = identity.candidates or tuple(listing.id for listing in library.listings())
     return click.UsageError(
         f"Device {identity.device} answers {who}; name its profile with -p: {', '.join(fits)}."

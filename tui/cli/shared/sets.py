@@ -47,19 +47,19 @@ confirm_option = click.option(
     multiple=True,
     metavar="CODE",
     shell_complete=complete_code,
-    help="Write this unverified parameter too, once its value was compared with the keypad.",
+    help="Write this unverified parameter after a keypad check.",
 )
 save_option = click.option(
-    "--save", is_flag=True, help="Then save the settings to the drive's EEPROM."
+    "--save", is_flag=True, help="Save the settings to the drive's EEPROM at the end."
 )
 round_option = click.option(
     "--round",
     "rounded",
     is_flag=True,
-    help="Write also values that are rounded to another one: to 0, or by half a step.",
+    help="Write values even if rounded to 0 or by half a step.",
 )
 dry_run_option = click.option(
-    "--dry-run", is_flag=True, help="Tell what would be written; write nothing."
+    "--dry-run", is_flag=True, help="Show what would be written; write nothing."
 )
 
 
@@ -77,7 +77,7 @@ def set_in(path: Path) -> ParameterSet:
 def refuse_existing(file: Path, *, force: bool) -> None:
     """Raise Failure with status 2 where a file would be lost; asked before the line is opened."""
     if file.exists() and not force:
-        raise Failure(f"{file} is there already. Use another name, or --force.", USAGE)
+        raise Failure(f"{file} already exists. Choose another name or use --force.", USAGE)
 
 
 def write_down(

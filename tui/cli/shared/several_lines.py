@@ -99,7 +99,7 @@ def further_lines(words: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...
     lines = tuple(takewhile(_is_line, words))
     rest = tuple(words[len(lines) :])
     if late := [one for one in rest if is_written_out(one)]:
-        raise click.UsageError(f"{late[0]}: every LINE stands before the first CODE.")
+        raise click.UsageError(f"{late[0]}: put every LINE before the first CODE.")
     return lines, rest
 
 
