@@ -21,7 +21,7 @@ from tui.bus.line import Line
 from tui.bus.model import DeviceCounters, DeviceState, LineCounters, LineState, LineStatus
 from tui.bus.poll_plan import PlannedRead, PollPlan
 from tui.bus.program import Program
-from tui.bus.share.failures import ErrorForm
+from tui.bus.share.carried import ErrorForm
 from tui.bus.share.messages import (
     VERSION,
     Alive,

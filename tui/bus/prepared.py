@@ -11,8 +11,8 @@ from .limits import Limits
 from .link import Link, TcpLink
 from .model import Priority
 from .requests import Request, write_request
+from .share.carried import request_form
 from .share.messages import Asking, packed
-from .share.request_forms import request_form
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,8 @@ from ..model import Priority
 from ..requests import BROADCAST
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .failures import error_of
+from .carried import error_of, request_form
 from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw
-from .request_forms import request_form
 
 OWNER_ENDED = "The program that owned the line ended"
 

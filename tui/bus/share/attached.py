@@ -17,7 +17,7 @@ from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .failures import failure_told
+from .carried import failure_told, request_of
 from .messages import (
     Alive,
     Answer,
@@ -30,7 +30,6 @@ from .messages import (
     seen_frames,
 )
 from .owner_watch import is_stop
-from .request_forms import asked_request
 
 log = logging.getLogger(__name__)
 
@@ -126,7 +125,11 @@ class Client:
         """It asks for something on the line. Raises NoMessage."""
         if len(self.asked) >= MOST_ASKED:
             raise NoMessage("too many requests at once")
-        request, priority = asked_request(message), message.priority
+        try:
+            request = request_of(message.kind, message.fields)
+        except ValueError as error:
+            raise NoMessage(str(error)) from error
+        priority = message.priority
         limits = message.limits or self.limits.get(request.device, CAUTIOUS)
         job = Job(request, priority, limits, replaceable=message.replaceable)
         job.program, job.stamp = self.program.id, message.stamp

@@ -40,7 +40,7 @@ from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priori
 from ..notes import LineNote
 from ..program import Program
 from ..trace import Frame, FrameDirection
-from .failures import ErrorForm
+from .carried import ErrorForm
 from .poll_messages import Polled, Subscribe, Unsubscribe
 
 VERSION = 7

@@ -6,7 +6,7 @@ from ..errors import LineError
 from ..model import LineState, LineStatus
 from ..schedule.inside import LineInside, Say
 from ..trace import Frame
-from .failures import error_of
+from .carried import error_of
 from .messages import News
 
 

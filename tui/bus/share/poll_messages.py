@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from ..bounds import ByteString, MonotonicTime, Number, Word
 from ..poll_plan import MOST_READS, MOST_TURNS, PollPlan
-from .failures import ErrorForm
+from .carried import ErrorForm
 
 
 class Subscribe(msgspec.Struct, frozen=True, tag=True):

@@ -19,7 +19,7 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import SHARE, greatest
 from ..schedule.queue import Job
 from .attached import Client
-from .failures import failure_told
+from .carried import failure_told
 from .messages import NoMessage
 from .poll_messages import Polled, PolledReply, Subscribe
 from .polls_submitted import plan_refusal

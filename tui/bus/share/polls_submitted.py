@@ -12,7 +12,7 @@ from ..poll_plan import PolledTurn, PollPlan
 from ..requests import read_request
 from ..schedule.inside import LineInside
 from ..schedule.polls import Subscription
-from .failures import error_of
+from .carried import error_of
 from .messages import AnyMessage, NoMessage
 from .poll_messages import Polled, PolledReply, Subscribe, Unsubscribe
 

@@ -1,4 +1,4 @@
-"""The errors of a line as messages carry them from its owner to the program that asked."""
+"""Requests for the line, and its errors, as messages carry them between programs."""
 
 from __future__ import annotations
 
@@ -34,9 +34,46 @@ from ..errors import (
     Superseded,
     WrongReply,
 )
+from ..limits import out_of_range
+from ..requests import (
+    Diagnose,
+    Identify,
+    Read,
+    ReadInput,
+    ReadWrite,
+    ReportId,
+    Request,
+    WriteMany,
+    WriteOne,
+)
 
 MOST_PORTS = 64
 """Serial ports that a message names; more are left out."""
+REQUEST_KINDS: Mapping[str, type[Request]] = {
+    kind.__name__: kind
+    for kind in (Read, ReadInput, WriteOne, WriteMany, ReadWrite, Diagnose, Identify, ReportId)
+}
+
+
+def request_form(request: Request) -> tuple[str, dict[str, Any]]:
+    """A request as a message carries it."""
+    return type(request).__name__, msgspec.to_builtins(request, builtin_types=(bytes,))
+
+
+def request_of(kind: str, fields: dict[str, Any]) -> Request:
+    """The request that a message carries. Raises ValueError."""
+    if kind not in REQUEST_KINDS:
+        raise ValueError(f"request {kind!r}")
+    try:
+        request = msgspec.convert(fields, REQUEST_KINDS[kind])
+        bytes([request.device])
+        request.pdu()
+    except Exception as error:
+        # a request that cannot be put into bytes, for whichever reason, is none
+        raise ValueError(str(error)) from error
+    if why := out_of_range(request):
+        raise ValueError(why)
+    return request
 
 
 class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
