@@ -12,7 +12,7 @@ import pytest
 from tui.bus.bounds import MOST_FRAMES
 from tui.bus.notes import LineNote
 from tui.bus.program import KEEPER, Program
-from tui.bus.share.line_past import line_past
+from tui.bus.share.beside import line_past
 from tui.bus.share.place import Owner, owner_of_lock
 
 from .conftest import Share

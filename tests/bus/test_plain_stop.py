@@ -14,9 +14,7 @@ import pytest
 from tui.bus.bounds import MOST_STOPPERS
 from tui.bus.line import Line
 from tui.bus.program import Program
-from tui.bus.share.messages import LONGEST_MESSAGE, NoMessage
-from tui.bus.share.place import Peer
-from tui.bus.share.plain_stop import (
+from tui.bus.share.beside import (
     GIVEN,
     LONGEST_PLAIN_STOP,
     STOP_HEAD,
@@ -24,6 +22,8 @@ from tui.bus.share.plain_stop import (
     send_plain_stop,
     stop_devices,
 )
+from tui.bus.share.messages import LONGEST_MESSAGE, NoMessage
+from tui.bus.share.place import Peer
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest

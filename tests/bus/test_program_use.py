@@ -17,7 +17,7 @@ from tui.bus.line import Line
 from tui.bus.model import LastMinute, LineCounters
 from tui.bus.program import KEEPER, Program
 from tui.bus.program_use import USE_WINDOW, ProgramUse, use_by_program
-from tui.bus.share.line_clients import LineClient, LineLook, line_look, look_answer
+from tui.bus.share.beside import LineClient, LineLook, line_look, look_answer
 from tui.bus.share.place import Owner, owner_of_lock
 
 from .conftest import Share

@@ -14,8 +14,8 @@ from tests.programs import drivepanel
 from tests.sweeps import kept
 from tui.bus.model import LastMinute
 from tui.bus.program import Program
-from tui.bus.share import line_clients
-from tui.bus.share.line_clients import LineLook
+from tui.bus.share import beside
+from tui.bus.share.beside import LineLook
 from tui.bus.share.place import Owner
 from tui.cli.main import main
 from tui.cli.shared.lines import is_line
@@ -313,7 +313,7 @@ def test_open_line_shows_the_replies_of_its_last_minute(monkeypatch: pytest.Monk
     }
     held = [Owner(1, Program("k", "keeper", 7), "", line=line) for line in owners]
     monkeypatch.setattr(share_place, "owners", lambda: held)
-    monkeypatch.setattr(line_clients, "line_look", lambda owner: owners[owner.line])
+    monkeypatch.setattr(beside, "line_look", lambda owner: owners[owner.line])
     minutes = [one["last_minute"] for one in json.loads(run(0, "lines", "--json"))["open"]]
     assert minutes[1:] == [None, None]
     assert (minutes[0]["share"], minutes[0]["good"], minutes[0]["lost"]) == (0.95, 19, 1)

@@ -598,7 +598,7 @@ DEFECTS = (
     ),
     Defect(
         "direct-stop-without-its-end",
-        "tui/bus/share/plain_stop.py",
+        "tui/bus/share/beside.py",
         'b"%s %s\\n" % (STOP_HEAD',
         'b"%s %s" % (STOP_HEAD',
         "The keeper waits for the end of the line, and no drive is stopped.",
@@ -692,7 +692,7 @@ DEFECTS = (
     ),
     Defect(
         "stop-that-nobody-took-counts",
-        "tui/bus/share/plain_stop.py",
+        "tui/bus/share/beside.py",
         "        if connection.recv(len(GIVEN)) != GIVEN:",
         "        if connection.recv(len(GIVEN)) is None:",
         "A stop that the keeper did not take counts as given, and is not tried again.",

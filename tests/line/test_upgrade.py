@@ -15,7 +15,7 @@ import pytest
 
 from tests.programs import drivepanel, keepers, wait_until
 from tests.sources import ROOT
-from tui.bus.share.plain_stop import GIVEN
+from tui.bus.share.beside import GIVEN
 from tui.cli.shared.errors import LINE_TROUBLE
 from tui.session.connect.share_place import owners
 

@@ -283,7 +283,7 @@ def _is_socket(address: str, folder: str, user: int) -> bool:
 
 
 def _send(address: str, devices: str) -> None:
-    """Send the stop in its plain form, see tui.bus.share.plain_stop; wait until it is taken."""
+    """Send the stop in its plain form, see tui.bus.share.beside; wait until it is taken."""
     from _socket import AF_UNIX, socket
 
     folder = -1

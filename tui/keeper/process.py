@@ -17,9 +17,9 @@ from tui.bus.line import Line, timing_of
 from tui.bus.link import parse_link
 from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER
+from tui.bus.share.beside import FRAMES_KEPT
 from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
 from tui.bus.share.keeping import KeeperOrder
-from tui.bus.share.line_past import FRAMES_KEPT
 from tui.bus.share.messages import VERSION
 from tui.bus.share.sharing import KEEPER_STARTS
 from tui.session.connect.share_place import this_program

@@ -14,8 +14,15 @@ from ..bounds import MOST_PROGRAMS
 from ..link import label
 from ..schedule.inside import LineInside
 from .attached import Client
-from .line_clients import LOOK_HEAD, look_answer
-from .line_past import PAST_HEAD, send_past
+from .beside import (
+    GIVEN,
+    LOOK_HEAD,
+    PAST_HEAD,
+    STOP_HEAD,
+    look_answer,
+    plain_stop,
+    send_past,
+)
 from .messages import (
     LENGTH,
     VERSION,
@@ -31,7 +38,6 @@ from .messages import (
     packed,
 )
 from .place import peer_of
-from .plain_stop import GIVEN, STOP_HEAD, plain_stop
 
 HELLO_WITHIN = 2.0
 """Seconds that a program has for its greeting."""
@@ -79,18 +85,8 @@ class Greeting:
         """
         async with asyncio.timeout(HELLO_WITHIN):
             head = await reader.readexactly(LENGTH)
-            if head == STOP_HEAD:
-                await self._hear_stop(reader, writer)
-                return None
-            if head == LOOK_HEAD and not self._is_stranger(writer):
-                tally = self._inside.around.tally
-                minute = tally.minute.total(tally.clock())
-                programs = self._inside.facts.programs
-                writer.write(look_answer(programs, tally.use.shares, minute))
-                return None
-            if head == PAST_HEAD and not self._is_stranger(writer):
-                frames = self._inside.around.trace.frames()
-                await send_past(writer, frames, self._inside.facts.notes.all)
+            if head in (STOP_HEAD, LOOK_HEAD, PAST_HEAD):
+                await self._answer_beside(head, reader, writer)
                 return None
             message = await next_message(reader, head)
         if isinstance(message, Pulse):
@@ -123,12 +119,22 @@ class Greeting:
             client.hears(message, self._inside.clock())
             message = await next_message(reader)
 
-    async def _hear_stop(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _answer_beside(
+        self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        facts, around = self._inside.facts, self._inside.around
         if self._is_stranger(writer):
-            raise NoMessage("a stop of another user")
+            raise NoMessage(f"{head.decode()} of another user")
+        if head == LOOK_HEAD:
+            tally = around.tally
+            minute = tally.minute.total(tally.clock())
+            writer.write(look_answer(facts.programs, tally.use.shares, minute))
+            return
+        if head == PAST_HEAD:
+            await send_past(writer, around.trace.frames(), facts.notes.all)
+            return
         peer = peer_of(writer.get_extra_info("socket"))
         stop = await plain_stop(reader, self._inside.devices.known, peer)
-        facts = self._inside.facts
         self._stopped(stop)
         facts.holder.hear_stop_due(stop.devices, stop.program.text)
         self._holder.moved(arrived=False)  # its port may be closed

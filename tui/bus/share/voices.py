@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .beside import send_plain_stop
 from .messages import AnyMessage, Armed, Claim, Hush
-from .plain_stop import send_plain_stop
 
 if TYPE_CHECKING:
     from ..shared_facts import SharedFacts

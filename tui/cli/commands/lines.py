@@ -13,7 +13,7 @@ from ..shared.options import json_option
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.bus.share.line_clients import LineClient, LineLook
+    from tui.bus.share.beside import LineClient, LineLook
     from tui.bus.share.place import Owner
     from tui.session.connect.known_lines import LineMark
     from tui.session.connect.named_lines import NamedLine
@@ -30,7 +30,7 @@ def lines(as_json: bool) -> None:
     that started it has exited is listed too. The settings file is checked: each fault is told with
     its file, line and key, and the status is 2 then.
     """
-    from tui.bus.share.line_clients import line_look
+    from tui.bus.share.beside import line_look
     from tui.session.connect.known_lines import load_memory
     from tui.session.connect.named_lines import line_settings
     from tui.session.connect.share_place import owners

@@ -13,7 +13,7 @@ import msgspec
 from tui.bus.api import Frame
 from tui.bus.link import TcpLink
 from tui.bus.notes import LineNote
-from tui.bus.share.line_past import line_past
+from tui.bus.share.beside import line_past
 from tui.bus.share.place import is_locked, owner_of
 from tui.drive.small_file import read_small
 from tui.wire.capture.forms import READ_RAW
