@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from .say import say
 
 if TYPE_CHECKING:
-    from tui.bus.program import Program
     from tui.session.connect.open_line import OpenLine
 
 
@@ -29,34 +28,14 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     from tui.session.journal import Journal
     from tui.session.sharing.guardian import Guardian
 
-    line = opened.line
-    guardians: list[Guardian] = []
-
-    def begin() -> None:
-        for leave in waiting:
-            leave()
-        guardians.append(Guardian(line, Journal()))
-
-    def gone(program: Program) -> None:
-        begin()
-        guardians[0].gone(program)
-
-    def armed(device: int, care: bytes) -> bool:
-        begin()
-        return line.facts.holder.hear_care(device, care)
-
-    def due(devices: tuple[int, ...], by: str) -> None:
-        begin()
-        line.facts.holder.hear_stop_due(devices, by)
+    guardian = Guardian(opened.line, Journal())
+    opened.line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
 
     def end() -> None:
         limit = time.monotonic() + MOTORS_STOP_WITHIN
-        while any(one.busy for one in guardians) and time.monotonic() < limit:
+        while guardian.busy and time.monotonic() < limit:
             time.sleep(GUARD_LOOK_INTERVAL)
 
-    holder = line.facts.holder
-    waiting = (line.facts.on_gone(gone), holder.on_care(armed), holder.on_stop_due(due))
-    line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
     return end
 
 
