@@ -1,13 +1,12 @@
-"""How long a new holder waits for programs to come back, by a loop whose time is the test's."""
+"""How long a new holder waits for programs to come back, by a clock that is the test's."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, cast
+import asyncio
 
 import pytest
 
-from tui.bus.share.coming_back import BACK_AT_LATEST, BACK_LOOK, BACK_WITHIN, ComingBack
+from tui.bus.share.signs import BACK_AT_LATEST, BACK_LOOK, BACK_WITHIN, programs_back
 
 
 class StarvedLoop:
@@ -16,24 +15,14 @@ class StarvedLoop:
     def __init__(self, late: float) -> None:
         self.late = late
         self.now = 0.0
-        self.next: Callable[[], None] | None = None
 
-    def time(self) -> float:
-        return self.now
-
-    def call_later(self, delay: float, call: Callable[[], None]) -> None:
-        self.next = call
-        self.now += delay + self.late
+    async def pause(self, seconds: float) -> None:
+        self.now += seconds + self.late
 
     def waited(self, *, greets: bool = False) -> float:
         """Seconds after which programs that are not back count as gone."""
-        over: list[float] = []
-        coming = ComingBack(cast("Any", self), lambda: greets, lambda: over.append(self.now))
-        coming.start()
-        while not over:
-            assert self.next is not None
-            self.next()
-        return over[0]
+        asyncio.run(programs_back(lambda: greets, lambda: self.now, self.pause))
+        return self.now
 
 
 def test_programs_have_their_time_on_a_computer_that_keeps_up() -> None:

@@ -14,7 +14,6 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from .attached import Client
-from .coming_back import ComingBack
 from .commanding import Commanding
 from .greeting import Greeting, LineHolder
 from .listening import Listening
@@ -36,7 +35,7 @@ from .messages import (
 from .place import OwnerLock, SharePlace, has_ended
 from .poll_messages import Subscribe, Unsubscribe
 from .polls_served import PollsServed
-from .signs import SignsOfLife
+from .signs import SignsOfLife, programs_back
 from .voices import LineVoice
 
 log = logging.getLogger(__name__)
@@ -60,7 +59,7 @@ class ShareServer:
         self._gone_before: set[str] = set()  # looked after
         self._handling: set[asyncio.Task[None]] = set()
         self._stops_left: list[Job] = []
-        self._coming_back = ComingBack(self._loop, self._is_greeting, self._miss_departed)
+        self._coming_back: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Listen. Raises OSError where no socket can be made."""
@@ -70,13 +69,14 @@ class ShareServer:
         await self._listening.start()
         self._signs.start()
         self._miss_departed(ended=True)
-        self._coming_back.start()
+        self._coming_back = self._loop.create_task(self._miss_late(), name="programs before")
 
     async def close(self) -> None:
         """Listen no more, and leave no socket behind; the programs start the next keeper."""
         self._inside.facts.voice = None
         self._signs.close()
-        self._coming_back.close()
+        if self._coming_back is not None:
+            self._coming_back.cancel()
         self._polls.close()
         await self._listening.close()
         for client in list(self._clients.values()):
@@ -176,6 +176,10 @@ class ShareServer:
         facts.stops.fold({one.id for one in facts.departed if has_ended(one)})
         self._holder.moved(arrived=False)
         self._tell_facts()
+
+    async def _miss_late(self) -> None:
+        await programs_back(self._is_greeting)
+        self._miss_departed()
 
     def _miss_departed(self, *, ended: bool = False) -> None:
         """Programs of an owner before are gone: they are not back, or surely have `ended`."""

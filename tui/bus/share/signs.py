@@ -1,10 +1,11 @@
-"""The owner's signs of life, and what it does where it gave none for too long."""
+"""The owner's signs of life, what it does after it gave none, and whom it waits for at first."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Collection
+from collections.abc import Awaitable, Callable, Collection
+from time import monotonic
 
 from ..schedule.inside import LineInside
 from .attached import SILENT_CLIENT, TOO_LATE, Client, stood_still
@@ -19,6 +20,28 @@ SENDS_WITHIN = 0.7
 """Seconds without a sign of life after which nothing but stops is sent, until all are heard."""
 HEARD_TIME, HEARD_TURNS = 0.05, 20
 """Seconds, and turns of the loop, in which all that programs have said meanwhile is heard."""
+BACK_WITHIN = 2.0
+"""Seconds in which programs come back, unless they are gone, too; while this one can be reached."""
+BACK_AT_LATEST = 6.0
+"""Seconds after which they count as gone in any case."""
+BACK_LOOK = 0.1
+"""Seconds between two looks. A late one counts as one: nobody was served in the meantime."""
+
+
+async def programs_back(
+    is_greeting: Callable[[], bool],
+    now: Callable[[], float] = monotonic,
+    pause: Callable[[float], Awaitable[None]] = asyncio.sleep,
+) -> None:
+    """Wait until every program of the holder before has had its time to come to this one.
+
+    A computer that is short of time, as in a container with a quota, does not run this process
+    for long: a program that has called in the meantime is heard first.
+    """
+    left, latest = BACK_WITHIN, now() + BACK_AT_LATEST
+    while (left > 0 or is_greeting()) and now() < latest:
+        await pause(BACK_LOOK)
+        left -= BACK_LOOK
 
 
 class SignsOfLife:
