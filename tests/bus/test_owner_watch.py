@@ -16,15 +16,19 @@ import pytest
 
 from tui.bus.model import Priority
 from tui.bus.program import KEEPER, Program
-from tui.bus.share.keeper_process import BY_HAND, OTHER_CONTAINER, OTHER_USER, STAYS, KeeperProcess
 from tui.bus.share.messages import VERSION, Alive, Asking, StopGiven, Told
 from tui.bus.share.owner_watch import (
+    BY_HAND,
     DIES_WITHIN,
     HEARD_WITHIN,
+    OTHER_CONTAINER,
+    OTHER_USER,
     SILENT_OWNER,
+    STAYS,
     STOP_HEARD_WITHIN,
     TAKEN_IN_WITHIN,
     WATCH_INTERVAL,
+    KeeperProcess,
     OwnerWatch,
     is_stop,
 )
@@ -236,7 +240,7 @@ def test_keeper_of_another_container_is_named_as_such(
     assert not found.kill()
     assert found.remedy == OTHER_CONTAINER
     # its lock file does not tell, but the system: no process here has its number
-    monkeypatch.setattr("tui.bus.share.keeper_process.peer_of", lambda _: Peer(0, os.getuid()))
+    monkeypatch.setattr("tui.bus.share.owner_watch.peer_of", lambda _: Peer(0, os.getuid()))
     assert KeeperProcess(owner(process.pid), connection).remedy == OTHER_CONTAINER
     assert process.poll() is None
 
@@ -245,7 +249,7 @@ def test_keeper_without_a_known_peer_is_ended_by_hand(
     listener: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     process, connection = listener
-    monkeypatch.setattr("tui.bus.share.keeper_process.peer_of", lambda _: None)
+    monkeypatch.setattr("tui.bus.share.owner_watch.peer_of", lambda _: None)
     found = KeeperProcess(owner(process.pid), connection)
     assert not found.kill()
     assert found.remedy == BY_HAND.format(pid=process.pid)

@@ -14,8 +14,7 @@ from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineError, LineLost, NoAnswer, RequestRefused
 from tui.bus.line import Line
 from tui.bus.program import KEEPER
-from tui.bus.share.keeper_process import OTHER_CONTAINER
-from tui.bus.share.owner_watch import HEARD_WITHIN
+from tui.bus.share.owner_watch import HEARD_WITHIN, OTHER_CONTAINER
 from tui.bus.share.place import owner_of
 from tui.bus.stop_counts import STOPS_KEPT, StopCounts
 

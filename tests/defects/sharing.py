@@ -141,7 +141,7 @@ DEFECTS = (
     ),
     Defect(
         "panel-killed-for-a-keeper",
-        "tui/bus/share/keeper_process.py",
+        "tui/bus/share/owner_watch.py",
         "owner.program.name == KEEPER and owner.version == VERSION",
         "owner.version == VERSION",
         "A panel that holds its line is killed by another program.",
