@@ -35,8 +35,8 @@ from rich.table import Table
 from benchmarks.quota import slow_group
 from benchmarks.terminal import Terminal
 from tests.sources import ROOT
+from tui.bus.share.keeping import NO_KEEPER
 from tui.bus.share.place import has_ended, owner_of_lock
-from tui.bus.share.starting import NO_KEEPER
 
 PROGRAM = (sys.executable, "-m", "tui")
 DRIVES = ("atv71@1", "atv31@2", "atv312@3", "atv71@4", "atv31@5")

@@ -99,7 +99,7 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "home").mkdir()
     # lines of the test itself have none; programs that it starts have
-    monkeypatch.setattr("tui.bus.share.starting.can_start", lambda: False)
+    monkeypatch.setattr("tui.bus.share.keeping.can_start", lambda: False)
     monkeypatch.setenv("LC_ALL", "C.UTF-8")
     monkeypatch.setenv("TZ", "UTC")
     yield tmp_path

@@ -431,7 +431,7 @@ async def test_one_that_ends_as_it_begins_to_listen_leaves_no_socket_behind(
     async def takes_long(*_: object, **__: object) -> None:
         await asyncio.sleep(60)
 
-    monkeypatch.setattr("tui.bus.share.listening.asyncio.start_unix_server", takes_long)
+    monkeypatch.setattr("tui.bus.share.greeting.asyncio.start_unix_server", takes_long)
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("hasty", wait=None)

@@ -102,7 +102,7 @@ async def test_a_disk_that_hangs_holds_up_neither_the_line_nor_its_signs_of_life
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("watch"), lines.open("panel")
-        monkeypatch.setattr("tui.bus.share.listening.os.access", hanging)
+        monkeypatch.setattr("tui.bus.share.greeting.os.access", hanging)
         try:
             await come(hangs.is_set)
             reasons: list[str] = []

@@ -109,7 +109,7 @@ DEFECTS = (
     ),
     Defect(
         "keeper-has-the-output-of-a-command",
-        "tui/bus/share/starting.py",
+        "tui/bus/share/keeping.py",
         "stdout=subprocess.DEVNULL",
         "stdout=None",
         "A shell waits for the output of a command until the keeper ends.",

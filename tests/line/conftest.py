@@ -13,7 +13,7 @@ import pytest
 
 from tests.conftest import need_peer
 from tests.programs import PATIENCE
-from tui.bus.share.starting import NO_KEEPER
+from tui.bus.share.keeping import NO_KEEPER
 
 from .pty_panel import PtyPanel, panel_on_a_pty
 from .terminal import Terminal
@@ -63,7 +63,7 @@ def held_inside(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def with_keepers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines that the test itself opens have keepers, too."""
-    monkeypatch.setattr("tui.bus.share.starting.can_start", lambda: True)
+    monkeypatch.setattr("tui.bus.share.keeping.can_start", lambda: True)
 
 
 @pytest.fixture(scope="session")

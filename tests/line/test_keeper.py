@@ -26,7 +26,7 @@ from tests.programs import (
     wait_until,
 )
 from tui.bus.share.keeper_share import LINGERS
-from tui.bus.share.starting import can_start
+from tui.bus.share.keeping import can_start
 from tui.drive.profile import library
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession

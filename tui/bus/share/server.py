@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from ..limits import CAUTIOUS
 from ..link import label
@@ -15,8 +16,7 @@ from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from .attached import Client
 from .commanding import Commanding
-from .greeting import Greeting, LineHolder
-from .listening import Listening
+from .greeting import Greeting, Listening
 from .messages import (
     Alive,
     AnyMessage,
@@ -38,6 +38,9 @@ from .polls_served import PollsServed
 from .signs import SignsOfLife, programs_back
 from .voices import LineVoice
 
+if TYPE_CHECKING:
+    from .sharing import Sharing
+
 log = logging.getLogger(__name__)
 
 
@@ -45,7 +48,7 @@ class ShareServer:
     """Serves the programs that attach; lives in the line's loop, and is its facts' voice."""
 
     def __init__(
-        self, place: SharePlace, lock: OwnerLock, inside: LineInside, holder: LineHolder
+        self, place: SharePlace, lock: OwnerLock, inside: LineInside, holder: Sharing
     ) -> None:
         self._inside = inside
         self._holder = holder

@@ -13,7 +13,7 @@ from ..program import KEEPER, Program, pid_namespace
 from ..schedule.inside import LineInside, Say, SharedLine
 from ..transport.opening import opened_beside
 from .client import OwnerAway, ShareClient
-from .keeping import KeeperOrder
+from .keeping import KeeperOrder, start_keeper
 from .messages import VERSION
 from .place import (
     MOST_DEATHS,
@@ -24,7 +24,6 @@ from .place import (
     owner_of,
 )
 from .server import ShareServer
-from .starting import start_keeper
 
 log = logging.getLogger(__name__)
 

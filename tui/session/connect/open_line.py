@@ -93,8 +93,8 @@ def open_line(
         )
     from tui.bus.line import Line
     from tui.bus.link import absolute, parse_link
+    from tui.bus.share.keeping import can_start
     from tui.bus.share.sharing import Sharing
-    from tui.bus.share.starting import can_start
 
     from .share_place import share_place, this_program
 
