@@ -22,8 +22,7 @@ from tui.bus.schedule.polls import Subscription
 from tui.bus.share.attached import MOST_UNREAD
 from tui.bus.share.messages import NoMessage, packed
 from tui.bus.share.poll_messages import Polled, PolledReply, Subscribe
-from tui.bus.share.polls_served import MOST_PLANNED, MOST_UNTAKEN
-from tui.bus.share.polls_submitted import PollsSubmitted
+from tui.bus.share.polls import MOST_PLANNED, MOST_UNTAKEN, PollsSubmitted
 from tui.wire.frames import frame
 
 from .conftest import WIDE, Share

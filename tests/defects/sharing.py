@@ -45,8 +45,8 @@ DEFECTS = (
     ),
     Defect(
         "heartbeat-beside-a-hung-loop",
-        "tui/bus/share/heartbeat.py",
-        "if time.monotonic() - self._turned < LOOP_HANGS:",
+        "tui/bus/share/signs.py",
+        "if monotonic() - self._turned < LOOP_HANGS:",
         "if True:",
         "The motor of a program that hangs for good runs on.",
         (HEARTBEAT,),

@@ -188,7 +188,7 @@ class Connection:
 
     async def _serve(self, master: Master) -> None:
         """Serve requests; return when the line is held for other programs and none needs it."""
-        if self._shared is None or not self._shared.keeps:
+        if self._shared is None:
             await self._dispatcher.serve(master)
             return
         serving = asyncio.ensure_future(self._dispatcher.serve(master))

@@ -55,9 +55,6 @@ Say = Callable[[LineStatus, str, LineError | None], None]
 class SharedLine(Protocol):
     """Other programs on the line; see tui.bus.share."""
 
-    keeps: bool
-    """True if the line is held for other programs alone: open as long as one is attached."""
-
     @property
     def starts(self) -> bool:
         """True while the process starts that is to hold the line, for some time."""
@@ -70,7 +67,7 @@ class SharedLine(Protocol):
         """Return once this program owns the line; until then its requests go to the owner."""
 
     async def unwanted(self) -> None:
-        """Return once no program needs the line; only where `keeps`."""
+        """Return once no program needs the line: never if this one does."""
 
     async def pause(self, seconds: float) -> None:
         """Wait before a lost line is tried again; a program that comes ends the wait."""

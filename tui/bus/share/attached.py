@@ -17,7 +17,7 @@ from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .carried import failure_told, request_of
+from .carried import asked_request, failure_told
 from .messages import (
     Alive,
     Answer,
@@ -126,7 +126,7 @@ class Client:
         if len(self.asked) >= MOST_ASKED:
             raise NoMessage("too many requests at once")
         try:
-            request = request_of(message.kind, message.fields)
+            request = asked_request(message.kind, message.fields)
         except ValueError as error:
             raise NoMessage(str(error)) from error
         priority = message.priority

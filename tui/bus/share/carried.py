@@ -60,7 +60,7 @@ def request_form(request: Request) -> tuple[str, dict[str, Any]]:
     return type(request).__name__, msgspec.to_builtins(request, builtin_types=(bytes,))
 
 
-def request_of(kind: str, fields: dict[str, Any]) -> Request:
+def asked_request(kind: str, fields: dict[str, Any]) -> Request:
     """The request that a message carries. Raises ValueError."""
     if kind not in REQUEST_KINDS:
         raise ValueError(f"request {kind!r}")

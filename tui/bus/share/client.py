@@ -16,7 +16,6 @@ from ..model import LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
-from .heartbeat import Heartbeat
 from .messages import (
     VERSION,
     Alive,
@@ -43,7 +42,8 @@ from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .poll_messages import Polled
-from .polls_submitted import PollsSubmitted
+from .polls import PollsSubmitted
+from .signs import Heartbeat
 from .voices import LineVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)

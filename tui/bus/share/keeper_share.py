@@ -49,8 +49,6 @@ class Keeping:
 class KeeperShare(Sharing):
     """The sharing of a line by its keeper; lives in the line's loop."""
 
-    keeps = True
-
     def __init__(self, keeping: Keeping, place: SharePlace, inside: LineInside) -> None:
         super().__init__(place, inside)
         self._keeping = keeping

@@ -34,7 +34,7 @@ from .messages import (
 )
 from .place import OwnerLock, SharePlace, has_ended
 from .poll_messages import Subscribe, Unsubscribe
-from .polls_served import PollsServed
+from .polls import PollsServed
 from .signs import SignsOfLife, programs_back
 from .voices import LineVoice
 
