@@ -4,104 +4,91 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, Generic, ParamSpec
 
 from .program import Program, readable
 
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    from .model import Reply
+    from .requests import Request
+
 log = logging.getLogger(__name__)
 
-T = TypeVar("T")
+P = ParamSpec("P")
 
 
-StopListener = Callable[[tuple[int, ...], str, Program], None]
-DeniedListener = Callable[[int, str], None]
-QuestionListener = Callable[[int, Program], None]
-ReplyListener = Callable[[int, bool, str], None]
-GoneListener = Callable[[Program], None]
-TextListener = Callable[[int, str], None]
-ChangeListener = Callable[[], None]
+class LineListeners(Generic[P]):
+    """The listeners to one kind of event, called in the line's thread."""
+
+    def __init__(self) -> None:
+        self.listeners: list[Callable[P, object]] = []
+
+    def __call__(self, listener: Callable[P, object]) -> Callable[[], None]:
+        """Call `listener` each time; returns how to end that."""
+        self.listeners.append(listener)
+
+        def leave() -> None:
+            if listener in self.listeners:
+                self.listeners.remove(listener)
+
+        return leave
+
+    def tell(self, *what: P.args, **more: P.kwargs) -> None:
+        """It has happened; a listener's fault is not the line's."""
+        for listener in tuple(self.listeners):
+            try:
+                listener(*what, **more)
+            except Exception:
+                log.exception("a listener of the shared line failed")
 
 
 class FactsHeard:
-    """Listeners of one line, called in its thread; a listener's fault is not the line's."""
+    """Listeners of one line."""
 
     def __init__(self) -> None:
-        self._on_stop: list[StopListener] = []
-        self._on_denied: list[DeniedListener] = []
-        self._on_question: list[QuestionListener] = []
-        self._on_reply: list[ReplyListener] = []
-        self._on_gone: list[GoneListener] = []
-        self._on_text: list[TextListener] = []
-        self._on_change: list[ChangeListener] = []
-
-    def on_change(self, listener: ChangeListener) -> Callable[[], None]:
-        """Call `listener` when programs or commanders are others than before."""
-        return subscribed(self._on_change, listener)
-
-    def _changed(self) -> None:
-        for listener in tuple(self._on_change):
-            heard(listener)
-
-    def on_text(self, listener: TextListener) -> Callable[[], None]:
-        """Call `listener` with what is to be read about a device."""
-        return subscribed(self._on_text, listener)
+        self.on_change: LineListeners[[]] = LineListeners()
+        """Programs or commanders are others than before."""
+        self.on_text: LineListeners[[int, str]] = LineListeners()
+        """Something is to be read about a device."""
+        self.on_stop: LineListeners[[tuple[int, ...], str, Program]] = LineListeners()
+        """Another program stops devices."""
+        self.on_denied: LineListeners[[int, str]] = LineListeners()
+        """A claim to a device was refused or ended, and why."""
+        self.on_question: LineListeners[[int, Program]] = LineListeners()
+        """A program asks for a device that is commanded from here."""
+        self.on_reply: LineListeners[[int, bool, str]] = LineListeners()
+        """A question about a device was answered, yes or no, and why."""
+        self.on_gone: LineListeners[[Program]] = LineListeners()
+        """In the owner only: a program left without saying so, or ended."""
+        self.hear_denied, self.hear_question = self.on_denied.tell, self.on_question.tell
 
     def hear_text(self, device: int, text: str) -> None:
         """Something is to be read."""
-        for listener in tuple(self._on_text):
-            heard(listener, device, readable(text))
-
-    def on_stop(self, listener: StopListener) -> Callable[[], None]:
-        """Call `listener` when another program stops devices; returns how to end that."""
-        return subscribed(self._on_stop, listener)
+        self.on_text.tell(device, readable(text))
 
     def hear_stop(self, devices: tuple[int, ...], by: str, program: Program) -> None:
         """Another program has stopped devices."""
-        for listener in tuple(self._on_stop):
-            heard(listener, devices, readable(by), program)
-
-    def on_denied(self, listener: DeniedListener) -> Callable[[], None]:
-        """Call `listener` with device and reason when a claim was refused or ended."""
-        return subscribed(self._on_denied, listener)
-
-    def hear_denied(self, device: int, why: str) -> None:
-        """What this program claimed is not, or no longer, its own."""
-        for listener in tuple(self._on_denied):
-            heard(listener, device, why)
-
-    def on_question(self, listener: QuestionListener) -> Callable[[], None]:
-        """Call `listener` when a program asks for a device that is commanded from here."""
-        return subscribed(self._on_question, listener)
-
-    def hear_question(self, device: int, program: Program) -> None:
-        """A program asks for a device that is commanded from here."""
-        for listener in tuple(self._on_question):
-            heard(listener, device, program)
-
-    def on_reply(self, listener: ReplyListener) -> Callable[[], None]:
-        """Call `listener` with device, yes or no, and why, when a question was answered."""
-        return subscribed(self._on_reply, listener)
-
-    def on_gone(self, listener: GoneListener) -> Callable[[], None]:
-        """Call `listener`, in the owner only, when a program left without saying so, or ended."""
-        return subscribed(self._on_gone, listener)
+        self.on_stop.tell(devices, readable(by), program)
 
 
-def subscribed(listeners: list[T], listener: T) -> Callable[[], None]:
-    """Add a listener; returns how to end that."""
-    listeners.append(listener)
+class HolderHeard:
+    """Listeners to what only the holder of a line learns of the programs on it."""
 
-    def leave() -> None:
-        if listener in listeners:
-            listeners.remove(listener)
+    def __init__(self) -> None:
+        self.on_care: LineListeners[[int, bytes]] = LineListeners()
+        """The care for a device; a listener returns True if it can use it."""
+        self.on_left: LineListeners[[Program, Request, Future[Reply]]] = LineListeners()
+        """A write that was perhaps sent when its program ended."""
+        self.on_stop_due: LineListeners[[tuple[int, ...], str]] = LineListeners()
+        """Devices are to be stopped, and by whom.
 
-    return leave
+        Their stop was given by a program that is gone, or that leaves the rest to the holder.
+        """
+        self.hear_left, self.hear_stop_due = self.on_left.tell, self.on_stop_due.tell
 
-
-def heard(listener: Callable[..., None], *what: object) -> None:
-    """Call a listener with what it hears."""
-    try:
-        listener(*what)
-    except Exception:
-        # a listener's fault is not the line's
-        log.exception("a listener of the shared line failed")
+    def hear_care(self, device: int, care: bytes) -> bool:
+        """A program describes how to stop a device; False if a listener cannot use that."""
+        taken = [listener(device, care) for listener in tuple(self.on_care.listeners)]
+        return all(taken)

@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from .bounds import DeviceId
-from .facts_heard import heard, subscribed
+from .facts_heard import LineListeners
 
 if TYPE_CHECKING:
     from .share.messages import AnyMessage
@@ -39,9 +39,6 @@ class LineNote(msgspec.Struct, frozen=True, tag=True):
     data: Annotated[bytes, Meta(max_length=MOST_NOTE)] = b""
 
 
-NoteListener = Callable[[LineNote], None]
-
-
 class Notes:
     """The notes of one line: in its holder those of all programs, elsewhere this program's own.
 
@@ -58,7 +55,9 @@ class Notes:
         self._kept: dict[LineNote, float] = {}
         """When each note came, the oldest first."""
         self._size = 0
-        self._on_note: list[NoteListener] = []
+        self.on_note: LineListeners[[LineNote]] = LineListeners()
+        """A note that was asked for has come."""
+        self.hear = self.on_note.tell
 
     def leave(self, note: LineNote) -> None:
         """Leave a note from here."""
@@ -68,15 +67,6 @@ class Notes:
     def ask(self, device: int, kind: str) -> None:
         """Have the notes of a device and kind given to whoever listens; they come one by one."""
         self._tell(LineNote(device, kind))
-
-    def on_note(self, listener: NoteListener) -> Callable[[], None]:
-        """Call `listener` with notes that were asked for, in the line's thread."""
-        return subscribed(self._on_note, listener)
-
-    def hear(self, note: LineNote) -> None:
-        """A note that was asked for has come."""
-        for listener in tuple(self._on_note):
-            heard(listener, note)
 
     def keep(self, note: LineNote) -> None:
         """Keep a note; one that is there already is kept once."""

@@ -11,8 +11,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
-from .facts_heard import FactsHeard, heard
-from .holder_heard import HolderHeard
+from .facts_heard import FactsHeard, HolderHeard
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
 from .notes import Notes
@@ -108,7 +107,7 @@ class SharedFacts(FactsHeard):
             stay = [one for one in self.departed if one.id not in here]
             self.departed = (*stay, *left)[-DEPARTED_KEPT:]
             self.programs = programs
-        self._changed()
+        self.on_change.tell()
 
     # What all are to read
 
@@ -190,7 +189,7 @@ class SharedFacts(FactsHeard):
             if program is not None:
                 held[device] = program
             self.commanders = MappingProxyType(held)
-        self._changed()
+        self.on_change.tell()
 
     # Taking over
 
@@ -208,8 +207,7 @@ class SharedFacts(FactsHeard):
         """The program that commands a device has answered."""
         if yes:
             self.note_commander(device, None)
-        for listener in tuple(self._on_reply):
-            heard(listener, device, yes, why)
+        self.on_reply.tell(device, yes, why)
 
     # Programs that went away
 
@@ -224,8 +222,7 @@ class SharedFacts(FactsHeard):
         self.leases.end(program.id)
         self.keep_alives.end(program.id)
         self.set_programs(rest)
-        for listener in tuple(self._on_gone):
-            heard(listener, program)
+        self.on_gone.tell(program)
 
     # What may go out
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 from ..bounds import MOST_FRAMES
 from ..errors import RequestRefused
-from ..holder_heard import LeftListener
 from ..limits import CAUTIOUS, Limits
 from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
+from ..requests import Request
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from .carried import asked_request, failure_told
@@ -51,7 +51,7 @@ class Client:
 
     program: Program
     writer: asyncio.StreamWriter
-    left: LeftListener
+    left: Callable[[Program, Request, Future[Reply]], None]
     """Told of each write that may be on the wire when it goes."""
     shares: dict[int, float] = field(default_factory=dict)
     trace: bool = False
