@@ -20,8 +20,8 @@ from tui.bus.program import Program
 from tui.bus.schedule.pace import SHARE
 from tui.bus.schedule.polls import Subscription
 from tui.bus.share.attached import MOST_UNREAD
+from tui.bus.share.carried import Polled, PolledReply, Subscribe
 from tui.bus.share.messages import NoMessage, packed
-from tui.bus.share.poll_messages import Polled, PolledReply, Subscribe
 from tui.bus.share.polls import MOST_PLANNED, MOST_UNTAKEN, PollsSubmitted
 from tui.wire.frames import frame
 

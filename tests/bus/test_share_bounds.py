@@ -21,7 +21,7 @@ from tui.bus.line import Line
 from tui.bus.model import DeviceCounters, DeviceState, LineCounters, LineState, LineStatus
 from tui.bus.poll_plan import PlannedRead, PollPlan
 from tui.bus.program import Program
-from tui.bus.share.carried import ErrorForm
+from tui.bus.share.carried import ErrorForm, Polled, PolledReply, Subscribe, Unsubscribe
 from tui.bus.share.messages import (
     VERSION,
     Alive,
@@ -49,7 +49,6 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.share.place import Owner
-from tui.bus.share.poll_messages import Polled, PolledReply, Subscribe, Unsubscribe
 from tui.bus.shared_facts import SharedFacts
 from tui.bus.stop_counts import StopCounts
 

@@ -1,4 +1,4 @@
-"""Requests for the line, and its errors, as messages carry them between programs."""
+"""Requests, errors and polls as messages carry them between programs; for polls see PollPlan."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from ..bounds import (
     ByteString,
     ByteValue,
     DeviceId,
+    MonotonicTime,
+    Number,
     RegisterAddress,
     Seconds,
     Text,
+    Word,
 )
 from ..errors import (
     ChecksumFault,
@@ -35,6 +38,7 @@ from ..errors import (
     WrongReply,
 )
 from ..limits import out_of_range
+from ..poll_plan import MOST_READS, MOST_TURNS, PollPlan
 from ..requests import (
     Diagnose,
     Identify,
@@ -132,3 +136,33 @@ def error_of(kind: str, form: ErrorForm) -> LineError:
     made = _NAMED.get(kind, LineError)
     fields = {name: getattr(form, name) for name in _KINDS[made]}
     return made(**fields) if fields else made(form.text)
+
+
+class Subscribe(msgspec.Struct, frozen=True, tag=True):
+    """A program wants the cycles of a plan, in place of an earlier one of that number."""
+
+    number: Number
+    plan: PollPlan
+
+
+class Unsubscribe(msgspec.Struct, frozen=True, tag=True):
+    """A program wants no more cycles of a plan."""
+
+    number: Number
+
+
+class PolledReply(msgspec.Struct, frozen=True, array_like=True):
+    """A reply of a cycle, or the error that came instead."""
+
+    pdu: ByteString
+    time: MonotonicTime
+    failure: tuple[Word, ErrorForm] | None = None
+
+
+class Polled(msgspec.Struct, frozen=True, tag=True):
+    """A cycle of a plan; replies in the order of its turn, none after the error that ended it."""
+
+    number: Number
+    turn: Annotated[int, Meta(ge=0, lt=MOST_TURNS)]
+    begun: MonotonicTime
+    replies: Annotated[tuple[PolledReply, ...], Meta(max_length=MOST_READS)]

@@ -16,6 +16,7 @@ from ..model import LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from .asked import RequestsAsked
+from .carried import Polled
 from .messages import (
     VERSION,
     Alive,
@@ -41,7 +42,6 @@ from .messages import (
 from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
-from .poll_messages import Polled
 from .polls import PollsSubmitted
 from .signs import Heartbeat
 from .voices import LineVoice, give_up_own, tell_own

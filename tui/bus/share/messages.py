@@ -40,8 +40,7 @@ from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priori
 from ..notes import LineNote
 from ..program import Program
 from ..trace import Frame, FrameDirection
-from .carried import ErrorForm
-from .poll_messages import Polled, Subscribe, Unsubscribe
+from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 
 VERSION = 7
 """Of the messages; programs of different versions do not share a line."""

@@ -21,9 +21,8 @@ from ..schedule.pace import SHARE, greatest
 from ..schedule.polls import Subscription
 from ..schedule.queue import Job
 from .attached import Client
-from .carried import error_of, failure_told
+from .carried import Polled, PolledReply, Subscribe, Unsubscribe, error_of, failure_told
 from .messages import AnyMessage, NoMessage
-from .poll_messages import Polled, PolledReply, Subscribe, Unsubscribe
 
 log = logging.getLogger(__name__)
 

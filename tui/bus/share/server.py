@@ -15,6 +15,7 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from .attached import Client
+from .carried import Subscribe, Unsubscribe
 from .commanding import Commanding
 from .greeting import Greeting, Listening
 from .messages import (
@@ -33,7 +34,6 @@ from .messages import (
     next_message,
 )
 from .place import OwnerLock, SharePlace, has_ended
-from .poll_messages import Subscribe, Unsubscribe
 from .polls import PollsServed
 from .signs import SignsOfLife, programs_back
 from .voices import LineVoice
