@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import socket
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
 import pytest
 
+from tui.bus.fake import FakeLine
+from tui.cli.commands import serve
 from tui.cli.commands.serve import with_named
 from tui.cli.plant.wish import read_drives
 from tui.cli.running.serving import GatewayWish
 from tui.cli.shared.host_port import host_port, written_host_port
-from tui.cli.shared.served_lines import served_lines
+from tui.cli.shared.served_lines import ServedLine, served_lines
+from tui.session.connect.open_line import OpenLine
 from tui.session.gateway.rules import GatewayRules
 
 from .commands import refused
@@ -49,6 +53,18 @@ def test_a_port_that_is_taken_is_told() -> None:
         assert f"Nothing can be served at {place}: Address already in use." in told
         told = refused(3, "serve", "sim:atv71", "--metrics", place)
         assert f"No metrics can be served at {place}: Address already in use." in told
+
+
+def test_a_line_without_a_keeper_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = FakeLine()
+    line.facts.unkept = "This program holds the line itself."
+    opened = OpenLine("pump", line)
+    monkeypatch.setattr("tui.session.connect.open_line.open_line", lambda *_, **__: opened)
+    with ExitStack() as stack:
+        serve._opened(stack, ServedLine("pump", "pump"), None)
+    assert "drivepanel: This program holds the line itself." in capsys.readouterr().err
 
 
 def test_a_place_without_a_host_is_loopback() -> None:

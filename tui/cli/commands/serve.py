@@ -21,7 +21,7 @@ from ..shared.devices import devices_option
 from ..shared.errors import told
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
-from ..shared.looking_after import guard_motors
+from ..shared.looking_after import guard_motors, say_shared
 from ..shared.numbers import SHORTEST_CYCLE, seconds
 from ..shared.options import CONNECT_WITHIN, json_option, profile_of, usual_settings
 from ..shared.output import print_json
@@ -205,8 +205,7 @@ def _opened(stack: ExitStack, served: ServedLine, plant: PlantWish | None) -> Op
     usual = usual_settings(served.usual_profile)
     opened = open_line(served.text, wait=CONNECT_WITHIN, usual=usual, program="serve")
     stack.callback(opened.close)
-    if opened.line.facts.voice is not None and opened.line.facts.others:
-        say(f"drivepanel: {opened.line.state.reason}", err=True)
+    say_shared(opened)
     guard_motors(opened)
     mind_the_line(opened)
     drives = read_drives(served, opened.devices) if plant is not None else []

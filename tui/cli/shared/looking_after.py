@@ -21,6 +21,8 @@ GUARD_LOOK_INTERVAL = 0.05
 def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     """From now on stop the motors of a program that is gone, as far as this one owns the line.
 
+    Says why this program holds the line in place of a keeper, if it does.
+
     `name` is what the line is called where a command has several. Returns what waits until those
     motors are stopped, before the line is closed.
     """
@@ -28,8 +30,11 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     from tui.session.journal import Journal
     from tui.session.sharing.guardian import Guardian
 
-    guardian = Guardian(opened.line, Journal())
-    opened.line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
+    guardian, facts = Guardian(opened.line, Journal()), opened.line.facts
+    tell = partial(_tell, f"{name}: " if name else "")
+    facts.on_text(tell)
+    if facts.unkept:
+        tell(0, facts.unkept)
 
     def end() -> None:
         limit = time.monotonic() + MOTORS_STOP_WITHIN
@@ -37,6 +42,13 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
             time.sleep(GUARD_LOOK_INTERVAL)
 
     return end
+
+
+def say_shared(opened: OpenLine, name: str = "") -> None:
+    """Say which other programs are on a line, if there are any."""
+    line = opened.line
+    if line.facts.voice is not None and line.facts.others:
+        _tell(f"{name}: " if name else "", 0, line.state.reason)
 
 
 def _tell(where: str, device: int, text: str) -> None:

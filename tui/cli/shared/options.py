@@ -14,7 +14,7 @@ from .completion import complete_profile
 from .devices import CommandFunction, Option, device_option, several_devices_option
 from .ending import to_its_end
 from .line_argument import mind_the_drive, mind_the_line, takes_line
-from .looking_after import guard_motors
+from .looking_after import guard_motors, say_shared
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
 from .say import say
 from .signals import never_suspended
@@ -180,10 +180,7 @@ def on_line(
             keeper=keeper,
         )
         stack.callback(opened.close)
-        if opened.line.facts.voice is not None and opened.line.facts.others:
-            say(f"drivepanel: {opened.line.state.reason}", err=True)
-        if unkept := opened.line.facts.unkept:
-            say(f"drivepanel: {unkept}", err=True)
+        say_shared(opened)
         stack.callback(guard_motors(opened))
         try:
             mind_the_line(opened)
@@ -260,8 +257,6 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
     """Go by a profile that the drive contradicts, if that was asked for; else raise."""
     from tui.session.connect.contradiction import Contradiction
 
-    from .say import say
-
     told = session.known_identity.profile
     if not target.force_profile:
         way = f"Name -p {told}, or leave -p away." if told else "Name the profile of that drive."
@@ -277,8 +272,6 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
 def _recall(session: DriveSession) -> None:
     """Go by what was taught of the drive; that it cannot be read is said and hinders nothing."""
     from tui.session.teaching.teacher import Teacher
-
-    from .say import say
 
     teacher = Teacher(session)
     teacher.recall()

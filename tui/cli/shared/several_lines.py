@@ -20,9 +20,8 @@ from click.core import ParameterSource
 from .ending import to_its_end
 from .line_argument import LineArgument, mind_the_line, named_line_of, takes_line_as
 from .lines import is_known_name, is_written_out
-from .looking_after import guard_motors
+from .looking_after import guard_motors, say_shared
 from .options import CONNECT_WITHIN, Target, usual_settings
-from .say import say
 from .signals import never_suspended
 
 if TYPE_CHECKING:
@@ -206,6 +205,5 @@ async def connected(opened: OpenLine, name: str) -> None:
         if asyncio.get_running_loop().time() > end:
             raise LineLost(line.state.reason or f"not connected within {CONNECT_WITHIN:g} s.")
         await asyncio.sleep(CONNECTION_LOOK)
-    if line.facts.voice is not None and line.facts.others:
-        say(f"drivepanel: {name}: {line.state.reason}", err=True)
+    say_shared(opened, name)
     mind_the_line(opened)
