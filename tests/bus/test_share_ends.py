@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import signal
 import socket
@@ -562,3 +563,21 @@ async def test_no_keeper_is_started_once_its_program_holds_the_line(
 
 def test_a_disk_has_less_time_than_a_person_has_patience() -> None:
     assert DISK_WITHIN <= 2.0
+
+
+async def test_a_full_disk_does_not_keep_a_line_closed(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_full(_lock: OwnerLock, _owner: Owner) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(OwnerLock, "tell", is_full)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        seen: list[LineStatus] = []
+        line = Line(lines.link, timing=QUICK, place=place_in(lines.folder))
+        lines.opened.append(line)
+        line.on_state(lambda state: seen.append(state.status))
+        line.open(wait=30.0)
+        assert (await line.read(1, 100)).words == (100,)
+        assert LineStatus.LOST not in seen

@@ -69,20 +69,15 @@ class ShareClient:
         self.writer: asyncio.StreamWriter | None = None
         self._asked = RequestsAsked(inside, self._tell)
         self._polls = PollsSubmitted(
-            inside, self._tell, self._asked.describe, lambda: not self.frozen
+            inside, self._tell, self._asked.describe, lambda: not self.watching.frozen
         )
         self._news = NewsHeard(inside, say)
         self._wish: tuple[dict[int, float], bool] = ({}, False)
         self._gone, self._told = False, ""
         self.again = False  # attached to the line before
         self.taken_in = False  # attached to this owner
-        self._watching = OwnerWatch(inside.clock, owner)
+        self.watching = OwnerWatch(inside.clock, owner)
         self._heartbeat: Heartbeat | None = None
-
-    @property
-    def frozen(self) -> bool:
-        """True while the owner does not answer."""
-        return self._watching.frozen
 
     async def serve(self) -> None:
         """Serve this program's requests until the owner ends.
@@ -95,7 +90,7 @@ class ShareClient:
         except (OSError, ValueError) as error:
             raise OwnerAway from error
         self.writer = writer
-        self._watching.connected(writer.get_extra_info("socket"))
+        self.watching.connected(writer.get_extra_info("socket"))
         closing = True
         try:
             self._greet()
@@ -107,10 +102,10 @@ class ShareClient:
             self._polls.lose_all()
             # what is said from here on would not be heard: a stop takes another way
             self.writer = None
-            self._watching.close()
+            self.watching.close()
             if self._heartbeat is not None:
                 self._heartbeat.close()
-            if closing and self.taken_in and not self.frozen:
+            if closing and self.taken_in and not self.watching.frozen:
                 await self._leave(reader, writer)
             with suppress(OSError, RuntimeError):
                 writer.close()
@@ -209,19 +204,19 @@ class ShareClient:
             if wish != self._wish:
                 self._wish = wish
                 self._tell(PollWish(*wish))
-            self._watching.look(attached=self.taken_in)
-            if self.frozen:
+            self.watching.look(attached=self.taken_in)
+            if self.watching.frozen:
                 self._wait_for_owner()
 
     def _hear_life(self, message: AnyMessage) -> None:
-        self._watching.hear(message)
+        self.watching.hear(message)
         if self._told:
             self._told = ""
             self._news.tell_state()
 
     def _wait_for_owner(self) -> None:
         """Fail what waits for a frozen owner, once it is known that this program cannot end it."""
-        remedy = self._watching.remedy
+        remedy = self.watching.remedy
         told = f"{self._owner.program.text} {OWNER_SILENT}. {remedy}".rstrip()
         if told != self._told:
             self._told = told
@@ -282,14 +277,14 @@ class ShareClient:
 
     def pass_on(self, stop: bytes) -> bool:
         """Send a finished stop to the owner; False if it takes none."""
-        if self.writer is None or self.frozen:
+        if self.writer is None or self.watching.frozen:
             return False
         self.writer.write(stop)
-        self._watching.note_stop()
+        self.watching.note_stop()
         return True
 
     def _tell(self, message: AnyMessage) -> None:
         if self.writer is not None and not self.writer.transport.is_closing():
             self.writer.write(packed(message))
             if is_stop(message):
-                self._watching.note_stop()
+                self.watching.note_stop()

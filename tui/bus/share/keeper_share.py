@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import os
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,8 +15,6 @@ from .client import LEAVE_WITHIN
 from .messages import VERSION
 from .place import STARTING, Owner, SharePlace
 from .sharing import Sharing
-
-log = logging.getLogger(__name__)
 
 LINGERS = 10.0
 """Seconds that a keeper waits for the next program, its port closed."""
@@ -65,7 +62,7 @@ class KeeperShare(Sharing):
         self._say = say
         if self._server is None:
             self._inside.facts.set_programs(self._keeping.before)
-            if not await self._listens():
+            if not await self._listen():
                 # the program that has started this process gets the lock back, and counts a death
                 me = Program(STARTING, KEEPER, os.getpid(), space=pid_namespace())
                 with suppress(OSError):
@@ -86,14 +83,6 @@ class KeeperShare(Sharing):
                 await asyncio.sleep(ALARM_RENEWED)
         finally:
             self._keeping.alarm(PROCESS_ENDS_WITHIN)
-
-    async def _listens(self) -> bool:
-        try:
-            return await self._listen()
-        except OSError as error:
-            log.error("the keeper cannot listen: %s", error)
-            self._inside.facts.set_programs((self._inside.facts.me,))
-            return False
 
     async def unwanted(self) -> None:
         """Return once no program is there and no motor is to be stopped."""

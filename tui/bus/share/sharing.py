@@ -74,7 +74,7 @@ class Sharing:
     @property
     def frozen(self) -> bool:
         """True while the process that holds the line does not answer."""
-        return self._client is not None and self._client.frozen
+        return self._client is not None and self._client.watching.frozen
 
     @property
     def starts(self) -> bool:
@@ -195,16 +195,18 @@ class Sharing:
         self._keeper_lives, self._starts_until = bool, 0.0
 
     async def _listen(self) -> bool:
-        inside = self._inside
-        self._learn_of_before()
-        # should this program end before it listens
-        stopped = inside.facts.stops.late_times
-        self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until, stopped))
-        self._server = server = ShareServer(self._place, self._lock, inside, self)
+        """Serve the programs on the line; False if that cannot be."""
+        facts = self._inside.facts
         try:
-            await server.start()
+            self._learn_of_before()
+            # should this program end before it listens
+            stopped = facts.stops.late_times
+            self._lock.tell(Owner(VERSION, facts.me, "", self._quiet_until, stopped))
+            self._server = ShareServer(self._place, self._lock, self._inside, self)
+            await self._server.start()
         except OSError as error:
             log.error("the line cannot be shared: %s", error)
+            facts.set_programs((facts.me,))
             return False
         return True
 
