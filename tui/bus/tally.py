@@ -82,7 +82,7 @@ class Tally:
 
     def of(self, device: int) -> DeviceTally:
         """The counts of a device; in the line's thread only."""
-        return self.devices.setdefault(device, DeviceTally())
+        return self.devices.get(device) or self.devices.setdefault(device, DeviceTally())
 
     def count_sent(self, device: int, size: int) -> None:
         """A frame of so many bytes has gone out to a device."""

@@ -49,7 +49,7 @@ class Devices:
         self.quiet_until = 0.0
 
     def __getitem__(self, device: int) -> Device:
-        return self._devices.setdefault(device, Device())
+        return self._devices.get(device) or self._devices.setdefault(device, Device())
 
     def describe(self, device: int, limits: Limits) -> None:
         """Set what a device may be sent."""
