@@ -239,7 +239,8 @@ class RtuMaster:
 
     async def _result(self, exchange: RtuExchange, sending: Sending) -> ExchangeResult:
         """Wait for the result; while bytes are coming in, a little over the time-out."""
-        assert self._done is not None
+        done, loop = self._done, asyncio.get_running_loop()
+        assert done is not None
         clock, expectation = self._around.clock, sending.expectation
         if expectation is None:
             self._hold = deadline = self._sent + self._around.timing.turnaround_delay
@@ -248,18 +249,28 @@ class RtuMaster:
             length = MAX_FRAME if expectation.length is None else expectation.length + 3
             deadline = self._sent + sending.time_out
             latest = deadline + length * self._character + self._gap
-        while True:
-            now = clock()
+
+        def look() -> None:
+            """End the exchange if its time is up, else look again then."""
+            nonlocal timer
             # a lump may follow what has come; where nothing has, the time is up by itself
             lump = self._ends if exchange.buffer else deadline
-            until = min(max(deadline, lump), latest)
-            if now >= until:
-                return exchange.expired()
-            await asyncio.wait((self._done,), timeout=until - now)
-            if self.failure is not None:
-                raise self.failure
-            if self._done.done():
-                return self._done.result()
+            left = min(max(deadline, lump), latest) - clock()
+            if left > 0:
+                timer = loop.call_later(left, look)
+            else:
+                settle(done, exchange.expired())
+
+        timer: asyncio.TimerHandle | None = None
+        look()
+        try:
+            result = await done
+        finally:
+            if timer is not None:
+                timer.cancel()
+        if self.failure is not None:
+            raise self.failure
+        return result
 
     def _fell_silent(self) -> None:
         if self._exchange is not None:
