@@ -17,11 +17,11 @@ from tui.bus.link import SerialLink, character_time
 from tui.bus.master import LineContext, Sending
 from tui.bus.requests import Read, Request, WriteOne
 from tui.bus.result import ResultKind
-from tui.bus.rtu.exchange import RtuExchange
+from tui.bus.rtu.exchange import REFUSAL, RtuExchange
 from tui.bus.rtu.master import BEFORE_END, RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.trace import Trace
-from tui.bus.transport.serial_posix import PosixSerial
+from tui.bus.transport.serial_posix import WAITED_ON_PORT, PosixSerial
 from tui.wire.frames import frame
 
 from .conftest import BRISK
@@ -42,8 +42,8 @@ def missing_after(data: bytes, request: Request = READ, **more: bool | int | Non
 
 def test_missing_counts_the_rest_of_a_reply_that_has_begun() -> None:
     found = [missing_after(REPLY[:length], echo=False) for length in range(len(REPLY))]
-    # before the byte count it may be a refusal, or the rest of another reply
-    assert found == [0, 0, 0, *range(len(REPLY) - 3, 0, -1)]
+    # before the byte count it may be a refusal
+    assert found == [0, 4, 3, *range(len(REPLY) - 3, 0, -1)]
 
 
 def test_missing_is_unknown_before_the_reply_to_this_request() -> None:
@@ -77,7 +77,8 @@ async def test_master_pauses_until_just_before_the_end_of_a_reply() -> None:
     transport.send = send  # type: ignore[method-assign]
     result = await master.exchange(Sending(1, READ.pdu(), READ.expectation(), 5.0))
     assert result.kind is ResultKind.REPLY
-    assert paused == [(len(REPLY) - 5) * character_time(LINE) - BEFORE_END]
+    lengths = REFUSAL - 2, len(REPLY) - 5
+    assert paused == [length * character_time(LINE) - BEFORE_END for length in lengths]
     master.close()
 
 
@@ -124,7 +125,7 @@ async def test_paused_port_takes_bytes_once_the_time_is_over(
     port: tuple[PosixSerial, Taker, int],
 ) -> None:
     transport, taker, peer = port
-    transport.pause(0.001)
+    transport.pause(WAITED_ON_PORT + 0.001)
     transport.pause(3600.0)  # one is enough
     await come(transport, peer, b"rest of a reply")
     async with asyncio.timeout(10.0):
@@ -133,9 +134,20 @@ async def test_paused_port_takes_bytes_once_the_time_is_over(
     assert taker.data == b"rest of a reply"
 
 
+async def test_short_pause_takes_what_came_without_a_turn_of_the_loop(
+    port: tuple[PosixSerial, Taker, int],
+) -> None:
+    transport, taker, peer = port
+    os.write(peer, b"rest of a reply")
+    assert transport._fd is not None
+    assert select.select([transport._fd], [], [], 10.0)[0]
+    transport.pause(0.001)
+    assert taker.data == b"rest of a reply"
+
+
 async def test_paused_port_closes(port: tuple[PosixSerial, Taker, int]) -> None:
     transport, taker, peer = port
-    transport.pause(0.0)
+    transport.pause(WAITED_ON_PORT + 0.001)
     transport.close()
     os.write(peer, b"late")
     await asyncio.sleep(0.01)

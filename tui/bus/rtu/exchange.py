@@ -13,6 +13,8 @@ from .frames import Match, begins_reply, find_reply, pieces
 
 FLOOD = 4096
 """Bytes of one exchange beyond which the older half is let go: no line says that much."""
+REFUSAL = 5
+"""Characters of the shortest reply."""
 NOISE = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
 
@@ -62,13 +64,16 @@ class RtuExchange:
 
     @property
     def missing(self) -> int:
-        """Characters that come before there is a result; 0 unless the reply has begun for sure."""
+        """Characters that come before there can be a result; 0 unless the reply has begun."""
         expectation = self._expectation
         if expectation is None or expectation.length is None or self._skip:
             return 0
+        reply = self.buffer[len(self.frame) if self.echo else 0 :]
         head = bytes((self._device, *expectation.prefix))
-        begun = self.buffer.startswith(head, len(self.frame) if self.echo else 0)
-        return self.longest - len(self.buffer) if begun else 0
+        if reply.startswith(head):
+            return self.longest - len(self.buffer)
+        # may be a refusal yet
+        return REFUSAL - len(reply) if reply and head.startswith(reply) else 0
 
     def feed(self, data: bytes) -> ExchangeResult | None:
         """Take received bytes; the result once the reply is whole."""

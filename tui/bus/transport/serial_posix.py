@@ -44,6 +44,10 @@ class PosixSerial:
         """
         if self._fd is None or self._resumes is not None:
             return
+        if seconds <= WAITED_ON_PORT:
+            time.sleep(seconds)
+            self._take()
+            return
         loop = asyncio.get_running_loop()
         loop.remove_reader(self._fd)
         until = time.monotonic() + seconds
