@@ -16,7 +16,7 @@ from ..errors import (
 )
 from ..limits import STANDARD_EXCEPTIONS
 from ..master import MonotonicClock
-from ..model import Priority, Timing
+from ..model import Priority, Reply, Timing
 from ..requests import BROADCAST
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_facts import SharedFacts
@@ -97,8 +97,7 @@ class Outcomes:
             result.kind = ResultKind.NOTHING
         match result.kind:
             case ResultKind.REPLY:
-                self._share(job, result)
-                job.finish(result.pdu, self._time_of(job, result))
+                self._share(job, job.finish(result.pdu, self._time_of(job, result)))
             case ResultKind.EXCEPTION:
                 self._tally.count_exception(request.device, result.exception)
                 job.fail(self._exception(job, result.exception))
@@ -130,14 +129,13 @@ class Outcomes:
         short = record.failures < MISSES or now - since < SHORT_SILENCE
         tally.count_good(device, was_heard=record.ever_answered and short)
 
-    def _share(self, job: Job, result: ExchangeResult) -> None:
+    def _share(self, job: Job, reply: Reply) -> None:
         """Keep what was read, while somebody else may want it.
 
         Another program, or another client of this one: a gateway takes what was read before.
         """
         if len(self._facts.programs) > 1 or job.max_age:
-            time = self._time_of(job, result)
-            self.values.note(job.request, job.request.words(job.own_part(result.pdu)), time)
+            self.values.note(job.request, reply.words, reply.time)
 
     @staticmethod
     def _time_of(job: Job, result: ExchangeResult) -> float:

@@ -93,10 +93,12 @@ class Job:
         """An internal error kept it from being queued."""
         self.fail(LineFailed(f"The line failed: {error!r}."))
 
-    def finish(self, pdu: bytes, time: float) -> None:
+    def finish(self, pdu: bytes, time: float) -> Reply:
         """Hand back a checked reply, without device and checksum."""
         own = self.own_part(pdu)
-        self.answer.set_result(Reply(self.request.words(own), time, own))
+        reply = Reply(self.request.words(own), time, own)
+        self.answer.set_result(reply)
+        return reply
 
 
 class JobQueue:
@@ -167,8 +169,11 @@ class JobQueue:
         """The job that goes out now, or when one may; both None when nothing waits."""
         earliest: float | None = None
         self._jobs = [job for job in self._jobs if not self._withdrawn(job)]
-        order = sorted(self._jobs, key=self._shares.rank)
-        for job in sorted(order, key=lambda one: self._stops.yields(one, now)):
+
+        def place(job: Job) -> tuple[float, ...]:
+            return self._stops.yields(job, now), *self._shares.rank(job)
+
+        for job in sorted(self._jobs, key=place):
             ready = not_before(job)
             if ready <= now:
                 self._jobs.remove(job)
