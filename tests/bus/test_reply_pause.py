@@ -21,7 +21,7 @@ from tui.bus.rtu.exchange import REFUSAL, RtuExchange
 from tui.bus.rtu.master import BEFORE_END, RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.trace import Trace
-from tui.bus.transport.serial_posix import WAITED_ON_PORT, PosixSerial
+from tui.bus.transport.serial_posix import SHORT_PAUSE, PosixSerial
 from tui.wire.frames import frame
 
 from .conftest import BRISK
@@ -125,7 +125,7 @@ async def test_paused_port_takes_bytes_once_the_time_is_over(
     port: tuple[PosixSerial, Taker, int],
 ) -> None:
     transport, taker, peer = port
-    transport.pause(WAITED_ON_PORT + 0.001)
+    transport.pause(SHORT_PAUSE + 0.001)
     transport.pause(3600.0)  # one is enough
     await come(transport, peer, b"rest of a reply")
     async with asyncio.timeout(10.0):
@@ -147,7 +147,7 @@ async def test_short_pause_takes_what_came_without_a_turn_of_the_loop(
 
 async def test_paused_port_closes(port: tuple[PosixSerial, Taker, int]) -> None:
     transport, taker, peer = port
-    transport.pause(WAITED_ON_PORT + 0.001)
+    transport.pause(SHORT_PAUSE + 0.001)
     transport.close()
     os.write(peer, b"late")
     await asyncio.sleep(0.01)

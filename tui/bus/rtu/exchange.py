@@ -13,8 +13,8 @@ from .frames import Match, begins_reply, find_reply, pieces
 
 FLOOD = 4096
 """Bytes of one exchange beyond which the older half is let go: no line says that much."""
-REFUSAL = 5
-"""Characters of the shortest reply."""
+REFUSAL, REFUSED_LATER = 5, 2
+"""Characters of the shortest reply, and those after it that are awaited as well: it is seldom."""
 NOISE = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
 
@@ -69,11 +69,13 @@ class RtuExchange:
         if expectation is None or expectation.length is None or self._skip:
             return 0
         reply = self.buffer[len(self.frame) if self.echo else 0 :]
-        head = bytes((self._device, *expectation.prefix))
+        head, rest = bytes((self._device, *expectation.prefix)), self.longest - len(self.buffer)
         if reply.startswith(head):
-            return self.longest - len(self.buffer)
-        # may be a refusal yet
-        return REFUSAL - len(reply) if reply and head.startswith(reply) else 0
+            return rest
+        if not reply or not head.startswith(reply):
+            return 0
+        refusal = REFUSAL - len(reply)
+        return rest if rest <= refusal + REFUSED_LATER else refusal
 
     def feed(self, data: bytes) -> ExchangeResult | None:
         """Take received bytes; the result once the reply is whole."""
@@ -134,7 +136,8 @@ class RtuExchange:
                 self.echo = True
             elif match.start == 0:
                 self.echo = False
-        loose = self._loose(match)
+        alone = match.end - match.start == len(self.buffer)
+        loose = [] if alone else self._loose(match)
         return ExchangeResult(
             ResultKind.REPLY if match.exception is None else ResultKind.EXCEPTION,
             pdu=match.pdu,

@@ -69,7 +69,9 @@ class RtuMaster:
         self._hold = 0.0
         self._exchange: RtuExchange | None = None
         self._done: asyncio.Future[ExchangeResult] | None = None
-        self._timer = PutOffTimer()
+        self._timer, self._time_out = PutOffTimer(), PutOffTimer()
+        self._deadline = self._latest = 0.0
+        """When the reply is given up if nothing has come, and if bytes are coming in."""
         self._sent = 0.0
         self._over = 0.0
         """When the last character of the reply that has begun is on the wire, at the latest."""
@@ -85,6 +87,7 @@ class RtuMaster:
     def close(self) -> None:
         """Give the port back."""
         self._timer.stop()
+        self._time_out.stop()
         self._transport.close()
 
     def received(self, data: bytes, time: float) -> None:
@@ -187,10 +190,11 @@ class RtuMaster:
             tally.count_sent(sending.device, len(data))
             self._around.trace.add(begun, "out", data)
             still = clock() - begun > FROZEN_IN_SENDING
-            result = await (self._distrust(sending) if still else self._result(exchange, sending))
+            result = await (self._distrust(sending) if still else self._result(sending))
         finally:
             self._exchange = self._done = None
             self._timer.stop()
+            self._time_out.leave()
         self.echo = exchange.echo
         end = clock() if result.kind is ResultKind.NOTHING else self._last
         tally.count_end(sending.device, clock() - begun, len(result.received))
@@ -237,40 +241,34 @@ class RtuMaster:
             raise self.failure
         return ExchangeResult(ResultKind.NOTHING)
 
-    async def _result(self, exchange: RtuExchange, sending: Sending) -> ExchangeResult:
+    async def _result(self, sending: Sending) -> ExchangeResult:
         """Wait for the result; while bytes are coming in, a little over the time-out."""
-        done, loop = self._done, asyncio.get_running_loop()
-        assert done is not None
-        clock, expectation = self._around.clock, sending.expectation
+        assert self._done is not None
+        expectation = sending.expectation
         if expectation is None:
-            self._hold = deadline = self._sent + self._around.timing.turnaround_delay
-            latest = deadline
+            self._hold = self._deadline = self._sent + self._around.timing.turnaround_delay
+            self._latest = self._deadline
         else:
             length = MAX_FRAME if expectation.length is None else expectation.length + 3
-            deadline = self._sent + sending.time_out
-            latest = deadline + length * self._character + self._gap
-
-        def look() -> None:
-            """End the exchange if its time is up, else look again then."""
-            nonlocal timer
-            # a lump may follow what has come; where nothing has, the time is up by itself
-            lump = self._ends if exchange.buffer else deadline
-            left = min(max(deadline, lump), latest) - clock()
-            if left > 0:
-                timer = loop.call_later(left, look)
-            else:
-                settle(done, exchange.expired())
-
-        timer: asyncio.TimerHandle | None = None
-        look()
-        try:
-            result = await done
-        finally:
-            if timer is not None:
-                timer.cancel()
+            self._deadline = self._sent + sending.time_out
+            self._latest = self._deadline + length * self._character + self._gap
+        self._look_at_time()
+        result = await self._done
         if self.failure is not None:
             raise self.failure
         return result
+
+    def _look_at_time(self) -> None:
+        """End the exchange if its time is up, else look again then."""
+        if (exchange := self._exchange) is None:
+            return
+        # a lump may follow what has come; where nothing has, the time is up by itself
+        lump = self._ends if exchange.buffer else self._deadline
+        left = min(max(self._deadline, lump), self._latest) - self._around.clock()
+        if left > 0:
+            self._time_out.start(left, self._look_at_time)
+        else:
+            settle(self._done, exchange.expired())
 
     def _fell_silent(self) -> None:
         if self._exchange is not None:

@@ -15,23 +15,27 @@ class PutOffTimer:
         self._action: Callable[[], None] | None = None
 
     def start(self, delay: float, action: Callable[[], None]) -> None:
-        """Do this once so many seconds have gone by; a timer that is set for it is put off."""
+        """Do only this, once so many seconds have gone by; a timer that is set is put off."""
         loop = asyncio.get_running_loop()
-        self._due, before, self._action = loop.time() + delay, self._action, action
-        if self._timer is not None and (before != action or self._timer.when() > self._due):
+        self._due, self._action = loop.time() + delay, action
+        if self._timer is not None and self._timer.when() > self._due:
             self.stop()
         if self._timer is None:
             self._timer = loop.call_at(self._due, self._ring)
 
     def _ring(self) -> None:
         """The time that was set first is over; to set it anew for each piece costs more."""
-        loop = asyncio.get_running_loop()
+        loop, self._timer = asyncio.get_running_loop(), None
+        if self._action is None:
+            return
         if loop.time() < self._due:
             self._timer = loop.call_at(self._due, self._ring)
-            return
-        self._timer = None
-        if self._action is not None:
+        else:
             self._action()
+
+    def leave(self) -> None:
+        """Do nothing any more; where it is soon started again, that costs less than stop()."""
+        self._action = None
 
     def stop(self) -> None:
         """Do nothing any more."""

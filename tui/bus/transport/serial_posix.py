@@ -16,6 +16,8 @@ from .port_errors import PortErrors, port_errors
 LUMP = 4096
 WAITED_ON_PORT = 0.0025
 """The loop wakes to the millisecond only; the last part of a pause is waited on the port."""
+SHORT_PAUSE = 0.004
+"""A pause up to which the loop sleeps through it: to turn meanwhile costs more."""
 SPIN = 0.00008
 """The system wakes a sleeper that much late; the very last part is waited in a short loop."""
 SEND_TIMEOUT = 1.0
@@ -44,7 +46,7 @@ class PosixSerial:
         """
         if self._fd is None or self._resumes is not None:
             return
-        if seconds <= WAITED_ON_PORT:
+        if seconds <= SHORT_PAUSE:
             time.sleep(seconds)
             self._take()
             return
