@@ -8,11 +8,12 @@ from collections.abc import Iterator
 import pytest
 from textual._compositor import Compositor
 from textual.css.stylesheet import Stylesheet
+from textual.pilot import Pilot
 from textual.widgets import Input
 
 from tui.screens.dialogs.question import Question
 
-from .quick import drawn_for_somebody, parse_once
+from .quick import drawn_for_somebody, parse_once, wait_for_the_busy
 
 
 @pytest.fixture(autouse=True)
@@ -40,6 +41,15 @@ def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
 def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fifth of the time of a test of the panel would go into the same style sheets."""
     monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)
+
+
+@pytest.fixture(autouse=True)
+def only_the_busy_waited_for(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tenth of the time went into waking widgets that wait. Pictures take the pilot's own way."""
+    if "snap_compare" not in request.fixturenames:
+        monkeypatch.setattr(Pilot, "_wait_for_screen", wait_for_the_busy)
 
 
 @pytest.fixture(autouse=True)

@@ -1,13 +1,16 @@
-"""What panels of tests need not do: parse the same style sheets again, draw for nobody."""
+"""What panels of tests need not do: parse style sheets again, draw for nobody, wake what waits."""
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 from rich.console import RenderableType
 from textual._compositor import Compositor
 from textual._context import active_app
 from textual.css.stylesheet import Stylesheet
+from textual.message_pump import MessagePump
+from textual.pilot import Pilot
 from textual.screen import Screen
 
 _draw = Compositor.render_update
@@ -34,3 +37,40 @@ def drawn_for_somebody(
         return _draw(self, full, screen_stack, simplify)
     self._dirty_regions.clear()
     return None
+
+
+async def wait_for_the_busy(self: Pilot[Any], timeout: float = 30.0) -> bool:
+    """Wait until what is queued on the screen is done; false where an error came first.
+
+    The pilot's own way wakes every widget for that, also those that wait for a message: a tenth
+    of what a panel did in a test.
+    """
+    app = self.app
+    if not app.screen_stack:
+        return False
+    done = asyncio.Event()
+    left = 0
+
+    def one_less() -> None:
+        nonlocal left
+        left -= 1
+        if not left:
+            done.set()
+
+    for pump in (app, app.screen, *filter(is_busy, app.screen.walk_children())):
+        left += pump.call_later(one_less)
+    if left:
+        waiting = {asyncio.ensure_future(one.wait()) for one in (done, app._exception_event)}
+        ended, others = await asyncio.wait(
+            waiting, timeout=timeout, return_when=asyncio.FIRST_COMPLETED
+        )
+        for one in others:
+            one.cancel()
+        assert ended, "the widgets of the screen did not do what is queued"
+    return left == 0
+
+
+def is_busy(pump: MessagePump) -> bool:
+    """Whether it has a message, or is at one: it does not wait for the next."""
+    ready: asyncio.Event = pump._message_queue.ready_event
+    return ready.is_set() or not ready._waiters
