@@ -218,11 +218,14 @@ def test_readme_names_every_profile_and_its_page_every_command() -> None:
 
 
 def test_readme_stays_short() -> None:
-    """What it is, install, five commands, safety, drives, links: the rest has pages of its own."""
+    """Install, strengths, five commands, safety, drives, links: the rest has pages of its own."""
     heads = re.findall(r"^## (.+)$", README, re.MULTILINE)
-    assert heads == ["Install", "Five commands", "Safety", "Drives", "Documents", "Licence"]
+    assert heads == [
+        "Install", "What sets it apart", "Common commands", "Safety",
+        "Drives", "Documents", "License",
+    ]  # fmt: skip
     assert len(README.splitlines()) <= 120
-    five = README.partition("## Five commands")[2].partition("\n## ")[0]
+    five = README.partition("## Common commands")[2].partition("\n## ")[0]
     assert len(re.findall(r"^drivepanel ", five, re.MULTILINE)) == 5
 
 
