@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from tui.bus.api import Priority
-from tui.bus.errors import LineError, LineLost
+from tui.bus.errors import LineError, LineLost, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line, LineStatus, Timing
 from tui.bus.link import RtuTcpLink
@@ -150,6 +150,27 @@ def _stopped(line: Line, peer: PtyPeer) -> bool:
     with suppress(LineError):
         asyncio.run(line.write(1, 1, [0], priority=Priority.STOP))
     return any(one[1] == 6 for one in peer.requests)
+
+
+async def test_stop_is_kept_while_a_line_that_is_behind_cannot_be_opened_again(
+    open_line: OpenLine,
+) -> None:
+    """A gateway may refuse the next connection for some seconds: the stop fails, and is sent."""
+    with TcpPeer(Behind()) as peer:
+        line = opened(open_line, RtuTcpLink("127.0.0.1", peer.port), WIDE)
+        await until_named(line)
+    await asyncio.to_thread(eventually, lambda: "cannot be reached" in line.state.reason)
+    with pytest.raises(NoAnswer):  # so that the stop goes on without a look
+        await line.read(1, 100, priority=Priority.STOP)
+    for _ in range(2):
+        with pytest.raises(LineLost, match="cannot be reached"):
+            await line.write(1, 1, [0], priority=Priority.STOP)
+    with pytest.raises(LineLost):
+        await line.write(1, 2, [7])
+    with TcpPeer(honest, port=peer.port) as again:
+        await asyncio.to_thread(again.await_requests, 2)
+        assert [one[1] for one in again.requests].count(6) == 1
+        assert again.requests[0][1:6] == bytes([6, 0, 1, 0, 0]), "before anything else"
 
 
 async def test_line_in_step_again_is_used_again(open_line: OpenLine) -> None:

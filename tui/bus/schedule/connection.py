@@ -152,6 +152,9 @@ class Connection:
                 log.exception("the line's loop failed")
                 failure = LineFailed(f"The line failed: {error!r}.")
             self._failures += 1
+            if type(failure) is LineLost and self._dispatcher.steps.behind:
+                # stops are still taken, and kept: the line is tried again soon
+                failure, self._failures = LineBehind(str(failure)), 1
             timing = self._around.timing
             delay = pause(self._failures, timing.reconnect_first, timing.reconnect_longest)
             self.refusal = failure

@@ -25,7 +25,7 @@ from .patience import Devices
 from .probes import may_be_silent
 from .queue import Job, JobQueue
 from .step_proof import StepProof
-from .unsent import ends_unsent, refusal_of
+from .unsent import ends_unsent, fail_lost, refusal_of
 
 HELD_LOOK = 0.01
 """Seconds between two looks whether requests are held back still."""
@@ -82,7 +82,13 @@ class Dispatcher:
     def fail_all(self, reason: str, kind: type[LineError]) -> None:
         """Fail everything that waits."""
         for job in self._queue.drain():
-            job.fail(kind(with_fate(job, reason) if job.begun else reason))
+            self.fail(job, reason, kind)
+
+    def fail(self, job: Job, reason: str, kind: type[LineError] = LineLost) -> None:
+        """Fail a request without a line; the word of a stop is kept if the line closed itself."""
+        keeps = bool(self.steps.behind) and kind is not LineClosed
+        if (kept := fail_lost(job, reason, kind, self._clock(), keeps=keeps)) is not None:
+            self._queue.keep(kept)
 
     async def all_waiting(self) -> list[Job]:
         """Take out all that waits, once something does."""
@@ -149,17 +155,14 @@ class Dispatcher:
         now = self._clock()
         if job.priority is not Priority.STOP and self.held_back():
             return now + HELD_LOOK
-        if self.steps.behind and job.priority is not Priority.STOP:
-            return 0.0  # taken out at once, to fail
-        if self.steps.quiet_until > now and job.priority > Priority.FEED:
-            return self.steps.quiet_until
+        if (free := self.steps.not_before(job, now)) is not None:
+            return free
         if (trusted := self.proof.not_before(job, now)) > now:
             return trusted
         if (free := self._back_to_back.not_before(job)) > now:
             return free
         if self._devices.backed_off(job.request.device, job.priority, now, job.within) is not None:
-            # taken out at once, to be told
-            return 0.0
+            return 0.0  # taken out at once, to fail
         ready = self._free_from(job, now)
         if ready > max(now, self._devices.quiet_until) and self.steps.lengthen(job):
             ready = self._free_from(job, now)
@@ -171,9 +174,8 @@ class Dispatcher:
         )
 
     def _ends_unsent(self, job: Job) -> bool:
-        if self.steps.refuses(job):
-            return True
-        return ends_unsent(job, self._devices, self._outcomes.values, self._clock())
+        values, now = self._outcomes.values, self._clock()
+        return self.steps.refuses(job) or ends_unsent(job, self._devices, values, now)
 
     def refusal(self, job: Job) -> str:
         """Why a write must not go out: a stop came after it, or another program commands."""
@@ -189,8 +191,7 @@ class Dispatcher:
             return False
         if why := self.forbidden(job):
             job.fail(RequestRefused(why))
-            return False
-        return True
+        return not why
 
     async def _run(self, master: Master, job: Job) -> None:
         if not self._begins(job):
@@ -239,8 +240,7 @@ class Dispatcher:
             job.fail(LineFailed(with_fate(job, f"The request failed: {error!r}.")))
             raise
         self.in_flight = False
-        acknowledged = result.kind is ResultKind.REPLY
-        self._queue.count(job, begun, self._clock(), acknowledged=acknowledged)
+        self._queue.count(job, begun, self._clock(), acknowledged=result.kind is ResultKind.REPLY)
         self._conclude(job, result, begun)
 
     async def _prove(self, master: Master, job: Job, probe: Request) -> None:

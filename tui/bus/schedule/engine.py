@@ -200,7 +200,7 @@ class Engine:
         if self._closed:
             job.fail(LineClosed())
         elif self._connection.refusal is not None:
-            job.fail(LineLost(str(self._connection.refusal)))
+            self._dispatcher.fail(job, str(self._connection.refusal))
         else:
             self._dispatcher.submit(job)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..errors import ONE_BEHIND, LineBehind, NoAnswer
+from ..errors import ONE_BEHIND, LineBehind
 from ..expectation import EXCEPTION, IDENTIFY, REPORT_ID, Expectation
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
@@ -19,6 +19,7 @@ from .outcomes import Outcomes
 from .patience import Devices
 from .probes import LOOKED_BACK, Probes, may_be_silent
 from .queue import Job
+from .unsent import fail_without_line, is_stop_word
 
 CHECK_EVERY, CHECK_SHARE = 10.0, 0.01
 """Seconds from one proof to the next on a connection that buffers, and their longest share."""
@@ -97,13 +98,17 @@ class InStep:
 
     def refuses(self, job: Job) -> bool:
         """Fail a request on a line that is behind, unless it is the word of a stop."""
-        stops, request = job.priority is Priority.STOP, job.request
         if not self.behind or is_stop_word(job):
             return False
-        place = (request.device, request.function, request.register)
-        # a stop that cannot read goes on without: a lost line would end it
-        job.fail(NoAnswer(*place, self.behind) if stops else LineBehind(self.behind))
+        fail_without_line(job, LineBehind(self.behind))
         return True
+
+    def not_before(self, job: Job, now: float) -> float | None:
+        """When a request may be taken out, if that depends on nothing else; else None."""
+        if self.behind and job.priority is not Priority.STOP:
+            return 0.0  # to fail
+        drains = self.quiet_until > now and job.priority > Priority.FEED
+        return self.quiet_until if drains else None
 
     def prepare(self, job: Job) -> Request | None:
         """Give a job a form that proves the step, if it needs one; else the probe to send first."""
@@ -286,8 +291,3 @@ class InStep:
             drain = self._timing.first_timeout
             self._next_try = self._clock() + (drain if self._rounds < REOPENINGS else RETRY)
         return 0.0
-
-
-def is_stop_word(job: Job) -> bool:
-    """True if a request stops a motor, also when it is repeated: nothing holds it back."""
-    return job.request.changes and job.priority <= Priority.FEED

@@ -163,6 +163,11 @@ class JobQueue:
             job.order = next(self._orders)
         self._jobs.append(job)
 
+    def keep(self, stop: Job) -> None:
+        """Queue a stop for whose answer nobody waits, unless the same one waits."""
+        if not any(stop.request == one.request for one in self._jobs):
+            self._jobs.append(stop)
+
     def take(
         self, not_before: Callable[[Job], float], now: float
     ) -> tuple[Job | None, float | None]:

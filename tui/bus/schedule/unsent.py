@@ -2,13 +2,48 @@
 
 from __future__ import annotations
 
-from ..errors import NoAnswer
+from ..errors import LineError, NoAnswer
 from ..model import Priority
 from ..requests import Diagnose
 from ..shared_facts import SharedFacts
+from .outcomes import with_fate
 from .patience import Devices
 from .queue import Job
 from .shared_values import SharedValues
+
+STOP_KEPT_FOR = 600.0
+"""Seconds after which a stop is not sent any more once a line opens again."""
+
+
+def is_stop_word(job: Job) -> bool:
+    """True if a request stops a motor, also when it is repeated: nothing holds it back."""
+    return job.request.changes and job.priority <= Priority.FEED
+
+
+def fail_without_line(job: Job, error: LineError) -> None:
+    """Fail a request that no line carries. A stop that cannot read goes on to send its word."""
+    place = (job.request.device, job.request.function, job.request.register)
+    reads = job.priority is Priority.STOP and not job.request.changes
+    job.fail(NoAnswer(*place, str(error)) if reads else error)
+
+
+def fail_lost(
+    job: Job, reason: str, kind: type[LineError], now: float, *, keeps: bool
+) -> Job | None:
+    """Fail a request of a lost line; returns the stop that is still to be sent, if it `keeps` any.
+
+    The program hears of the failure at once; the word is sent as soon as the line opens.
+    """
+    error = kind(with_fate(job, reason) if job.begun else reason)
+    if not keeps:
+        job.fail(error)
+        return None
+    fail_without_line(job, error)
+    if not is_stop_word(job) or now - job.asked > STOP_KEPT_FOR:
+        return None
+    kept = Job(job.request, job.priority, job.limits, order=job.order)
+    kept.program, kept.asked = job.program, job.asked
+    return kept
 
 
 def ends_unsent(job: Job, devices: Devices, values: SharedValues, now: float) -> bool:
