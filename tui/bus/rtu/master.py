@@ -263,12 +263,14 @@ class RtuMaster:
         if (exchange := self._exchange) is None:
             return
         # a lump may follow what has come; where nothing has, the time is up by itself
-        lump = self._ends if exchange.buffer else self._deadline
-        left = min(max(self._deadline, lump), self._latest) - self._around.clock()
+        lump, now = self._ends if exchange.buffer else self._deadline, self._around.clock()
+        left = min(max(self._deadline, lump), self._latest) - now
         if left > 0:
             self._time_out.start(left, self._look_at_time)
         else:
-            settle(self._done, exchange.expired())
+            # the line may have fallen silent at the same moment
+            silent = exchange.silent() if now >= self._ends else None
+            settle(self._done, silent or exchange.expired())
 
     def _fell_silent(self) -> None:
         if self._exchange is not None:
