@@ -359,7 +359,7 @@ def test_4_the_drive_refuses_the_run_order_and_stands() -> None:
         assert done.returncode == 4, done.stdout + done.stderr
         assert "xception" in done.stderr
         assert "NOT STOPPED" not in done.stderr
-        assert "it stands" in done.stdout
+        assert "is at standstill" in done.stdout
         assert stands(simulation)
 
 

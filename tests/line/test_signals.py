@@ -177,7 +177,7 @@ def catches(pid: int, number: int) -> bool:
 OWNERS = {
     "watch": (("sim:atv71@2", "-d", "2", "ETA", "--every", "0.2"), "ETA", 128),
     "watch of two lines": (("sim:atv71@2", "sim:atv31@1", "ETA", "--every", "0.2"), "ETA", 128),
-    "hold": (("sim:atv71@2", "-d", "2"), "kept from", 128),
+    "hold": (("sim:atv71@2", "-d", "2"), "kept alive", 128),
     "serve": (("sim:atv71@2", "--tcp", "127.0.0.1:0"), "Ready", 128),
     "listen": (("sim:atv71@2",), "Listening", 128),
     "simulate": (("atv71@2", "--tcp", "127.0.0.1:0"), "Ready", -signal.SIGUSR1),
