@@ -12,6 +12,7 @@ from tui.bus.errors import ChecksumFault, DeviceException, LineLost, NoAnswer, W
 from tui.bus.limits import CAUTIOUS
 from tui.bus.line import Timing
 from tui.bus.link import RtuTcpLink, TcpLink
+from tui.bus.prepared import prepared_write
 
 from .conftest import BRISK, WIDE, OpenLine
 from .peer import Step, TcpPeer, eventually, honest, reply, tcp_reply, tcp_request_length
@@ -169,3 +170,35 @@ async def test_rtu_over_tcp_late_and_damaged(open_line: OpenLine) -> None:
         with pytest.raises(ChecksumFault):
             await line.read(1, 20, priority=OPERATOR)
         assert (await line.read(1, 30, priority=OPERATOR)).words == (30,)
+
+
+@pytest.mark.parametrize("unit", [255, 0])
+async def test_requests_to_the_only_drive_of_a_gateway_carry_its_unit(
+    open_line: OpenLine, unit: int
+) -> None:
+    def only(request: bytes, _count: int) -> Sequence[Step]:
+        return [tcp_reply(request)] if request[6] == unit else []
+
+    with TcpPeer(only, length=tcp_request_length) as peer:
+        link = TcpLink("127.0.0.1", peer.port, unit=unit)
+        line = open_line(link)
+        assert (await line.read(1, 100, priority=OPERATOR)).words == (100,)
+        with pytest.raises(NoAnswer):
+            await line.read(2, 100, priority=OPERATOR)
+        assert [request[6] for request in peer.requests[:2]] == [unit, 2]
+    assert prepared_write(link, WIDE, 1, 8501, [0]).frame[6] == unit
+    assert prepared_write(link, WIDE, 2, 8501, [0]).frame[6] == 2
+
+
+async def test_reply_with_the_number_of_the_device_is_not_that_of_the_unit(
+    open_line: OpenLine,
+) -> None:
+    def number(request: bytes, _count: int) -> Sequence[Step]:
+        whole = bytearray(tcp_reply(request))
+        whole[6] = 1
+        return [bytes(whole)]
+
+    with TcpPeer(number, length=tcp_request_length) as peer:
+        line = open_line(TcpLink("127.0.0.1", peer.port, unit=255))
+        with pytest.raises(WrongReply, match="unit 1"):
+            await line.read(1, 100)

@@ -208,6 +208,7 @@ TEXTS = some.one_of(
         ),
         some.sampled_from(
             ["", ",timeout=2", ",timeout=0.001", ",timeout=", ",timeout=31", ",TIMEOUT=2",
+             ",unit=255", ",unit=0", ",unit=1", ",unit=255,timeout=2", ",timeout=2,unit=0",
              ",timeout=2.5", ",timeout=.5", ",timeout=1e1", ",timeout=2,9600", " "]
         ),
     ),
@@ -250,7 +251,7 @@ def test_short_stop_line_taken_is_the_line_of_the_command(text: str) -> None:
     [
         "/dev/null", "serial:/dev/null,9600", "SERIAL:/dev/null,9600,8n1,timeout=2.5", "tcp:pump",
         "tcp:10.0.0.5", "tcp:10.0.0.5:1502,timeout=2", "rtu-tcp:both:4001", "tcp:other.host",
-        "tcp:LOCALHOST.",
+        "tcp:LOCALHOST.", "tcp:10.0.0.5,unit=255", "tcp:pump:1502,unit=0,timeout=2",
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("hosts")

@@ -239,7 +239,7 @@ DEFECTS = (
     Defect(
         "tcp-unit-not-compared",
         "tui/bus/tcp",
-        "if device != sending.device:",
+        "if device != awaited:",
         "if not device:",
         "Over a gateway the values of one motor are shown as those of another.",
         ("tests/bus/test_tcp.py",),
@@ -299,6 +299,14 @@ DEFECTS = (
         "if False:",
         "Each new owner of a line that repeats replies takes one of each drive for an answer.",
         (f"{QUEUE}::test_who_takes_a_line_over_knows_that_it_repeats_the_replies_of_all",),
+    ),
+    Defect(
+        "unit-of-a-gateway-not-in-stops",
+        "tui/bus/prepared.py",
+        "bytes([link.unit_of(device)])",
+        "bytes([device])",
+        "A prepared stop goes to a unit that the gateway does not answer.",
+        ("tests/bus/test_tcp.py::test_requests_to_the_only_drive_of_a_gateway_carry_its_unit",),
     ),
     Defect(
         "replies-behind-trusted-on-contact",

@@ -564,7 +564,7 @@ ASKED = Sight(LINK, 2, PROFILE, port=PortSeen(PORT))
 EXAMPLES = {
     "other-master": replace(ASKED, overheard="Another master asks drives on this line. Address 2."),
     "wrong-protocol": replace(ASKED, works=Works("rtu-tcp:gateway:4001")),
-    "other-unit": replace(ASKED, works=Works("", 255)),
+    "other-unit": replace(ASKED, works=Works("tcp:gateway:502,unit=255", 255)),
     "behind": replace(ASKED, measure=Measure(asked=9, behind=3)),
     "two-drives": replace(ASKED, measure=Measure(asked=9, answered=9, second=3)),
     "swapped": replace(ASKED, measure=Measure(asked=9, answered=9, swapped=3)),

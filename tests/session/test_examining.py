@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -207,6 +208,9 @@ async def test_the_only_unit_of_a_gateway_is_found(unit: int) -> None:
     with opened({"only-unit": unit}, "tcp") as line:
         found = await found_on(line)
     assert (found.rung, f"unit {unit}," in found.text) == ("other-unit", True)
+    opens = re.search(r"tcp:127.0.0.1:\d+,unit=(\d+)", found.steps[0])
+    assert opens is not None
+    assert opens[1] == str(unit), "the line that works"
 
 
 async def test_no_connection_is_made_beside_a_line_that_answers(

@@ -12,10 +12,15 @@ from .errors import LinkSyntaxError
 
 FORMS = (
     "serial:PATH[,BAUD[,FORMAT]] such as serial:/dev/ttyUSB0,19200,8E1, tcp:HOST[:PORT], "
-    "or rtu-tcp:HOST:PORT; ,timeout=SECONDS at the end sets the longest wait for a reply"
+    "or rtu-tcp:HOST:PORT; ,timeout=SECONDS at the end sets the longest wait for a reply; "
+    ",unit=255 or ,unit=0 after tcp: is for a gateway that has one drive, as device 1"
 )
 MODBUS_PORT = 502
-_TIMEOUT = re.compile(r"(.*),\s*timeout\s*=([^,]*)", re.IGNORECASE)
+_OPTION = re.compile(r"(.*),\s*(timeout|unit)\s*=([^,]*)", re.IGNORECASE)
+ONLY_UNITS = (255, 0)
+"""Units that address the only drive of a gateway (Modbus Messaging on TCP/IP, 4.4.1.2)."""
+ONLY_DEVICE = 1
+"""The device that such a drive is on a line with a unit."""
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.02, 30.0
 _PORT_NAME = re.compile(r"(?:/dev/.+|\\\\\.\\.+|COM\d+)", re.IGNORECASE)
 
@@ -38,6 +43,12 @@ class TcpLink:
     host: str
     port: int = MODBUS_PORT
     timeout: float | None = None
+    unit: int | None = None
+    """The unit by which a gateway reaches its only drive, device 1 here; None for its address."""
+
+    def unit_of(self, device: int) -> int:
+        """The unit that requests to a device carry."""
+        return device if self.unit is None or device != ONLY_DEVICE else self.unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +76,33 @@ def parse_link(text: str, usual: UsualSettings | None = None) -> Link:
 
     Takes `serial:PATH[,BAUD[,FORMAT]]`, a bare port (`/dev/ttyUSB0`, `COM3`, any path that
     exists), `tcp:HOST[:PORT]` and `rtu-tcp:HOST:PORT`, with IPv6 hosts in brackets, each with
-    `,timeout=SECONDS` behind it (0.02..30) where a drive or a gateway is slow.
-    Raises LinkSyntaxError.
+    `,timeout=SECONDS` behind it (0.02..30) where a drive or a gateway is slow, and `tcp:` with
+    `,unit=255` or `,unit=0` if the gateway answers only that unit. Raises LinkSyntaxError.
     """
-    text = text.strip()
-    if match := _TIMEOUT.fullmatch(text):
-        return replace(_parse(match[1], usual), timeout=_seconds(text, match[2].strip()))
-    return _parse(text, usual)
+    text = rest = text.strip()
+    options: dict[str, str] = {}
+    while match := _OPTION.fullmatch(rest):
+        rest, name = match[1], match[2].casefold()
+        if name in options:
+            raise LinkSyntaxError(f"{text}: {name} is given twice. Write it once.")
+        options[name] = match[3].strip()
+    link = _parse(rest, usual)
+    if "unit" in options:
+        if not isinstance(link, TcpLink):
+            raise LinkSyntaxError(f"{text}: only tcp: lines have a unit. Leave out unit=.")
+        link = replace(link, unit=_unit(text, options["unit"]))
+    if "timeout" in options:
+        link = replace(link, timeout=_seconds(text, options["timeout"]))
+    return link
+
+
+def _unit(text: str, typed: str) -> int:
+    if typed not in map(str, ONLY_UNITS):
+        raise LinkSyntaxError(
+            f"{text}: {typed!r} is not a unit for a gateway with one drive. Write unit=255 or "
+            "unit=0. Drives at other units are devices: use -d."
+        )
+    return int(typed)
 
 
 def _seconds(text: str, typed: str) -> float:
@@ -147,8 +178,9 @@ def label(link: Link) -> str:
     match link:
         case SerialLink(path, baud, format_):
             return f"serial:{path},{baud},{format_}{timeout}"
-        case TcpLink(host, port):
-            return f"tcp:{_bracketed(host)}:{port}{timeout}"
+        case TcpLink(host, port, _, unit):
+            only = "" if unit is None else f",unit={unit}"
+            return f"tcp:{_bracketed(host)}:{port}{only}{timeout}"
         case RtuTcpLink(host, port):
             return f"rtu-tcp:{_bracketed(host)}:{port}{timeout}"
 

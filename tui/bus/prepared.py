@@ -34,7 +34,7 @@ def prepared_write(
     pdu = request.pdu()
     if isinstance(link, TcpLink):
         # transaction 0 is never used by TcpMaster: no other request gets this reply
-        head = bytes(4) + (len(pdu) + 1).to_bytes(2, "big") + bytes([device])
+        head = bytes(4) + (len(pdu) + 1).to_bytes(2, "big") + bytes([link.unit_of(device)])
         data = head + pdu
     else:
         data = frame(device, pdu)

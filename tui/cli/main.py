@@ -55,7 +55,7 @@ LINE_HELP = """
 \b
 LINE is one of
   /dev/ttyUSB0  serial:PATH[,BAUD[,FORMAT]]  a serial port; formats 8E1, 8N2
-  tcp:HOST[:PORT]                            Modbus TCP
+  tcp:HOST[:PORT][,unit=255]                 Modbus TCP; unit= for a gateway of one drive
   rtu-tcp:HOST:PORT                          RTU frames over TCP
   sim:PROFILE[@ADDRESS][,...]                simulated drives
   NAME                                       a line of the settings file

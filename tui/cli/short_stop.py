@@ -22,6 +22,7 @@ _LONGEST_SOCKET_ADDRESS = 100
 """Bytes of a path that the system takes for a socket."""
 _FLAGS = ("--json", "--arm", "--accept-line")
 _VERBOSE = ("-v", "-vv", "-vvv", "--verbose")
+_UNITS = {("tcp", "unit=255"), ("tcp", "unit=0")}
 _ADDRESSES = {str(device): device for device in range(1, 248)}
 _HOST = frozenset("abcdefghijklmnopqrstuvwxyz0123456789.-_")
 _DEVICE_LINKS = "/dev/serial"
@@ -134,8 +135,8 @@ def line_keys(text: str) -> tuple[list[str], str]:
     link, *settings = (rest if kind else text).split(",")
     if settings and _is_timeout(settings[-1]):
         settings.pop()
-    if kind in ("tcp", "rtu-tcp") and not settings:
-        return _network_keys(kind, link), ""
+    if kind in ("tcp", "rtu-tcp") and (not settings or (kind, *settings) in _UNITS):
+        return [",".join((key, *settings)) for key in _network_keys(kind, link)], ""
     bare = not kind and link.startswith("/")
     if not (kind == "serial" or bare) or not link or " " in text or not _are_serial(settings):
         return [], ""

@@ -90,7 +90,7 @@ async def open_master(
     wire_time = isinstance(link, SerialLink) and not is_pseudo_terminal(link.path)
     opened(transport.note)
     if isinstance(link, TcpLink):
-        return TcpMaster(transport, around, wake)
+        return TcpMaster(transport, around, wake, link.unit_of)
     if around.timing.wire_time is not None:
         wire_time = around.timing.wire_time
     if isinstance(transport, PosixSerial | ThreadedSerial):

@@ -27,13 +27,19 @@ class TcpMaster:
     """One Modbus TCP connection. `ended` is called once when it is lost."""
 
     def __init__(
-        self, transport: Transport, around: LineContext, ended: Callable[[], None]
+        self,
+        transport: Transport,
+        around: LineContext,
+        ended: Callable[[], None],
+        unit_of: Callable[[int], int] = int,
     ) -> None:
+        """`unit_of`: the unit that requests to a device carry."""
         self.echo: bool | None = False
         self.failure: LineLost | None = None
         self._transport = transport
         self._around = around
         self._ended = ended
+        self._unit_of = unit_of
         self._framer = FramerSocket(DecodePDU(is_server=False))
         self._buffer = bytearray()
         self._transaction = 0
@@ -71,7 +77,7 @@ class TcpMaster:
             self._around.tally.stale += 1
             self._around.trace.add(time, "in", unit, "late or repeated")
             return
-        result = _result(unit, sending)
+        result = _result(unit, sending, self._unit_of(sending.device))
         note = "" if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION) else "not the reply"
         self._around.trace.add(time, "in", unit, note)
         settle(self._done, result)
@@ -104,7 +110,7 @@ class TcpMaster:
         """Send a request and await the reply of its transaction."""
         clock, tally = self._around.clock, self._around.tally
         self._transaction = self._transaction % 0xFFFF + 1
-        data = self._framer.encode(sending.pdu, sending.device, self._transaction)
+        data = self._framer.encode(sending.pdu, self._unit_of(sending.device), self._transaction)
         await self._transport.take_in()
         if self.failure is not None:
             raise self.failure
@@ -149,18 +155,18 @@ class TcpMaster:
         return self._done.result() if self._done.done() else ExchangeResult(ResultKind.NOTHING)
 
 
-def _result(unit: bytes, sending: Sending) -> ExchangeResult:
+def _result(unit: bytes, sending: Sending, awaited: int) -> ExchangeResult:
     """What a reply with the right transaction id is."""
     expectation = sending.expectation
     assert expectation is not None
     device, pdu = unit[6], unit[HEADER_LENGTH:]
-    if device != sending.device:
+    if device != awaited:
         return ExchangeResult(ResultKind.WRONG, detail=f"unit {device} answered", received=unit)
     if expectation.fits(pdu):
         return ExchangeResult(ResultKind.REPLY, pdu=pdu, received=unit)
     code = exception_code(expectation.function, pdu)
     if code is not None:
         return ExchangeResult(ResultKind.EXCEPTION, pdu=pdu, exception=code, received=unit)
-    instead = Piece(unit[HEADER_LENGTH - 1 :] + NO_CHECKSUM, whole=True)
+    instead = Piece(bytes([sending.device]) + pdu + NO_CHECKSUM, whole=True)
     detail = expectation.mismatch(pdu)
     return ExchangeResult(ResultKind.WRONG, detail=detail, received=unit, instead=instead)

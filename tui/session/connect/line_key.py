@@ -33,8 +33,10 @@ def line_key(text: str) -> str:
     match link:
         case SerialLink(path=path):
             return f"serial:{_port(path)}"
-        case TcpLink(host=host, port=port):
-            return f"tcp:{host_key(host)}:{port}"
+        case TcpLink(host=host, port=port, unit=unit):
+            # with a unit, device 1 may be another drive than without
+            only = "" if unit is None else f",unit={unit}"
+            return f"tcp:{host_key(host)}:{port}{only}"
         case RtuTcpLink(host=host, port=port):
             return f"rtu-tcp:{host_key(host)}:{port}"
 

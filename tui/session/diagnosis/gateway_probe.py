@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import DeviceException, LineError
-from tui.bus.link import RtuTcpLink, TcpLink
+from tui.bus.link import ONLY_UNITS, RtuTcpLink, TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.wire.frames import frame, is_whole
 
@@ -24,8 +24,8 @@ ANY_REGISTER = bytes.fromhex("030C810001")
 """A read whose RTU frame is not a message of Modbus TCP: its protocol would not be 0."""
 GATEWAY_CODES = {10: "0A, it has no way to the drive", 11: "0B, the drive did not answer it"}
 GATEWAY_REFUSALS = frozenset(GATEWAY_CODES)
-ANY_UNIT, NO_UNIT = 255, 0
-"""Units by which Modbus TCP reaches the only drive of a gateway; the line has no requests to 0."""
+ANY_UNIT, NO_UNIT = ONLY_UNITS
+"""The line has no requests to 0."""
 TRANSACTION = 0x4450
 
 
@@ -34,8 +34,8 @@ class Works:
     """The request that a gateway answers."""
 
     line: str
-    """The line that works; empty if the unit is the difference."""
     unit: int | None = None
+    """The unit that the gateway answers, if the unit is the difference."""
 
 
 def _message(unit: int) -> bytes:
@@ -73,19 +73,24 @@ async def probed(line: ModbusLine, device: int, *, beside: bool = True) -> Works
     others = {unit for unit, one in line.counters.devices.items() if one.replies}
     if others - {device, ANY_UNIT}:
         return None  # the gateway passes units on
-    if isinstance(link, TcpLink) and await _reads(line, ANY_UNIT):
-        return Works("", ANY_UNIT)
+    if isinstance(link, TcpLink) and link.unit is None and await _reads(line, ANY_UNIT):
+        return _by_unit(link, ANY_UNIT)
     counters = line.counters
     if not beside or counters.replies or counters.exceptions or line.facts.others:
         return None
-    place = f"{link.host}:{link.port}"
-    rtu = (frame(device, ANY_REGISTER), device, _answers_rtu, Works(f"rtu-tcp:{place}"))
-    own = (_message(device), device, _answers_tcp, Works(f"tcp:{place}"))
-    unit = (_message(NO_UNIT), NO_UNIT, _answers_tcp, Works("", NO_UNIT))
+    over_rtu = Works(label(RtuTcpLink(link.host, link.port)))
+    over_tcp = Works(label(TcpLink(link.host, link.port)))
+    rtu = (frame(device, ANY_REGISTER), device, _answers_rtu, over_rtu)
+    own = (_message(device), device, _answers_tcp, over_tcp)
+    unit = (_message(NO_UNIT), NO_UNIT, _answers_tcp, _by_unit(link, NO_UNIT))
     for request, named, answers, works in [rtu, unit] if isinstance(link, TcpLink) else [own]:
         if await _answered(link, request, lambda data, a=answers, u=named: a(data, u)):  # type: ignore[misc]
             return works
     return None
+
+
+def _by_unit(link: TcpLink | RtuTcpLink, unit: int) -> Works:
+    return Works(label(TcpLink(link.host, link.port, link.timeout, unit)), unit)
 
 
 async def _reads(line: ModbusLine, unit: int) -> bool:

@@ -214,8 +214,12 @@ def open_what_works(sight: Sight) -> Iterator[str]:
 
 def set_unit(sight: Sight) -> Iterator[str]:
     """A gateway that answers one unit only."""
-    yield f"In the gateway, pass the unit on to the serial side: address {sight.device}."
-    yield "A gateway that cannot do so reaches one drive only, and Drive Panel cannot use it."
+    assert sight.works is not None
+    yield f"Close the line and open {sight.works.line}. The only drive is device 1 there."
+    yield (
+        "If the gateway has more than one drive, set it to pass the unit on to the serial side: "
+        f"address {sight.device}."
+    )
 
 
 def restart_converter(_sight: Sight) -> Iterator[str]:

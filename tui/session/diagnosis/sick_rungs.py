@@ -65,7 +65,7 @@ GATEWAY_RUNGS = (
     ),
     Rung(
         "wrong-protocol",
-        lambda s: s.works is not None and bool(s.works.line),
+        lambda s: s.works is not None and s.works.unit is None,
         lambda s: f"The gateway does not speak the protocol of this line: {_works(s).line} works.",
         steps.open_what_works,
     ),
