@@ -1,7 +1,7 @@
 """Drives behind a line that does every wrong a line can do; a process of its own, seeded.
 
 Every register of every drive holds a value of its own, so that a value that is taken for
-another's is recognised at once. Started by `FaultyLine`, it serves a pseudo-terminal until its
+another's is recognized at once. Started by `FaultyLine`, it serves a pseudo-terminal until its
 input ends; with a character time it paces its replies as a real line does.
 """
 

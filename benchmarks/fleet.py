@@ -297,7 +297,7 @@ def show(console: Console, stretches: Sequence[dict[str, Any]], title: str) -> N
         "CPU, share of a core": lambda one: f"{one['cpu_share']:.3f}",
         "requests": lambda one: str(one["counters"]["requests"]),
         "replies": lambda one: str(one["counters"]["replies"]),
-        "time-outs": lambda one: str(one["counters"]["timeouts"]),
+        "timeouts": lambda one: str(one["counters"]["timeouts"]),
         "refusals": lambda one: str(one["counters"]["exceptions"]),
         "drives failing at the end": lambda one: str(len(one["failing"])),
         "request to request / theory": lambda one: f"{one['request_median']:.3f}",

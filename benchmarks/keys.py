@@ -55,7 +55,7 @@ ARM = FIRST = ("a", " ARMED")
 TASKS = (
     Task(
         "open the drive that was found, run at 30 Hz",
-        [("Enter", "Time-out"), ARM, ("r", "RUN FORWARD"), *typed("30"),
+        [("Enter", "Timeout"), ARM, ("r", "RUN FORWARD"), *typed("30"),
          ("Enter!", "accelerating")],
         [("Enter", "STANDBY"), FIRST, ("f", "Reference"), *typed("30"), ("Enter", "DONE Ref"),
          ("r", "FORWARD")],

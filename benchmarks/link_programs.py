@@ -1,6 +1,6 @@
 """The programs that `link` runs over a link, and what their pictures say when.
 
-All is told from the text of a picture, colours are not seen.
+All is told from the text of a picture, colors are not seen.
 """
 
 from __future__ import annotations

@@ -287,7 +287,7 @@ TIMES: Mapping[str, str] = {
 COUNTERS: Mapping[str, str] = {
     "requests": "requests",
     "replies": "replies",
-    "time-outs": "timeouts",
+    "timeouts": "timeouts",
     "damaged": "checksum",
     "wrong replies told": "wrong",
     "replies found again": "resyncs",

@@ -1,7 +1,7 @@
 """The drives of the soak: five families whose words, but for a few, each hold a value of its own.
 
-A value that is taken for another's, of the same drive or of another one, is recognised by that.
-Words that make a drive what it is (its state, its place on the line, its time-out, the scales and
+A value that is taken for another's, of the same drive or of another one, is recognized by that.
+Words that make a drive what it is (its state, its place on the line, its timeout, the scales and
 the slots of its block) stay as they are, and are not checked.
 """
 

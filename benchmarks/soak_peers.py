@@ -42,7 +42,7 @@ EVERY = 40
 ALONE = 4
 """The device that the libmodbus server is on a serial line."""
 LONGEST = 1.2
-"""The longest lateness in s; longer than any time-out in force."""
+"""The longest lateness in s; longer than any timeout in force."""
 
 
 class MissingPeer(Exception):

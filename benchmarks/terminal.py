@@ -55,7 +55,7 @@ class NotShown(Exception):
 
 
 class Picture:
-    """What a terminal shows: as much of its language as the programs here speak, no colours."""
+    """What a terminal shows: as much of its language as the programs here speak, no colors."""
 
     def __init__(self, columns: int, rows: int) -> None:
         self._columns, self._rows = columns, rows

@@ -8,7 +8,7 @@ function or length, by a seeded plan. Some requests are cancelled on their way. 
 is read back. Contestants get the same plans; those whose waits are long do fewer exchanges.
 
 To make hundreds of thousands of exchanges in minutes the line has no baud rate and the waits are
-short (time-out 50 ms, replies up to 120 ms late); one row is measured with the panel's usual
+short (timeout 50 ms, replies up to 120 ms late); one row is measured with the panel's usual
 times on a paced line of 19200 baud, where replies come up to 1.2 s late.
 """
 
@@ -345,7 +345,7 @@ def joined(name: str, parts: Sequence[dict[str, object]]) -> dict[str, object]:
 
 
 def table_of(rows: Sequence[dict[str, object]]) -> Table:
-    """The figures as a table; recovery as a multiple of the time-out in force."""
+    """The figures as a table; recovery as a multiple of the timeout in force."""
     table = Table(title="Wrong values on a faulty line")
     for name in (
         "contestant",

@@ -28,7 +28,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.values import word_count
 from tui.session.drive import DriveSession
-from tui.session.read.retrying_reader import neighbours
+from tui.session.read.retrying_reader import neighbors
 from tui.session.read.upload import Upload, readable_codes
 from tui.simulator import LineTiming
 
@@ -74,7 +74,7 @@ def best_plan(wire: WireLine, profile: Profile, codes: list[str]) -> float:
     """The cheapest requests for these parameters, in s; no request spans two parts."""
     times = wire.times
     timing = WireTiming(times.character, times.silence, times.turnarounds.get(1, 0.0))
-    parts = neighbours(profile, codes)
+    parts = neighbors(profile, codes)
     return sum(plan_reads(profile, part, timing).seconds for part in parts)
 
 

@@ -92,11 +92,11 @@ CHECKS: dict[int, Check] = {
     14: Check("UD", of(r"\b(no|some|any)body\b"), 50, "nobody answers"),
     15: Check("UDS", of(r"\bstands?\b(?! for\b)"), 224, "it stands there"),
     16: Check("UDS", of(r"\b(became|becomes?) of\b|\bc(a|o)mes? to\b"), 142, "what becomes of it"),
-    17: Check("UDS", of(r"\btime-outs?\b"), 132, "its time-out"),
+    17: Check("UDS", of(r"\btime-outs?\b"), 0, "its time-out"),
     18: Check(
         "UDSNL",
         of("colour|favourite|neighbour|behaviour|analogue|licence|recognis"),
-        172,
+        39,
         "one_colour",
     ),
     19: Check(

@@ -12,7 +12,7 @@ from .conftest import BRISK, WIDE, OpenLine
 from .peer import PtyPeer, honest, silent
 from .plain import outcome, plain_serial
 
-# a probe after an unsure write may take a second time-out
+# a probe after an unsure write may take a second timeout
 SHORT = Timing(first_timeout=0.3, min_timeout=0.3, late_reply=0.5, retries=0)
 
 

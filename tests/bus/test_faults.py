@@ -29,7 +29,7 @@ from .plain import outcome, plain_serial
 
 OPERATOR = Priority.OPERATOR_READ
 LATE = 0.35
-"""Later than the time-outs used here, but not later than the line awaits a late reply."""
+"""Later than the timeouts used here, but not later than the line awaits a late reply."""
 
 
 def first_late(request: bytes, count: int) -> Sequence[Step]:

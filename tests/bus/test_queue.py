@@ -1,4 +1,4 @@
-"""Order of requests, back-off, time-outs and late replies; with a clock of the test's own."""
+"""Order of requests, back-off, timeouts and late replies; with a clock of the test's own."""
 
 from __future__ import annotations
 

@@ -170,7 +170,7 @@ def test_the_indirect_block_counts_after_a_reset() -> None:
 
 
 @pytest.mark.parametrize("family", LONELY)
-def test_a_family_without_blocks_says_so_and_shows_its_neighbours(family: str) -> None:
+def test_a_family_without_blocks_says_so_and_shows_its_neighbors(family: str) -> None:
     line = f"sim:{family}"
     text = run(0, line, "-p", family)
     assert "neither an indirect block nor a communication scanner" in text

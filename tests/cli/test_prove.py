@@ -21,5 +21,5 @@ def test_the_time_out_of_each_port_counts() -> None:
     assert "15.07 is Off and 11.63 is Off: the drive does not notice a dead line" in said
     with tcp_line("powerdrive@1", "--set", "11.63=5", "--any-settings") as line:
         told = ended(1, "prove", line, "-p", "powerdrive", "--arm")
-    # the simulated drive is asked by its module, which has another time-out
+    # the simulated drive is asked by its module, which has another timeout
     assert "DID NOT REACT to 1.5 s of silence; set are 0.5 s" in told.stdout

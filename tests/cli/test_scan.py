@@ -349,7 +349,7 @@ def test_drives_are_held_while_the_person_decides() -> None:
         scan = "scan", line, "--addresses", "1-2", "--all-settings", "--json"
         with at_a_terminal(*scan) as (process, near):
             seen(near, "Try the other settings?")
-            time.sleep(5.0)  # more than two of its time-outs
+            time.sleep(5.0)  # more than two of its timeouts
             assert drive.fault is None
             os.write(near, b"n\n")
             out, _ = process.communicate(timeout=PATIENCE)

@@ -30,7 +30,7 @@ def test_a_drive_that_another_program_leaves_alone_is_stopped_too() -> None:
     with tcp_line("atv71@1", "atv312@2") as line:
         opened = open_line(line, wait=5, program="prove")
         try:
-            opened.line.facts.hush(2, "Its communication time-out is being proved.")
+            opened.line.facts.hush(2, "Its communication timeout is being proved.")
             told = run(0, "stop", line, "--all", "--addresses", "1-2")
         finally:
             opened.close()

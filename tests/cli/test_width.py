@@ -1,4 +1,4 @@
-"""What is told on a terminal of few columns, and on one that wants no colours."""
+"""What is told on a terminal of few columns, and on one that wants no colors."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 def test_lines_break_at_words(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
-    say_row("Time-out", LONG, 18)
+    say_row("Timeout", LONG, 18)
     lines = out.getvalue().splitlines()
     assert len(lines) > 2
     assert all(len(line) <= 40 for line in lines)
     assert all(line.startswith(" " * 18) for line in lines[1:])
-    assert " ".join(" ".join(lines).split()) == f"Time-out {LONG}"
+    assert " ".join(" ".join(lines).split()) == f"Timeout {LONG}"
 
 
 def test_a_word_longer_than_the_terminal_is_told_whole(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -90,7 +90,7 @@ def test_a_table_loses_columns_and_no_digit(width: int, cut: bool) -> None:
     assert ("Wire address" in out.getvalue()) == (width >= 60)
 
 
-def test_no_colour_is_plain_text(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_color_is_plain_text(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.delenv("NO_COLOR", raising=False)

@@ -78,7 +78,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "self._queue.put_back(job, behind=missed)",
         "self._queue.put_back(job)",
-        "All drives of a line pause for several time-outs when one goes away.",
+        "All drives of a line pause for several timeouts when one goes away.",
         ("tests/bus/test_faults.py::test_repeated_poll_lets_polls_of_other_drives_pass",),
     ),
     Defect(
@@ -109,7 +109,7 @@ DEFECTS = (
         ),
     ),
     Defect(
-        "no-quiet-after-a-time-out",
+        "no-quiet-after-a-timeout",
         "tui/bus/schedule",
         "self.quiet_until = now + min(LATE_MARGIN * record.lateness, quiet)",
         "self.quiet_until = now",

@@ -393,7 +393,7 @@ DEFECTS = (
         "tui/session/proof/prover.py",
         "            await self._check_same(rules, readings)\n",
         "",
-        "A drive whose time-out was changed meanwhile is said not to react as set.",
+        "A drive whose timeout was changed meanwhile is said not to react as set.",
         (f"{PROVER}::test_what_is_set_otherwise_meanwhile_proves_nothing",),
     ),
     Defect(
@@ -405,7 +405,7 @@ DEFECTS = (
         ("tests/cli/test_prove.py::test_on_the_run_without_a_terminal_takes_a_yes",),
     ),
     Defect(
-        "time-out-of-one-port-alone",
+        "timeout-of-one-port-alone",
         "tui/session/proof/prover.py",
         "told = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)",
         "told = (await self._reader.read([rules.timeout])).values()",
@@ -413,7 +413,7 @@ DEFECTS = (
         ("tests/cli/test_prove.py::test_the_time_out_of_each_port_counts",),
     ),
     Defect(
-        "unfed-until-its-time-out-is-learnt",
+        "unfed-until-its-timeout-is-learnt",
         "tui/session/monitor/line_watch.py",
         "            self._keep_alive(kept, UNKNOWN_TIMEOUT)\n",
         "            pass\n",

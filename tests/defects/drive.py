@@ -16,7 +16,7 @@ DEFECTS = (
         (f"{EDITOR}::test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved",),
     ),
     Defect(
-        "field-clears-its-neighbours",
+        "field-clears-its-neighbors",
         "tui/session/settings/write.py",
         "held = await self._held_word(parameter) if is_field(parameter) else None",
         "held = 0 if is_field(parameter) else None",
@@ -244,7 +244,7 @@ DEFECTS = (
         "tui/drive/read_plan.py",
         ' or parameter.access == "w" or parameter.code in unreadable:',
         ' or parameter.access == "w":',
-        "One word that a drive lacks makes its neighbours unreadable.",
+        "One word that a drive lacks makes its neighbors unreadable.",
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(

@@ -1,4 +1,4 @@
-"""Defects of who a drive is taken for, of its stop before that is known, and of its time-out."""
+"""Defects of who a drive is taken for, of its stop before that is known, and of its timeout."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ DEFECTS = (
         ("tests/session/test_first_stop.py::test_it_is_in_the_journal_with_what_was_said_to_it",),
     ),
     Defect(
-        "time-out-of-the-other-port-ignored",
+        "timeout-of-the-other-port-ignored",
         "tui/session/monitor/timeout.py",
         "for code in (rules.timeout, *rules.other_timeouts):",
         "for code in (rules.timeout,):",
@@ -138,7 +138,7 @@ DEFECTS = (
         "tui/cli/shared/ending.py",
         "        finally:\n            try:",
         "        else:\n            try:",
-        "A command that fails leaves a time-out running and says nothing of it.",
+        "A command that fails leaves a timeout running and says nothing of it.",
         (f"{LEFT}::test_it_is_told_where_the_command_failed",),
     ),
     Defect(

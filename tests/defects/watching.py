@@ -30,11 +30,11 @@ DEFECTS = (
         ("tests/session/test_reader.py",),
     ),
     Defect(
-        "refusal-hurts-the-neighbours",
+        "refusal-hurts-the-neighbors",
         "tui/session/read/reader.py",
         "if several:\n                return {}",
         "if False:\n                return {}",
-        "One word that a drive lacks makes its neighbours unreadable.",
+        "One word that a drive lacks makes its neighbors unreadable.",
         ("tests/session/test_reader.py",),
     ),
     Defect(
@@ -142,11 +142,11 @@ DEFECTS = (
         ("tests/session/test_monitor_faults.py",),
     ),
     Defect(
-        "time-out-not-fed",
+        "timeout-not-fed",
         "tui/bus/schedule/alive_reads.py",
         "period = one.timeout / READS_PER_TIMEOUT",
         "period = one.timeout * READS_PER_TIMEOUT",
-        "Drives trip by their communication time-out while the panel is open.",
+        "Drives trip by their communication timeout while the panel is open.",
         ("tests/bus/test_keep_alive.py",),
     ),
     Defect(
@@ -162,11 +162,11 @@ DEFECTS = (
         "tui/bus/schedule/alive_reads.py",
         "priority = Priority.FEED if now - heard < one.timeout else Priority.POLL",
         "priority = Priority.POLL",
-        "On a busy line drives trip by their communication time-out.",
+        "On a busy line drives trip by their communication timeout.",
         ("tests/bus/test_keep_alive.py",),
     ),
     Defect(
-        "time-out-warning-not-told",
+        "timeout-warning-not-told",
         "tui/session/monitor",
         "if silent > TOLD_SHARE * watch.timeout:",
         "if silent > 1000 * watch.timeout:",

@@ -67,7 +67,7 @@ def test_a_small_profile_loads(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ('unit = "Hz"', 'unit = "Hz"\ncolour = "red"', 29, "no field `colour`"),
+        ('unit = "Hz"', 'unit = "Hz"\ncolor = "red"', 29, "no field `color`"),
         ("address = 100", 'address = "100"', 27, "must be of type int, not str"),
         ("address = 100", "address = 70000", 27, "must be <= 65535"),
         ('scale = "0.1"', 'scale = "0,1"', 29, "wrong form"),

@@ -284,11 +284,11 @@ def test_the_time_of_the_exchange_that_is_shown() -> None:
 
 
 @pytest.mark.parametrize("family", WITHOUT)
-def test_neighbours_are_proposed_within_the_limit(family: str) -> None:
+def test_neighbors_are_proposed_within_the_limit(family: str) -> None:
     profile = library.load(family)
     codes = [value.parameter for value in profile.data.monitoring.values]
     found = stretches(profile, codes, TIMING)
-    assert found, "the monitoring set has neighbours"
+    assert found, "the monitoring set has neighbors"
     function = profile.function(3)
     assert function is not None
     brought = [code for stretch in found for code in stretch.brings]

@@ -69,7 +69,7 @@ def covered(plan: ReadPlan) -> list[str]:
     return sorted(place.code for request in plan.requests for place in request.places)
 
 
-def test_neighbours_are_read_together() -> None:
+def test_neighbors_are_read_together() -> None:
     profile = profile_of(range(3201, 3212))
     assert spans(plan_reads(profile, codes([3201, 3202, 3204]), TIMING)) == [(3201, 4)]
 

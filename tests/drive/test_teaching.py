@@ -51,7 +51,7 @@ def test_every_scale_is_found_from_two_honest_looks(
     first, second = (honest(word, scale, signed, places, cut) for word in (one, other))
     assume(one != other)
     step = Decimal(1).scaleb(-places)
-    # two digits and a half are seen of one of them: enough to tell a scale from its neighbours
+    # two digits and a half are seen of one of them: enough to tell a scale from its neighbors
     assume(max(abs(first.shown), abs(second.shown)) >= 25 * step)
     lesson = taught(first, second)
     assert lesson.kind is LessonKind.TAUGHT, lesson.text

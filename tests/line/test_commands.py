@@ -65,7 +65,7 @@ def stands(simulation: Simulation, device: int = 1) -> bool:
 
 
 def besides(said: str) -> str:
-    """What standard error has beside the communication time-out that a command leaves running."""
+    """What standard error has beside the communication timeout that a command leaves running."""
     told = ("communication timeout", "To keep polling it: drivepanel hold")
     return "".join(line for line in said.splitlines(True) if not any(t in line for t in told))
 

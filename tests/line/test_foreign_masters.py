@@ -89,7 +89,7 @@ def test_what_mbpoll_writes_is_what_both_read_back(reached: Reached) -> None:
     assert ours(reached.line, "ACC", "ETA", "RFR") == {"ACC": 61, "ETA": 0x0637, "RFR": 425}
 
 
-def test_mbpoll_writes_two_neighbours_at_once(reached: Reached) -> None:
+def test_mbpoll_writes_two_neighbors_at_once(reached: Reached) -> None:
     assert reached.mbpoll.run(ACCELERATION, "62", "63").returncode == 0
     assert ours(reached.line, "ACC", "DEC") == {"ACC": 62, "DEC": 63}
 

@@ -66,7 +66,7 @@ def test_the_next_panel_knows_the_motor_and_takes_it_over(
 def test_a_motor_that_is_disowned_is_not_left_without_a_question(
     terminal_with: Start, second_terminal: Start
 ) -> None:
-    """Its polls feed the drive's time-out: one q alone would let the motor coast later."""
+    """Its polls feed the drive's timeout: one q alone would let the motor coast later."""
     with running(terminal_with) as made:
         os.kill(made.pid, signal.SIGKILL)
         wait_until(lambda: not runs(made.pid), "the panel is gone")

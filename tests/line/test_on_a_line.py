@@ -188,7 +188,7 @@ async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
 
 
 async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None:
-    """The line watch learns the time-out though a monitor is at work, and takes its newer state."""
+    """The line watch learns the timeout though a monitor is at work, and takes its newer state."""
     opened = demo_line({"atv21": 35.0})
     drive = session(opened, "atv21")
     monitor = Monitor(drive)

@@ -247,7 +247,7 @@ def test_publishing_keeps_no_motor_running_whose_client_died(programs: ExitStack
     made = Gateway(simulation, line, program)
     wait_until(lambda: up(program), "the drive is read")
     started_by_a_client(made)
-    wait_until(lambda: not turns(simulation), "its own time-out stops the motor")
+    wait_until(lambda: not turns(simulation), "its own timeout stops the motor")
     wait_until(lambda: up(program), "it is read again")
 
 
@@ -264,7 +264,7 @@ def test_a_serve_that_comes_back_feeds_no_motor_of_the_one_before(programs: Exit
     first.process.wait(PATIENCE)
     again = programs.enter_context(served(command, ready="Ready:"))
     assert turns(simulation)
-    wait_until(lambda: not turns(simulation), "its own time-out stops the motor")
+    wait_until(lambda: not turns(simulation), "its own timeout stops the motor")
     wait_until(lambda: "fault_info{" in scraped(again), "it is read again")
 
 
@@ -277,7 +277,7 @@ def test_publish_beside_serve_feeds_no_motor_whose_client_died(programs: ExitSta
     command = [*serving()[:-1], "publish", line, "--mqtt", broker, "--every", "0.2"]
     programs.enter_context(served(command, ready="Ready:"))
     started_by_a_client(made)
-    wait_until(lambda: not turns(simulation), "its own time-out stops the motor")
+    wait_until(lambda: not turns(simulation), "its own timeout stops the motor")
 
 
 def up(program: Served) -> bool:

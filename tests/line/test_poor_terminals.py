@@ -13,7 +13,7 @@ TERMINALS: dict[str, tuple[tuple[str, ...], dict[str, str], tuple[int, int]]] = 
     "dumb": ((), {"TERM": "dumb"}, (80, 24)),
     "vt100": ((), {"TERM": "vt100"}, (80, 24)),
     "NO_COLOR": ((), {"NO_COLOR": "1"}, (80, 24)),
-    "sixteen colours": ((), {"TERM": "linux"}, (80, 24)),
+    "sixteen colors": ((), {"TERM": "linux"}, (80, 24)),
     "60x16": ((), {}, (60, 16)),
     "too small": ((), {}, (40, 12)),
     "much too small": ((), {}, (12, 3)),

@@ -83,7 +83,7 @@ def motor_run(
 def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
     programs: ExitStack, first: str
 ) -> None:
-    """A recorder asks the drive on and on: its own time-out would never stop the motor."""
+    """A recorder asks the drive on and on: its own timeout would never stop the motor."""
     with motor_run(programs, first) as (simulation, _, runner, recorder):
         runner.process.kill()
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
@@ -258,10 +258,10 @@ def test_a_stop_that_a_frozen_owner_holds_up_is_reported_and_carried_out(
 
 @pytest.mark.usefixtures("held_inside")
 def test_nobody_feeds_the_motor_of_an_owner_that_is_frozen(programs: ExitStack) -> None:
-    """The drive's own time-out stops it, as it would if nobody shared the line."""
+    """The drive's own timeout stops it, as it would if nobody shared the line."""
     with motor_run(programs, "run", time_out=20) as (simulation, _, runner, recorder):
         runner.process.send_signal(signal.SIGSTOP)
-        wait_until(lambda: simulation.drive(1).fault is not None, "the drive's own time-out")
+        wait_until(lambda: simulation.drive(1).fault is not None, "the drive's own timeout")
         wait_until(lambda: stands(simulation), "the motor stops")
         runner.process.send_signal(signal.SIGCONT)
         runner.process.communicate(timeout=PATIENCE)

@@ -151,7 +151,7 @@ def test_a_terminal_that_stands_still_does_not_stop_the_polling(
         stale = terminal.text()
         wait_until(lambda: terminal.text() != stale, "the screen goes on after the stall")
         terminal.press("q")
-        terminal.wait_for("Leave the panel?")  # its drive acts on the time-out
+        terminal.wait_for("Leave the panel?")  # its drive acts on the timeout
         time.sleep(SETTLED)
         terminal.press("y")
         wait_until(lambda: not runs(panel), "the panel left on its keys")

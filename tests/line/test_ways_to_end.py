@@ -113,5 +113,5 @@ def test_against_a_kill_only_the_drives_own_watch_helps(terminal_with: Start) ->
     with running(terminal_with) as made:
         made.simulation.drive(1).set("TTO", 10)
         os.kill(made.pid, signal.SIGKILL)
-        wait_until(lambda: made.simulation.drive(1).fault is not None, "the drive's own time-out")
+        wait_until(lambda: made.simulation.drive(1).fault is not None, "the drive's own timeout")
         made.stopped()

@@ -72,7 +72,7 @@ def test_a_drive_is_asked_a_while_after_each_sign_of_its_commander() -> None:
         assert bench.asks(0.5)
         assert bench.asks(GRACE_SHARE * TTO - 0.5)
     assert not bench.asks(0.1), "the client has died"
-    # nothing feeds its time-out; once it must have acted, it is looked at
+    # nothing feeds its timeout; once it must have acted, it is looked at
     assert not bench.asks(TTO - 0.2)
     assert bench.asks(ACTED_AFTER + 0.2)
     assert not bench.asks()

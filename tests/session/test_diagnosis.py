@@ -361,8 +361,8 @@ async def test_silence(line: OpenedLine) -> None:
         assert found.text == "Nobody answers at address 2: not one byte came back."
         functions = {request[1] for request in peer.requests}
     assert functions <= {3, 43}
-    neighbour = replace(found.sight, neighbours=(3, 4))
-    assert "while 3, 4 on this line does" in of(neighbour).text
+    neighbor = replace(found.sight, neighbors=(3, 4))
+    assert "while 3, 4 on this line does" in of(neighbor).text
 
 
 async def test_damaged_answers_beside_good_ones(line: OpenedLine) -> None:

@@ -77,7 +77,7 @@ async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
 
 
 class Kept:
-    """A drive with so many tenths of a second to its time-out, looked after."""
+    """A drive with so many tenths of a second to its timeout, looked after."""
 
     def __init__(self, tenths: int) -> None:
         self.line = HeardLine(tenths)

@@ -300,7 +300,7 @@ async def test_drives_at_rest_that_will_trip_are_known() -> None:
 
 
 async def test_a_motor_that_runs_by_the_line_is_watched_whoever_started_it() -> None:
-    """The time-out of an Altivar 71 runs once it was commanded, be it by another program."""
+    """The timeout of an Altivar 71 runs once it was commanded, be it by another program."""
     async with bench("atv71", watch=False) as here:
         line_watch = here.fleet.line_watch
         await until(lambda: line_watch.watch(1) is not None)

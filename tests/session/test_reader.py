@@ -18,7 +18,7 @@ from .fakes import BlockDrive, OneDrive, parameter, profile_of
 INR = {"parameter": "INR", "scales": {"0": "0.01", "1": "0.1", "2": "1"}}
 
 
-async def test_neighbours_come_in_one_request_with_their_units() -> None:
+async def test_neighbors_come_in_one_request_with_their_units() -> None:
     profile = profile_of(
         parameter("LCR", 3204, unit="A", scale="0.1"),
         parameter("OTR", 3205, unit="%", scale="0.1", type="int16"),
@@ -31,7 +31,7 @@ async def test_neighbours_come_in_one_request_with_their_units() -> None:
     assert all(r.quality is Quality.GOOD for r in readings.values())
 
 
-async def test_one_refused_word_does_not_hurt_its_neighbours() -> None:
+async def test_one_refused_word_does_not_hurt_its_neighbors() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
     line = OneDrive({10: 1, 12: 3})
     reader = Reader(DriveSession(line, 1, profile))

@@ -80,7 +80,7 @@ async def test_a_watch_that_is_off_is_told_so(family: str, code: str, raw: int, 
         upload = Upload(made.session)
         await upload.run()
         text = report_text(made.profile, upload.parameter_set(), [])
-    assert f"- Time-out ({code}): {told}" in text.splitlines()
+    assert f"- Timeout ({code}): {told}" in text.splitlines()
 
 
 async def test_what_the_drive_stored_with_a_fault() -> None:

@@ -1,4 +1,4 @@
-"""What a drive tells of its communication time-out, and whether that runs."""
+"""What a drive tells of its communication timeout, and whether that runs."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def test_every_word_of_every_family_can_be_read(profile: str) -> None:
 @pytest.mark.parametrize("profile", ["atv31", "atv312", "atv71"])
 @pytest.mark.parametrize(("reaction", "hertz"), [(1, 0.0), (6, 20.0), (7, 0.0)])
 def test_a_silent_line_stops_as_sll_says(profile: str, reaction: int, hertz: float) -> None:
-    """Freewheel, ramp stop and fast stop, half a second after the time-out of 1.0 s."""
+    """Freewheel, ramp stop and fast stop, half a second after the timeout of 1.0 s."""
     simulated = drive(profile, sets={"SLL": reaction, "TTO": 10})
     frequency = simulated.profile.quantity("command_frequency")
     assert frequency is not None

@@ -8,7 +8,7 @@ from .bench import Bench
 
 
 def running(reaction: int, profile: str = "atv71") -> Bench:
-    """A drive at 30 Hz with a time-out of 1.0 s."""
+    """A drive at 30 Hz with a timeout of 1.0 s."""
     bench = Bench(profile, {"TTO": 10, "SLL": reaction, "ACC": 5, "DEC": 20})
     bench.taken("LFR", 300)
     for command in (6, 7, 15):

@@ -18,7 +18,7 @@ from textual.color import Color
 
 import tui
 from tui.terminal.abilities import ASCII, UTF_8, Abilities, abilities_of, encoding_of
-from tui.terminal.few_colours import in_sixteen, without_colours
+from tui.terminal.few_colors import in_sixteen, without_colors
 from tui.terminal.plain_signs import NO_SIGN, PLAIN_SIGNS, PlainSigns, in_encoding
 from tui.widgets import palette
 
@@ -54,7 +54,7 @@ def test_a_person_who_says_it_is_right(ascii: bool, encoding: str) -> None:
         assert abilities_of(environment, ascii=ascii).encoding == encoding
 
 
-COLOURS = [
+COLORS = [
     ({"TERM": "xterm-256color"}, ColorSystem.EIGHT_BIT),
     ({"TERM": "xterm-256color", "COLORTERM": "truecolor"}, ColorSystem.TRUECOLOR),
     ({"TERM": "xterm-256color", "COLORTERM": "truecolor", "NO_COLOR": "1"}, None),
@@ -71,15 +71,13 @@ COLOURS = [
 ]
 
 
-@pytest.mark.parametrize(("environment", "colours"), COLOURS)
-def test_terminfo_tells_the_colours(
-    environment: dict[str, str], colours: ColorSystem | None
-) -> None:
-    assert told_of(environment).colours == colours
+@pytest.mark.parametrize(("environment", "colors"), COLORS)
+def test_terminfo_tells_the_colors(environment: dict[str, str], colors: ColorSystem | None) -> None:
+    assert told_of(environment).colors == colors
 
 
 @pytest.mark.parametrize("term", ["vt100", "nobody-knows", "dumb", "screen"])
-def test_only_a_terminal_that_erases_in_colour_is_let_erase(term: str) -> None:
+def test_only_a_terminal_that_erases_in_color_is_let_erase(term: str) -> None:
     assert not told_of({"TERM": term}).erases
 
 
@@ -121,16 +119,16 @@ STYLES = [style for name, style in vars(palette).items() if isinstance(style, St
 
 
 @pytest.mark.parametrize("style", STYLES, ids=str)
-def test_in_sixteen_colours_words_are_never_of_the_colour_behind_them(style: Style) -> None:
+def test_in_sixteen_colors_words_are_never_of_the_color_behind_them(style: Style) -> None:
     shown = in_sixteen(Style(bgcolor=palette.GROUND) + style)
     assert shown.color is None or shown.color.number != shown.bgcolor.number  # type: ignore[union-attr]
 
 
 def test_what_is_raised_from_the_ground_stays_so() -> None:
-    assert without_colours(palette.CURSOR).reverse
-    assert without_colours(palette.FAULT_BLOCK).reverse
-    assert without_colours(palette.ATTENTION_BLOCK).reverse
-    assert not without_colours(Style(color=palette.TEXT, bgcolor=palette.SURFACE)).reverse
+    assert without_colors(palette.CURSOR).reverse
+    assert without_colors(palette.FAULT_BLOCK).reverse
+    assert without_colors(palette.ATTENTION_BLOCK).reverse
+    assert not without_colors(Style(color=palette.TEXT, bgcolor=palette.SURFACE)).reverse
     grounds = {in_sixteen(Style(bgcolor=one)).bgcolor for one in (palette.GROUND, palette.SURFACE)}
     assert in_sixteen(palette.CURSOR).bgcolor not in grounds
     assert in_sixteen(palette.FAULT).color != in_sixteen(palette.ALARM).color

@@ -238,7 +238,7 @@ class FakeLineWatch:
         return self.commanded
 
     def unread(self) -> list[DriveSession]:
-        """Every time-out is known."""
+        """Every timeout is known."""
         return []
 
     def left_alone(self) -> dict[int, TimeoutWatch]:

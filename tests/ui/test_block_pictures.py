@@ -171,7 +171,7 @@ STATES: dict[str, tuple[Callable[[], BlockEditor], Any, float | None, list[str]]
     "indirect-outputs": (indirect, nothing, None, ["tab"]),
     "reading": (empty, nothing, None, []),
     "none": (without("atv312"), nothing, None, []),
-    "neighbours": (without("powerdrive"), nothing, None, []),
+    "neighbors": (without("powerdrive"), nothing, None, []),
     "help": (scanner, nothing, None, ["question_mark"]),
 }
 

@@ -38,11 +38,11 @@ Cell = tuple[str, str]
 
 
 class Terminal:
-    """As much of a terminal as the panel's updates need: places, colours, characters."""
+    """As much of a terminal as the panel's updates need: places, colors, characters."""
 
     def __init__(self) -> None:
         self.cells: dict[tuple[int, int], Cell] = {}
-        self._x, self._y, self._colour = 0, 0, ""
+        self._x, self._y, self._color = 0, 0, ""
         self._pen: dict[str, str] = {}
 
     def feed(self, data: str) -> None:
@@ -54,13 +54,13 @@ class Terminal:
                 row, column = control[1].split(";")
                 self._x, self._y = int(column) - 1, int(row) - 1
             elif control[2] == "m":
-                self._set_colour(control[1])
+                self._set_color(control[1])
             elif control[2] == "X":
                 for x in range(self._x, self._x + int(control[1])):
-                    self.cells[self._y, x] = (" ", self._colour)
+                    self.cells[self._y, x] = (" ", self._color)
         self._write(data[at:])
 
-    def _set_colour(self, numbers: str) -> None:
+    def _set_color(self, numbers: str) -> None:
         """One number after another, as a terminal takes them."""
         left = numbers.split(";")
         while left:
@@ -73,7 +73,7 @@ class Terminal:
                 self._pen = {n: look for n, look in self._pen.items() if n not in ("1", "2", "22")}
             left = left[size:]
         order = sorted(self._pen, key=lambda name: (name == "behind", name == "front", name))
-        self._colour = ";".join(self._pen[name] for name in order)
+        self._color = ";".join(self._pen[name] for name in order)
 
     def _write(self, text: str) -> None:
         for character in text:
@@ -82,12 +82,12 @@ class Terminal:
             elif character != "\r":
                 width = get_character_cell_size(character)
                 if not width:
-                    before, colour = self.cells[self._y, self._x - 1]
-                    self.cells[self._y, self._x - 1] = (before + character, colour)
+                    before, color = self.cells[self._y, self._x - 1]
+                    self.cells[self._y, self._x - 1] = (before + character, color)
                     continue
-                self.cells[self._y, self._x] = (character, self._colour)
+                self.cells[self._y, self._x] = (character, self._color)
                 if width == 2:
-                    self.cells[self._y, self._x + 1] = ("", self._colour)
+                    self.cells[self._y, self._x + 1] = ("", self._color)
                 self._x += width
 
     def text(self) -> list[str]:
@@ -129,15 +129,15 @@ class Seen(App[None]):
         self.terminal.feed(data)
 
 
-COLOURS = [Style(color="#112233"), Style(color="#445566", bold=True), Style()]
+COLORS = [Style(color="#112233"), Style(color="#445566", bold=True), Style()]
 PIECES = st.lists(
-    st.tuples(st.text("ab█·é ", max_size=6), st.sampled_from(COLOURS)), max_size=5
+    st.tuples(st.text("ab█·é ", max_size=6), st.sampled_from(COLORS)), max_size=5
 ).map(lambda pieces: Text.assemble(*pieces))
 
 
 @pytest.mark.parametrize("seed", range(3))
 async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
-    """However the lines change, cell by cell and in colour."""
+    """However the lines change, cell by cell and in color."""
     import random
 
     chance = random.Random(seed)
@@ -151,15 +151,15 @@ async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
             fresh = Terminal()
             fresh.feed("\n".join(strip.render(app.console) for strip in strips))
             assert app.terminal.text() == [strip.text for strip in strips]
-            for place, (character, colour) in fresh.cells.items():
-                shown, its_colour = app.terminal.cells[place]
+            for place, (character, color) in fresh.cells.items():
+                shown, its_color = app.terminal.cells[place]
                 assert shown == character
-                assert _seen(shown, its_colour) == _seen(character, colour)
+                assert _seen(shown, its_color) == _seen(character, color)
 
 
-def _seen(character: str, colour: str) -> str:
+def _seen(character: str, color: str) -> str:
     """What is seen of a style: of a blank, what lies behind it."""
-    return of_blank(colour) if character == " " else colour
+    return of_blank(color) if character == " " else color
 
 
 class Dialog(ModalScreen[None]):
@@ -211,7 +211,7 @@ def _line(chance: Any) -> Text:
     line = Text()
     for _ in range(chance.randrange(1, 5)):
         length = chance.randrange(1, 6)
-        line.append("".join(chance.choice("ab█·1") for _ in range(length)), chance.choice(COLOURS))
+        line.append("".join(chance.choice("ab█·1") for _ in range(length)), chance.choice(COLORS))
     return line
 
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.drawn
 
 
 def picture(app: Any) -> list[list[tuple[str, str]]]:
-    """Every cell with its colours, but for the strip, which has the time of day."""
+    """Every cell with its colors, but for the strip, which has the time of day."""
     return [cells_of(strip, ColorSystem.TRUECOLOR) for strip in app._last_strips()[1:]]
 
 

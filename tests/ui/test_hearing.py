@@ -154,7 +154,7 @@ async def test_another_master_on_opening_is_offered_to_be_listened_to() -> None:
 async def panel_with(
     spec: DriveSpec,
 ) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None], PtyPeer]]:
-    """The panel on a line with one drive, whose time-out it knows."""
+    """The panel on a line with one drive, whose timeout it knows."""
     simulation = Simulation([spec], any_settings=True)
 
     def script(request: bytes, _count: int) -> Sequence[Step]:

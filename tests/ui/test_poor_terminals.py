@@ -1,4 +1,4 @@
-"""Terminals that lack signs, colours or room: what stands on them, and that it is all they have."""
+"""Terminals that lack signs, colors or room: what stands on them, and that it is all they have."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ pytestmark = pytest.mark.drawn
 POOR = {
     "plain signs": Abilities(ASCII),
     "latin-1": Abilities("iso8859-1"),
-    "no colours": Abilities(colours=None),
-    "sixteen colours": Abilities(colours=ColorSystem.STANDARD),
+    "no colors": Abilities(colors=None),
+    "sixteen colors": Abilities(colors=ColorSystem.STANDARD),
     "vt100": Abilities(ASCII, None),
 }
 """Terminals that lack something, as `abilities_of` finds them."""
@@ -52,10 +52,10 @@ async def test_plain_signs_are_ascii_on_every_screen(
             assert [strip.text for strip in strips if not strip.text.isascii()] == []
 
 
-async def test_without_colours_there_is_none_on_any_screen(
+async def test_without_colors_there_is_none_on_any_screen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    app, screen = panel(SCENES["fault"], monkeypatch, POOR["no colours"])
+    app, screen = panel(SCENES["fault"], monkeypatch, POOR["no colors"])
     async with app.run_test(size=(80, 24)) as pilot:
         await show(app, screen, (), pilot)
         for key in LOOKED_AT:

@@ -66,7 +66,7 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 LATE_REPLY = 2.0
-"""A reply may come so many times later than the time-out that a person has set."""
+"""A reply may come so many times later than the timeout that a person has set."""
 
 
 class Line:
@@ -290,7 +290,7 @@ class Line:
 
 
 def timing_of(link: Link) -> Timing:
-    """The usual timing of a line, with the time-out that a person has set."""
+    """The usual timing of a line, with the timeout that a person has set."""
     usual = Timing()
     if link.timeout is None:
         return usual

@@ -112,7 +112,7 @@ def _seconds(text: str, typed: str) -> float:
         seconds = 0.0
     if not SHORTEST_TIMEOUT <= seconds <= LONGEST_TIMEOUT:
         raise LinkSyntaxError(
-            f"{text}: {typed!r} is not a time-out. Write seconds from {SHORTEST_TIMEOUT:g} to "
+            f"{text}: {typed!r} is not a timeout. Write seconds from {SHORTEST_TIMEOUT:g} to "
             f"{LONGEST_TIMEOUT:g}, such as timeout=2."
         )
     return seconds

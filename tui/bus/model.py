@@ -27,7 +27,7 @@ class Priority(IntEnum):
 
     STOP = 0
     FEED = 1
-    """A read without which a drive would trip on its communication time-out."""
+    """A read without which a drive would trip on its communication timeout."""
     OPERATOR_WRITE = 2
     OPERATOR_READ = 3
     POLL = 4
@@ -95,7 +95,7 @@ class DeviceState:
     heard: MonotonicTime | None
     """When its last reply ended, on the line's clock; None before the first."""
     lateness: Seconds = 0.0
-    """Seconds by which a reply came after its time-out, the longest; fades with those in time."""
+    """Seconds by which a reply came after its timeout, the longest; fades with those in time."""
     copies_within: Seconds = 0.0
     """Seconds after a reply in which it may come once more; 0 where none ever came twice."""
     refused: bool = False
@@ -239,11 +239,11 @@ class Timing:
     """Seconds and counts that govern a line."""
 
     first_timeout: float = 1.0
-    """Time-out until a device's turnaround is known, and the longest ever waited."""
+    """Timeout until a device's turnaround is known, and the longest ever waited."""
     min_timeout: float = 0.15
-    """The shortest time-out that measured turnarounds may lead to."""
+    """The shortest timeout that measured turnarounds may lead to."""
     scan_timeout: float = 0.4
-    """Time-out of background requests to a device that never answered yet."""
+    """Timeout of background requests to a device that never answered yet."""
     patient_timeout: float = 0.8
     """The same where it is asked once more."""
     late_reply: float = 2.0

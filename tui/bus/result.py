@@ -55,7 +55,7 @@ class ExchangeResult:
     """Over Modbus TCP: the reply of this transaction, if it is not that of its request."""
     resynchronised: bool = False
     """True if the reply was found behind or between other bytes."""
-    recognised: bool = False
+    recognized: bool = False
     """Of damaged bytes: whether they are surely what is left of the reply."""
     sent: float = 0.0
     """When the last byte of the request left."""

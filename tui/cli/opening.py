@@ -43,7 +43,7 @@ def open_panel(
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
     from tui.session.connect.open_line import open_line
-    from tui.terminal.abilities import abilities_of, fewer_colours, given_environment
+    from tui.terminal.abilities import abilities_of, fewer_colors, given_environment
     from tui.terminal.loop import soon_in_loop
 
     abilities = abilities_of(
@@ -60,7 +60,7 @@ def open_panel(
         leave_running=on_hangup == LEAVE_RUNNING,
         mouse=mouse,
         bell=bell,
-        abilities=fewer_colours(abilities) if low_bandwidth else abilities,
+        abilities=fewer_colors(abilities) if low_bandwidth else abilities,
         on_shown=collect_garbage,
         drive_documents=_drive_documents,
     )

@@ -171,7 +171,7 @@ def _silence(data: ProfileData) -> Iterator[PageRow]:
         yield PageRow("", "What this family does then is in no document at hand.", "", True)
         return
     off = f"; {watch.off} switches it off" if watch.off is not None else ""
-    yield PageRow("Time-out", f"{watch.timeout}{off}")
+    yield PageRow("Timeout", f"{watch.timeout}{off}")
     yield PageRow("It begins", watch.starts)
     for one in watch.reactions:
         head = f"{watch.reaction} = {one.raw}" if watch.reaction else one.name

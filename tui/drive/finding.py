@@ -1,4 +1,4 @@
-"""What profiles tell about finding drives on a line: settings, turnaround, reads, time-outs."""
+"""What profiles tell about finding drives on a line: settings, turnaround, reads, timeouts."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class WatchingFamily:
     id: str
     name: str
     code: str
-    """The parameter that sets its time-out."""
+    """The parameter that sets its timeout."""
     sure: bool
     """Whether a document says so; it is taken so where none does."""
 
@@ -160,7 +160,7 @@ def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
 
 
 def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
-    """Families whose communication time-out begins with any request; the documented ones first."""
+    """Families whose communication timeout begins with any request; the documented ones first."""
     found = []
     for one in profiles:
         rules = one.data.communication_fault
@@ -179,6 +179,6 @@ def watching_text(families: Sequence[WatchingFamily]) -> str:
         return ""
     parts = [part for part in (sure, f"and perhaps {likely}" if likely else "") if part]
     return (
-        f"From the first request on these watch the line, and act on their communication time-out"
+        f"From the first request on these watch the line, and act on their communication timeout"
         f" when they are asked no more: {', '.join(parts)}."
     )

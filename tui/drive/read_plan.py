@@ -1,6 +1,6 @@
 """Which requests read a set of parameters with the least time on the wire.
 
-Exact for what it considers: every split of the wanted addresses into runs of neighbours that
+Exact for what it considers: every split of the wanted addresses into runs of neighbors that
 the drive allows, with or without one stretch of each indirect block or scanner table whose
 slots are known.
 """
@@ -222,7 +222,7 @@ def _runs(
     timing: WireTiming,
     unreadable: Collection[str],
 ) -> list[ReadRequest]:
-    """The cheapest split of parameters into runs of neighbours, by dynamic programming."""
+    """The cheapest split of parameters into runs of neighbors, by dynamic programming."""
     wanted = sorted(parameters, key=lambda p: p.address)
     found: list[ReadRequest] = []
     for function in sorted({p.function for p in wanted}):
@@ -270,7 +270,7 @@ def _longest(profile: Profile, parameter: Parameter) -> int:
 
 
 def request_of(run: Sequence[Parameter]) -> ReadRequest:
-    """The request that reads a run of neighbours, in the order of their addresses."""
+    """The request that reads a run of neighbors, in the order of their addresses."""
     first = run[0].address
     places = tuple(Place(p.code, p.address - first) for p in run)
     return ReadRequest(first, _span(run), places, run[0].function)

@@ -157,7 +157,7 @@ class FrameSource:
         when = f"in {one.left:.1f} s" if one.left > 0 else "by now"
         return (
             f"Drive {one.device} NOT HEARD for {one.silent:.1f} s: it acts on its communication"
-            f" time-out {when}{does}."
+            f" timeout {when}{does}."
         )
 
 

@@ -94,7 +94,7 @@ class Leaving(Panel):
         ]
 
     def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
-        """Which drives act on their communication time-out once they are left, and when."""
+        """Which drives act on their communication timeout once they are left, and when."""
         from tui.session.monitor.timeout import left_alone_text, names_of
 
         told = {session.device for session in but}
@@ -115,7 +115,7 @@ class Leaving(Panel):
             for device, one in fleet.found.items()
             if one.console is None
         ]
-        head = "Once nobody asks them any more, drives act on their time-out, at rest too:"
+        head = "Once nobody asks them any more, drives act on their timeout, at rest too:"
         return [head, *found] if found else []
 
     def _leave_motors(self, choice: LeaveChoice | None) -> None:

@@ -79,7 +79,7 @@ async def _looked(target: WhyTarget) -> Diagnosis:
         seen = await asyncio.to_thread(sight_of_port, link, target.device, target.trouble)
         return diagnosed(replace(seen, profile=profile))
     line = opened.line
-    answer = [one for one in target.neighbours if line.device_state(one).answers]
+    answer = [one for one in target.neighbors if line.device_state(one).answers]
     changed = opened.known.text if opened.known is not None else ""
     return diagnosed(
         await examine_line(line, target.device, profile, changed=changed, answering=answer)

@@ -74,7 +74,7 @@ class DriveSession:
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
         self.timeout: Timeout | None = None
-        """What it has told of its communication time-out; None while it was not asked."""
+        """What it has told of its communication timeout; None while it was not asked."""
         self.told_by_line = False
         """Whether a command or reference word was written to it from here, a stop among them."""
         self.unsaved_settings = UnsavedSettings()

@@ -156,7 +156,7 @@ class _Report:
         told = self.text(watch.timeout)
         if raw is not None and raw == watch.off and told.casefold() != "off":
             told += ", the watch is off"
-        lines.append(f"- Time-out ({watch.timeout}): {told}")
+        lines.append(f"- Timeout ({watch.timeout}): {told}")
         if watch.reaction:
             held = self.values.raws.get(watch.reaction)
             known = next((r for r in watch.reactions if r.raw == held), None)

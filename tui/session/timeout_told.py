@@ -1,4 +1,4 @@
-"""What a drive has told of its communication time-out: how long it is, and what follows."""
+"""What a drive has told of its communication timeout: how long it is, and what follows."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tui.drive.profile.schema import Reaction
 
 @dataclass(frozen=True, slots=True)
 class TimeoutWatch:
-    """A drive's watch over the line: seconds to its time-out, and what it does then."""
+    """A drive's watch over the line: seconds to its timeout, and what it does then."""
 
     timeout: float
     reaction: Reaction | None
     active: bool = True
     """False where the reaction is off, and before the first command where it begins with that."""
     code: str = ""
-    """The parameter that sets the time-out."""
+    """The parameter that sets the timeout."""
     fault: str = ""
     """The fault in which its reaction ends; empty where it ends in none, or it is not known."""
     sure: bool = True
@@ -35,7 +35,7 @@ class TimeoutWatch:
 
 @dataclass(frozen=True, slots=True)
 class Timeout:
-    """What is known of a drive's communication time-out."""
+    """What is known of a drive's communication timeout."""
 
     known: bool
     """Whether the drive has told it."""

@@ -1,6 +1,6 @@
-"""What the terminal can show: signs beyond ASCII, colours, erasing in colour.
+"""What the terminal can show: signs beyond ASCII, colors, erasing in color.
 
-The locale tells the signs, terminfo (or COLORTERM) the colours; nothing is asked of the terminal
+The locale tells the signs, terminfo (or COLORTERM) the colors; nothing is asked of the terminal
 itself, which a slow link would have to answer first.
 """
 
@@ -16,12 +16,12 @@ from rich.color import ColorSystem
 
 UTF_8: Final = "utf-8"
 ASCII: Final = "ascii"
-TRUE_COLOURS = frozenset({"truecolor", "24bit"})
-LEAST_COLOURS: tuple[tuple[int, ColorSystem], ...] = (
+TRUE_COLORS = frozenset({"truecolor", "24bit"})
+LEAST_COLORS: tuple[tuple[int, ColorSystem], ...] = (
     (256, ColorSystem.EIGHT_BIT),
     (8, ColorSystem.STANDARD),
 )
-NAMED_COLOURS: tuple[tuple[str, ColorSystem], ...] = (
+NAMED_COLORS: tuple[tuple[str, ColorSystem], ...] = (
     ("256color", ColorSystem.EIGHT_BIT),
     ("direct", ColorSystem.TRUECOLOR),
     ("kitty", ColorSystem.TRUECOLOR),
@@ -45,10 +45,10 @@ class Abilities(NamedTuple):
 
     encoding: str = UTF_8
     """How characters are written, as Python names it; what it lacks becomes a plain sign."""
-    colours: ColorSystem | None = ColorSystem.TRUECOLOR
+    colors: ColorSystem | None = ColorSystem.TRUECOLOR
     """None where there are none, or none are wanted."""
     erases: bool = False
-    """Whether it erases cells in the colour that is set."""
+    """Whether it erases cells in the color that is set."""
 
 
 EVERYTHING: Final = Abilities()
@@ -66,14 +66,14 @@ def abilities_of(
     encoding = encoding_of(environment, written_as)
     if ascii is not None:
         encoding = ASCII if ascii else UTF_8
-    return Abilities(encoding, _colours(environment, term, known), erases)
+    return Abilities(encoding, _colors(environment, term, known), erases)
 
 
-def fewer_colours(abilities: Abilities) -> Abilities:
-    """The same with sixteen colours at most: to set one of them takes half the bytes."""
-    if abilities.colours in (None, ColorSystem.STANDARD):
+def fewer_colors(abilities: Abilities) -> Abilities:
+    """The same with sixteen colors at most: to set one of them takes half the bytes."""
+    if abilities.colors in (None, ColorSystem.STANDARD):
         return abilities
-    return abilities._replace(colours=ColorSystem.STANDARD)
+    return abilities._replace(colors=ColorSystem.STANDARD)
 
 
 def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:
@@ -104,18 +104,18 @@ def given_environment(environment: Mapping[str, str]) -> Mapping[str, str]:
     return kept | {name: given[name] for name in LOCALE if name in given}
 
 
-def _colours(environment: Mapping[str, str], term: str, known: int | None) -> ColorSystem | None:
+def _colors(environment: Mapping[str, str], term: str, known: int | None) -> ColorSystem | None:
     if environment.get("NO_COLOR") or term in ("", "dumb", "unknown"):
         return None
-    if environment.get("COLORTERM", "").lower() in TRUE_COLOURS:
+    if environment.get("COLORTERM", "").lower() in TRUE_COLORS:
         return ColorSystem.TRUECOLOR
     if known is None:
-        return next((system for part, system in NAMED_COLOURS if part in term), None)
-    return next((system for least, system in LEAST_COLOURS if known >= least), None)
+        return next((system for part, system in NAMED_COLORS if part in term), None)
+    return next((system for least, system in LEAST_COLORS if known >= least), None)
 
 
 def _terminfo(term: str) -> tuple[int | None, bool]:
-    """How many colours a terminal has, and whether it erases in them; None where not known."""
+    """How many colors a terminal has, and whether it erases in them; None where not known."""
     try:
         import curses
     except ImportError:  # as on Windows

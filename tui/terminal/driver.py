@@ -1,7 +1,7 @@
 """The driver of this platform, with keys read the panel's way.
 
 Textual hands keys to its event loop, which waits for the terminal whenever that takes no more
-bytes. The thread that reads the keys does not: there stop keys are recognised, and every key is
+bytes. The thread that reads the keys does not: there stop keys are recognized, and every key is
 given its stroke.
 """
 

@@ -1,7 +1,7 @@
 """What the terminal is to show and what it shows; only the cells that differ are sent.
 
 Textual 8.2 sends a changed part of a widget from its left edge on, a new screen as a whole and
-several times over, and sets every colour anew for each piece of text; over a slow link that is
+several times over, and sets every color anew for each piece of text; over a slow link that is
 most of what a panel sends. Here its updates come together in one picture, and what goes to the
 terminal is the difference at the moment at which the terminal can take it.
 """
@@ -23,7 +23,7 @@ from tui.drive.plain import commands
 from .sgr import change, erasable, of_blank, same_blank
 
 Cell = tuple[str, str]
-"""A character and its colours; none where the one to the left takes two cells."""
+"""A character and its colors; none where the one to the left takes two cells."""
 
 Placed = tuple[int, int, Strip]
 """A strip at a column and a row."""
@@ -42,7 +42,7 @@ lead, message and keys."""
 class Picture:
     """What the terminal is to show, and what it shows as far as the frames so far tell.
 
-    With `erases` the terminal erases cells in the colour that is set.
+    With `erases` the terminal erases cells in the color that is set.
     """
 
     def __init__(self, *, erases: bool = False) -> None:
@@ -66,10 +66,10 @@ class Picture:
         self._wanted.clear()
         self.forget()
 
-    def want(self, strips: Sequence[Placed], colours: ColorSystem) -> None:
+    def want(self, strips: Sequence[Placed], colors: ColorSystem) -> None:
         """Take strips that are to be shown from now on."""
         for x, y, strip in strips:
-            cells = cells_of(strip, colours)
+            cells = cells_of(strip, colors)
             end = x + len(cells)
             row = self._wanted.setdefault(y, [])
             row.extend([None] * (end - len(row)))
@@ -158,13 +158,13 @@ def _of_lines(update: LayoutUpdate) -> Iterator[Placed]:
             x += strip.cell_length
 
 
-def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
+def cells_of(strip: Strip, colors: ColorSystem) -> list[Cell]:
     """A strip cell by cell."""
     found: list[Cell] = []
     for text, style, control in strip:
         if control:
             continue
-        ansi = Strip.render_ansi(style, colours) if style is not None else ""
+        ansi = Strip.render_ansi(style, colors) if style is not None else ""
         blank = (" ", of_blank(ansi))
         if text.isascii() and text.isprintable():
             found += [blank if character == " " else (character, ansi) for character in text]
@@ -181,9 +181,9 @@ def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
 
 
 class Pen:
-    """Writes cells; moves and changes colour only where it has to.
+    """Writes cells; moves and changes color only where it has to.
 
-    With `erases` the terminal erases cells in the colour that is set.
+    With `erases` the terminal erases cells in the color that is set.
     """
 
     def __init__(self, *, erases: bool = False) -> None:
@@ -226,7 +226,7 @@ class Pen:
         self.size += len(text)
 
     def text(self) -> str:
-        """All that was written, with colours as they were before."""
+        """All that was written, with colors as they were before."""
         if self._ansi:
             self._put("\x1b[0m")
             self._ansi = ""

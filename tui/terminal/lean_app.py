@@ -50,11 +50,11 @@ class LeanApp(App[None]):
         """Whether a frame was sent in part."""
 
     def fit_terminal(self, abilities: Abilities, *, slow: bool = False) -> None:
-        """Use signs and colours that the terminal has.
+        """Use signs and colors that the terminal has.
 
         With `slow` the link is taken for slow until it has shown its rate.
         """
-        self._colours = abilities.colours or ColorSystem.STANDARD
+        self._colors = abilities.colors or ColorSystem.STANDARD
         self.plain_signs = abilities.encoding != UTF_8
         """Whether the terminal has signs of ASCII only, or few more."""
         self._instead = filters_for(abilities)
@@ -62,7 +62,7 @@ class LeanApp(App[None]):
         self._pacing = Pacing(slow=slow)
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """Textual's own, but for its way to leave colours out, and those of this terminal."""
+        """Textual's own, but for its way to leave colors out, and those of this terminal."""
         own = [one for one in super().get_line_filters() if not isinstance(one, Monochrome)]
         return [*own, *self._instead]
 
@@ -99,7 +99,7 @@ class LeanApp(App[None]):
         if strips is None or not self._draws:
             super()._display(screen, renderable)
             return
-        self._picture.want(strips, self._colours)
+        self._picture.want(strips, self._colors)
         self._send()
         self.post_display_hook()
 
@@ -180,12 +180,12 @@ def filters_for(abilities: Abilities) -> list[LineFilter]:
         from .plain_signs import PlainSigns
 
         found.append(PlainSigns(abilities.encoding))
-    if abilities.colours is None:
-        from .few_colours import NoColours
+    if abilities.colors is None:
+        from .few_colors import NoColors
 
-        found.append(NoColours())
-    elif abilities.colours in SIXTEEN:
-        from .few_colours import SixteenColours
+        found.append(NoColors())
+    elif abilities.colors in SIXTEEN:
+        from .few_colors import SixteenColors
 
-        found.append(SixteenColours())
+        found.append(SixteenColors())
     return found

@@ -1,4 +1,4 @@
-"""How colours and attributes are set on a terminal, and what has to be sent to change them."""
+"""How colors and attributes are set on a terminal, and what has to be sent to change them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ FOREGROUND = frozenset({*range(30, 38), *range(90, 98)})
 BACKGROUND = frozenset({*range(40, 48), *range(100, 108)})
 EXTENDED = {38: "foreground", 48: "background"}
 NUMBERS = {2: 5, 5: 3}
-"""Numbers of an extended colour in all, by the one that follows 38 or 48."""
+"""Numbers of an extended color in all, by the one that follows 38 or 48."""
 
 
 class CellLook(NamedTuple):
-    """Attributes and colours of a character; a colour that is empty is the terminal's own."""
+    """Attributes and colors of a character; a color that is empty is the terminal's own."""
 
     attributes: frozenset[str] = frozenset()
     foreground: str = ""
@@ -27,22 +27,22 @@ class CellLook(NamedTuple):
 @lru_cache(maxsize=1024)
 def look_of(ansi: str) -> CellLook:
     """What the numbers of a style mean, as `1;38;5;7;48;5;0`."""
-    attributes, colours = set(), {"foreground": "", "background": ""}
+    attributes, colors = set(), {"foreground": "", "background": ""}
     left = ansi.split(";") if ansi else []
     while left:
         number = int(left[0])
         size = 1
         if number in EXTENDED:
             size = NUMBERS[int(left[1])]
-            colours[EXTENDED[number]] = ";".join(left[:size])
+            colors[EXTENDED[number]] = ";".join(left[:size])
         elif number in FOREGROUND:
-            colours["foreground"] = left[0]
+            colors["foreground"] = left[0]
         elif number in BACKGROUND:
-            colours["background"] = left[0]
+            colors["background"] = left[0]
         elif number not in (39, 49):
             attributes.add(left[0])
         left = left[size:]
-    return CellLook(frozenset(attributes), **colours)
+    return CellLook(frozenset(attributes), **colors)
 
 
 @lru_cache(maxsize=4096)
@@ -53,8 +53,8 @@ def change(before: str, after: str) -> str:
     was, now = look_of(before), look_of(after)
     anew = f"\x1b[{RESET};{after}m" if after else f"\x1b[{RESET}m"
     gone = was.attributes - now.attributes
-    colour_gone = (was.foreground and not now.foreground) or (was.background and not now.background)
-    if colour_gone or not gone <= {"1"}:
+    color_gone = (was.foreground and not now.foreground) or (was.background and not now.background)
+    if color_gone or not gone <= {"1"}:
         return anew
     added = [NOT_BOLD] if gone else []
     kept = was.attributes - {"2"} if gone else was.attributes  # not bold is not dim either

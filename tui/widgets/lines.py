@@ -35,7 +35,7 @@ class Lines(Widget):
         self._lines: list[Text] = []
         self._strips: dict[int, Strip] = {}
         self._under: Style | None = None
-        """The colours of the place itself; to ask for them costs more than to draw a line."""
+        """The colors of the place itself; to ask for them costs more than to draw a line."""
         self.redrawn = 0
         """How many lines were sent so far, for tests and benchmarks."""
 
@@ -80,7 +80,7 @@ class Lines(Widget):
             self._lines = list(self._fit(width))
 
     def notify_style_update(self) -> None:
-        """Draw anew when colours change."""
+        """Draw anew when colors change."""
         self._strips.clear()
         self._under = None
         super().notify_style_update()
@@ -129,7 +129,7 @@ def _names_of_styles() -> Console:
 def strip_of(
     text: str, spans: tuple[Span, ...], style: Style | str, width: int, under: Style
 ) -> Strip:
-    """A line in exactly so many cells, on the colours of its place.
+    """A line in exactly so many cells, on the colors of its place.
 
     Kept for when it comes again: most of what changes becomes what it was before.
     """
@@ -188,7 +188,7 @@ def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
 
 
 def looks(strip: Strip) -> tuple[str, list[Style | None]]:
-    """The characters of a strip, and their colours; fewer than its cells where some are wide."""
+    """The characters of a strip, and their colors; fewer than its cells where some are wide."""
     styles: list[Style | None] = []
     for text, style, _ in strip:
         styles += [style] * len(text)
@@ -196,7 +196,7 @@ def looks(strip: Strip) -> tuple[str, list[Style | None]]:
 
 
 def same(one: Text, other: Text) -> bool:
-    """Whether two lines look the same, their colours too."""
+    """Whether two lines look the same, their colors too."""
     if one is other:
         return True
     return one.plain == other.plain and one.spans == other.spans and one.style == other.style

@@ -1,4 +1,4 @@
-"""The colours of the panel: grey while all is well, colour for a state that wants to be seen."""
+"""The colors of the panel: grey while all is well, color for a state that wants to be seen."""
 
 from __future__ import annotations
 

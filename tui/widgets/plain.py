@@ -36,7 +36,7 @@ def written(content: VisualType) -> VisualType:
 
 
 def signs(text: Text) -> Text:
-    """The same text, in the same colours, with its control characters as signs."""
+    """The same text, in the same colors, with its control characters as signs."""
     if text.plain.replace("\n", "").isprintable():
         return text
     shown = text.copy()

@@ -15,7 +15,7 @@ NEAR = 2.0
 """Eighths of a row within which the line and the end of the area are one."""
 WANTED = Style(color=KEY.color)
 WANTED_OVER = "#123a5c"
-"""Colour of the line where the area lies over it."""
+"""Color of the line where the area lies over it."""
 AREA, HANGING, LINE_ABOVE, LINE_OVER = range(4)
 """What a cell shows: the area, the end of one that hangs from zero, the line beside or over it."""
 

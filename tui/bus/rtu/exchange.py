@@ -1,6 +1,6 @@
 """One RTU request and the bytes that come back for it: what they are, and when that is sure.
 
-Knows no clock and no port: fed with bytes, told of silence and of the time-out.
+Knows no clock and no port: fed with bytes, told of silence and of the timeout.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class RtuExchange:
                     ResultKind.DAMAGED,
                     received=bytes(self.buffer),
                     strays=[stray for stray in loose if stray.whole],
-                    recognised=True,
+                    recognized=True,
                 )
         return None
 

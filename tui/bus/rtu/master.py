@@ -242,7 +242,7 @@ class RtuMaster:
         return ExchangeResult(ResultKind.NOTHING)
 
     async def _result(self, sending: Sending) -> ExchangeResult:
-        """Wait for the result; while bytes are coming in, a little over the time-out."""
+        """Wait for the result; while bytes are coming in, a little over the timeout."""
         assert self._done is not None
         expectation = sending.expectation
         if expectation is None:

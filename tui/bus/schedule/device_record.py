@@ -51,7 +51,7 @@ class Device:
     recent: dict[int, deque[float]] = field(default_factory=dict)
     outstanding: list[Outstanding] = field(default_factory=list)
     lateness: float = 0.0
-    """The longest that a reply came after its time-out."""
+    """The longest that a reply came after its timeout."""
     settle: float = 0.0
     """Quiet time after each reply of a device that repeats its replies later."""
     repeated: float = 0.0
@@ -74,7 +74,7 @@ def usual(recent: Mapping[int, Sequence[float]]) -> float | None:
 
 
 def note_turnaround(record: Device, function: int, turnaround: float) -> None:
-    """Note a turnaround; the time-out goes by the recent ones."""
+    """Note a turnaround; the timeout goes by the recent ones."""
     recent = record.recent.setdefault(function, deque(maxlen=TURNAROUNDS_KEPT))
     recent.append(turnaround)
     record.turnaround = max(recent)

@@ -269,7 +269,7 @@ class Dispatcher:
             self._repeat(job, result)
 
     def _repeat(self, job: Job, result: ExchangeResult) -> None:
-        # one drive that went away must not keep the others waiting for several time-outs
+        # one drive that went away must not keep the others waiting for several timeouts
         missed = job.priority is Priority.POLL and result.kind is ResultKind.NOTHING
         self._queue.put_back(job, behind=missed)
         self._wake.set()

@@ -28,7 +28,7 @@ from .shared_values import SharedValues
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
 STILL = 1.0
-"""Seconds past the time-out after which an answer cannot have come just now."""
+"""Seconds past the timeout after which an answer cannot have come just now."""
 REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL + 1))
 SHORT_SILENCE = 5.0
 """Seconds after which several misses in a row are a trouble of the drive, not of the line."""
@@ -157,7 +157,7 @@ class Outcomes:
         match result.kind:
             case ResultKind.DAMAGED:
                 self._tally.count_checksum(request.device)
-                if not result.recognised:
+                if not result.recognized:
                     self._devices.may_come(request.device, expectation, result.sent, now, again)
                 error = ChecksumFault(*place, received=result.received)
             case ResultKind.WRONG:

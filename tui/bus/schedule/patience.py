@@ -13,12 +13,12 @@ from .backoff import pause
 from .device_record import Device, Outstanding, note_turnaround, usual
 
 MARGIN = 4
-"""The time-out is so many times the worst recent turnaround."""
+"""The timeout is so many times the worst recent turnaround."""
 LATE_MARGIN = 2.0
 """Late replies are awaited so many times longer than the worst lateness seen."""
 LONGEST_WAIT = 10.0
 QUIET_SHARE = 0.3
-"""Longest that the whole line keeps quiet for one late device, as a share of the time-out."""
+"""Longest that the whole line keeps quiet for one late device, as a share of the timeout."""
 FORGET = 0.99
 """What is left of the worst lateness after each reply in time."""
 SHORT_WAIT = 0.1
@@ -292,7 +292,7 @@ class Devices:
         record.answers = record.ever_answered = True
         # should it come once more, it is known
         record.last, record.last_time = late.expectation, now
-        # the next time-out allows for it
+        # the next timeout allows for it
         note_turnaround(record, late.expectation.function, now - late.sent)
 
     def _note_copy(self, record: Device, came: float, now: float) -> None:

@@ -171,7 +171,7 @@ def _has_parity(port: serial.Serial) -> bool:
 
 
 def _open(path: str, baud: int, format_: str, *, alone: bool) -> serial.Serial:
-    # an inter-byte time-out of 0 makes a read of nothing fail on POSIX instead of looking
+    # an inter-byte timeout of 0 makes a read of nothing fail on POSIX instead of looking
     # like the end of the port
     posix = os.name == "posix"
     try:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.block_output import show_blocks, show_neighbours
+from ..shared.block_output import show_blocks, show_neighbors
 from ..shared.block_plans import Wanted, plans_of
 from ..shared.errors import (
     DIFFERENT,
@@ -108,7 +108,7 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
         if wanted.action != "show":
             raise MappingError(no_blocks(session.profile))
         await _measure_answer(session)
-        show_neighbours(session, line_text, as_json=wanted.as_json)
+        show_neighbors(session, line_text, as_json=wanted.as_json)
         return DONE
     if wanted.action in WRITING:
         return await _write(session, line_text, wanted)

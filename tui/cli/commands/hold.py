@@ -1,4 +1,4 @@
-"""`drivepanel hold`: drives asked on, so that their communication time-out does not run out."""
+"""`drivepanel hold`: drives asked on, so that their communication timeout does not run out."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def hold(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Ask drives on until Ctrl-C, so that their communication time-out does not run out.
+    """Ask drives on until Ctrl-C, so that their communication timeout does not run out.
 
     It reads, and writes nothing. A drive that is asked cannot tell that its controller is lost:
     its own protection is off meanwhile. At the end it is told what each drive does then, and when.
@@ -114,7 +114,7 @@ async def _take_all(
 
 
 async def _connected(opened: OpenLine, target: Target) -> DriveSession:
-    """A drive that answers, with what it tells of its time-out."""
+    """A drive that answers, with what it tells of its timeout."""
     session = await connect_drive(opened, target)
     if opened.line.device_state(target.device).heard is None:
         raise Failure(f"Device {target.device} does not answer.", LINE_TROUBLE)

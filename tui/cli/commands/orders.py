@@ -42,7 +42,7 @@ FIRST_TRIES, FIRST_WITHIN = 3, 5.0
 """Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word
 that it does not have may meet silence meanwhile, which is no answer of any kind."""
 LEARNT_WITHIN = 10.0
-"""Seconds in which a drive's communication time-out is read on a quick line: words that it lacks
+"""Seconds in which a drive's communication timeout is read on a quick line: words that it lacks
 meet silence, and a small computer is slow."""
 
 arm_option = click.option(

@@ -53,7 +53,7 @@ def scan(
     """Find the drives on a line. It reads, and writes nothing. Ctrl-C ends it.
 
     It listens first: where another master asks drives, it ends before it sends anything. What is
-    found is asked on until the end, so that its communication time-out does not run out.
+    found is asked on until the end, so that its communication timeout does not run out.
     """
     from tui.session.connect.addresses import parse_addresses
 

@@ -154,7 +154,7 @@ class WatchingFamilyTold(msgspec.Struct, forbid_unknown_fields=True):
     profile: str
     name: str
     timeout: str
-    """The parameter that sets its time-out."""
+    """The parameter that sets its timeout."""
     sure: bool
     """Whether a document says so."""
 

@@ -96,7 +96,7 @@ class PlannedReadTold(PartTold):
 
 
 class FeedingTold(PartTold):
-    """A communication time-out against the longest pause; seconds, null where it is off."""
+    """A communication timeout against the longest pause; seconds, null where it is off."""
 
     code: str
     seconds: float | None

@@ -54,7 +54,7 @@ class WatchedValueTold(PartTold):
 
 
 class TimeoutTold(PartTold):
-    """The communication time-out of a drive; all null where the drive does not tell it."""
+    """The communication timeout of a drive; all null where the drive does not tell it."""
 
     seconds: float | None
     reaction: str | None
@@ -219,7 +219,7 @@ class ControlTold(PartTold):
 
 
 class OldTimeoutTold(PartTold):
-    """The communication time-out as `status` has told it; `timeout` takes its place."""
+    """The communication timeout as `status` has told it; `timeout` takes its place."""
 
     timeout_s: float
     reaction: str | None

@@ -34,7 +34,7 @@ PLANT_LOOK_INTERVAL = 2.0
 RATE_LOOK_INTERVAL = 10.0
 """Seconds between two looks whether the line keeps the wished cycle time."""
 TIMEOUT_READ_AGAIN = 20.0
-"""Seconds after which a drive's communication time-out is read anew."""
+"""Seconds after which a drive's communication timeout is read anew."""
 
 GATEWAY = "serve"
 """What a program is called on a line whose clients may start motors."""

@@ -1,4 +1,4 @@
-"""Asking drives on, so that their communication time-out does not run out: --hold and hold."""
+"""Asking drives on, so that their communication timeout does not run out: --hold and hold."""
 
 from __future__ import annotations
 

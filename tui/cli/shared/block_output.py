@@ -185,8 +185,8 @@ def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...
 # Families without blocks
 
 
-def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> None:
-    """Print that there is no block, and which neighbours are worth reading in one request."""
+def show_neighbors(session: DriveSession, line_text: str, *, as_json: bool) -> None:
+    """Print that there is no block, and which neighbors are worth reading in one request."""
     from tui.drive.blocks.assignment import no_blocks
     from tui.drive.blocks.wire_cost import stretches
     from tui.session.blocks.mapping import wire_timing
@@ -212,7 +212,7 @@ def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> 
 
 
 def stretch_json(stretch: Stretch) -> Mapping[str, Any]:
-    """The object of one read of neighbours."""
+    """The object of one read of neighbors."""
     return {
         "address": stretch.request.address,
         "count": stretch.request.count,

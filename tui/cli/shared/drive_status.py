@@ -62,7 +62,7 @@ class Status:
     """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
     timeout: Timeout
-    """Its time-out as it was known when `unread` was settled; it may be learnt later."""
+    """Its timeout as it was known when `unread` was settled; it may be learnt later."""
     left: LeftBehind | None = None
     """Its motor, if the program that started it has exited and no program commands it."""
     finding: FaultFinding | None = None

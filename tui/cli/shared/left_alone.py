@@ -1,4 +1,4 @@
-"""What drives do when a command no longer asks them: their communication time-out."""
+"""What drives do when a command no longer asks them: their communication timeout."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tui.session.timeout_told import Timeout
 
 TOLD_WITHIN = 3.0
-"""Seconds in which a drive tells its time-out at the end of a command, on a quick line."""
+"""Seconds in which a drive tells its timeout at the end of a command, on a quick line."""
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ class LeftAlone:
     """Whether the drive is there afterwards: a simulated one ends with its line."""
 
     async def learn(self) -> None:
-        """Have the drive tell its time-out, unless it has; no answer fails nothing."""
+        """Have the drive tell its timeout, unless it has; no answer fails nothing."""
         from tui.bus.api import Priority
         from tui.bus.errors import LineError
         from tui.session.monitor.timeout import read_timeout
@@ -55,7 +55,7 @@ class LeftAlone:
             session.timeout = await asyncio.wait_for(reading, within)
 
     async def tell(self) -> None:
-        """Say on standard error that its time-out runs, and what follows."""
+        """Say on standard error that its timeout runs, and what follows."""
         from tui.session.monitor.timeout import timeout_now
 
         session = self.session

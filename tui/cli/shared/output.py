@@ -145,7 +145,7 @@ def console() -> Console:
 
     return Plain(
         width=None if sys.stdout.isatty() else PIPE_WIDTH,
-        # bold and dim are no colours, but who wants none wants plain text
+        # bold and dim are no colors, but who wants none wants plain text
         color_system=None if os.environ.get("NO_COLOR") else "auto",
         highlight=False,
         markup=False,

@@ -1,6 +1,6 @@
 """What an assignment costs and saves on the wire, and the requests that use it.
 
-Also, for families without blocks: what neighbouring parameters cost in one read, and which
+Also, for families without blocks: what neighboring parameters cost in one read, and which
 stretch of them saves most.
 """
 
@@ -42,7 +42,7 @@ class Saving:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A read of neighbours: the request, what it brings, what it takes and what it saves."""
+    """A read of neighbors: the request, what it brings, what it takes and what it saves."""
 
     request: ReadRequest
     brings: tuple[str, ...]
@@ -169,7 +169,7 @@ def stretches(
     timing: WireTiming,
     unreadable: Collection[str] = (),
 ) -> list[Stretch]:
-    """The reads of neighbours that save most for these parameters, the best first.
+    """The reads of neighbors that save most for these parameters, the best first.
 
     Each parameter counts for one stretch only. Empty where the drive reads single words only.
     """

@@ -215,7 +215,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "motor_keeps_running": "True where the motor runs on.",
     },
     "CommunicationFault": {
-        "timeout": "Code of the time-out.",
+        "timeout": "Code of the timeout.",
         "reaction": "Code of what chooses the reaction.",
         "reactions": "What each value of it does.",
         "fault": "Raw code of the fault that follows.",
@@ -251,7 +251,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "profile": "The head of the file, first in it.",
         "sources": "Documents that the facts were taken from.",
         "errata": "Places where a manual is wrong.",
-        "identification": "How the drive is recognised.",
+        "identification": "How the drive is recognized.",
         "link": "The line from the factory, and the parameters behind it.",
         "addresses": "Slave addresses.",
         "functions": "Modbus functions and their limits.",

@@ -31,7 +31,7 @@ class Edit:
     rounded: bool = False
     """True where the drive cannot hold exactly what was typed."""
     lossy: bool = False
-    """True where rounding makes another value of it: 0, or either of two neighbours."""
+    """True where rounding makes another value of it: 0, or either of two neighbors."""
     warning: str = ""
     """What is dangerous about it; else empty."""
 

@@ -87,7 +87,7 @@ class BlocksScreen(BlockKeys):
                 self.query_one(id).display = self.size.height >= rows
             self._show_tables(width)
         else:
-            self._show_neighbours(width - 1)  # the table's margin
+            self._show_neighbors(width - 1)  # the table's margin
 
     def _show_tables(self, width: int) -> None:
         block_editor, block = self.block_editor, self._block
@@ -127,9 +127,9 @@ class BlocksScreen(BlockKeys):
         todo = [block for block in editor.proposals.blocks if editor.proposals.changes(block)]
         return next((why for block in todo if (why := editor.not_now(block))), "")
 
-    def _show_neighbours(self, width: int) -> None:
+    def _show_neighbors(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
-        head = rule("Neighbours of the monitoring set, one request each", width)
+        head = rule("Neighbors of the monitoring set, one request each", width)
         room = max(3, self.size.height - len(why) - 8)
         stretches = monitoring_stretches(self.session)
         found = stretch_lines(self.block_editor, stretches, width, room)

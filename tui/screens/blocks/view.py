@@ -282,7 +282,7 @@ def user_word_lines(block_editor: BlockEditor, words: UserWords, width: int) -> 
 def stretch_lines(
     block_editor: BlockEditor, found: Sequence[Stretch], width: int, room: int
 ) -> list[Text]:
-    """For a family without blocks: which neighbours come best in one request."""
+    """For a family without blocks: which neighbors come best in one request."""
     lines: list[Text] = []
     for stretch in found:
         request = stretch.request

@@ -20,7 +20,7 @@ FIELD_NAME = Style(color="#85898d")
 FIELD_TEXT = Style(color=TEXT, bgcolor=SURFACE)
 EMPTY = Style(color="#7a7d7f", bgcolor=SURFACE)
 OFF = Style(color="#969a9e", bgcolor="#24272b")
-"""The colours that Textual mixes for a name, a field, what stands in an empty one, one that is
+"""The colors that Textual mixes for a name, a field, what stands in an empty one, one that is
 off."""
 
 

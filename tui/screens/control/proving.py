@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
 
 HOW_IT_IS_PROVED = (
-    "Nobody asks the drive for longer and longer, around its time-out, until it reacts: then it is"
+    "Nobody asks the drive for longer and longer, around its timeout, until it reacts: then it is"
     " in a fault, which x on Monitor resets. It takes about {seconds:.0f} s."
 )
 PROOF_ON_THE_RUN = (
@@ -32,7 +32,7 @@ PROOF_ON_THE_RUN = (
     " proof ends, and at any stop key. "
 )
 TIMEOUTS_A_PROOF_TAKES = 4.6
-"""Time-outs that a proof takes where the drive reacts as set."""
+"""Timeouts that a proof takes where the drive reacts as set."""
 
 
 def silence_line(
@@ -42,9 +42,9 @@ def silence_line(
     rules, link = session.profile.data.communication_fault, session.line.link
     told = Text("  On silence    ", FAINT, no_wrap=True)
     if rules is None:
-        told.append("no communication time-out is known", PLAIN)
+        told.append("no communication timeout is known", PLAIN)
     elif watch is None:
-        told.append(f"{rules.timeout or 'time-out'} off, or not read yet", ALARM)
+        told.append(f"{rules.timeout or 'timeout'} off, or not read yet", ALARM)
     else:
         does = watch.reaction.name if watch.reaction else "its own reaction"
         told.append(f"{rules.timeout} {watch.timeout:g} s, ", STRONG)

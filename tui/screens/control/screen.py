@@ -138,7 +138,7 @@ class ControlSourceScreen(OrderKeys):
         self.action_write_chosen()
 
     def action_prove(self) -> None:
-        """Ask, then prove the communication time-out of the drive."""
+        """Ask, then prove the communication timeout of the drive."""
         latest = self.console.latest
         if not self._armed_or_told() or latest is None:
             return

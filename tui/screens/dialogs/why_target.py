@@ -19,7 +19,7 @@ class WhyTarget(NamedTuple):
     """The line; None where it is not open."""
     profile: str = ""
     """The profile of the drive as far as it is known here."""
-    neighbours: tuple[int, ...] = ()
+    neighbors: tuple[int, ...] = ()
     """Other drives of the line that answer."""
     trouble: LineError | None = None
     """Why the line could not be opened."""

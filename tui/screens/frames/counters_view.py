@@ -47,7 +47,7 @@ def our_lines(found: CountersNow) -> list[Text]:
     rows = [
         ("frames sent", total.requests, since.requests),
         ("answered", total.replies, since.replies),
-        ("time-outs", total.timeouts, since.timeouts),
+        ("timeouts", total.timeouts, since.timeouts),
         ("damaged", total.checksum, since.checksum),
         ("strange", total.wrong, since.wrong),
         ("refused", sum(total.exceptions.values()), sum(since.exceptions.values())),
@@ -55,7 +55,7 @@ def our_lines(found: CountersNow) -> list[Text]:
         ("bytes sent", total.bytes_out, since.bytes_out),
         ("bytes received", total.bytes_in, since.bytes_in),
     ]
-    lost = {"time-outs", "damaged", "strange"}
+    lost = {"timeouts", "damaged", "strange"}
     lines = [head]
     for name, all_of_them, lately in rows:
         text = Text(f" {name:<15}", FAINT, no_wrap=True)

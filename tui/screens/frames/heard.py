@@ -29,7 +29,7 @@ class HeardScreen(FrameListScreen):
         self._told_trouble = False
 
     def sum_lines(self, width: int, height: int) -> list[Text]:
-        """Each drive: who commands it, how often it is asked, whether its time-out is fed."""
+        """Each drive: who commands it, how often it is asked, whether its timeout is fed."""
         lines, self._top = heard_lines(self._heard.summary(), width, height, self._top)
         return lines
 

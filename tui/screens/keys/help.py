@@ -77,7 +77,7 @@ class HelpScreen(Framed, ModalScreen[None]):
 def help_lines(screen: str, width: int) -> list[Text]:
     """Keys and signs of a screen, each sentence in a column of its own."""
     keys = [(action.shown or WITHOUT_KEY, KEY, action.help) for action in of_screen(screen)]
-    signs = [(sign, HELP_STYLES[colour], meaning) for sign, colour, meaning in SIGNS]
+    signs = [(sign, HELP_STYLES[color], meaning) for sign, color, meaning in SIGNS]
     column = max(len(key) for key, _, _ in (*keys, *signs)) + 2
     title = Text(" " * column).append(f"Keys on {screen.capitalize()}", TITLE)
     return [

@@ -47,7 +47,7 @@ def state_lines(view: View, width: int) -> list[Text]:
     rows = [
         _channel(view, "Command", "command_channel", width),
         _channel(view, "Reference", "reference_channel", width),
-        _pair("Time-out", *_timeout(view, width), width),
+        _pair("Timeout", *_timeout(view, width), width),
         _pair("Fed" if _is_fed(view) else "Heard", *_heard(view), width),
     ]
     lines = [head, *more[:4], *rows[len(more[:4]) :]]

@@ -74,7 +74,7 @@ class View:
 
     @property
     def time_left(self) -> float | None:
-        """Seconds until the drive acts on its time-out if nobody asks it; None if it does not."""
+        """Seconds until the drive acts on its timeout if nobody asks it; None if it does not."""
         if self.watch is None or not self.watch.active or self.heard is None:
             return None
         return self.watch.timeout - (self.now - self.heard)

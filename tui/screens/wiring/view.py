@@ -30,7 +30,7 @@ def trouble_sections(found: Diagnosis | None, wall: float) -> list[PageSection]:
 
 
 def wiring_lines(page: Sequence[PageLine]) -> list[Text]:
-    """The lines of a page with their colours: amber where it warns, else grey."""
+    """The lines of a page with their colors: amber where it warns, else grey."""
     return [_line(line) for line in page]
 
 

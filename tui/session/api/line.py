@@ -96,7 +96,7 @@ class DriveLine:
         return session
 
     def close(self) -> None:
-        """Close the line. A drive with a communication time-out acts on it from now on."""
+        """Close the line. A drive with a communication timeout acts on it from now on."""
         self._guardian.close()
         self._fleet.forget()
         self._opened.close()

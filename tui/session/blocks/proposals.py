@@ -157,6 +157,6 @@ class Proposals:
 
 
 def monitoring_stretches(session: DriveSession) -> list[Stretch]:
-    """For families without blocks: which neighbours to read in one request."""
+    """For families without blocks: which neighbors to read in one request."""
     codes = monitoring_codes(session.profile)
     return stretches(session.profile, codes, wire_timing(session))

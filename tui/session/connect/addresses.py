@@ -28,7 +28,7 @@ def parse_addresses(text: str) -> list[int]:
 
 
 def addresses_text(devices: Iterable[int]) -> str:
-    """Addresses as a person types them, neighbours as one span: `1-3,7`."""
+    """Addresses as a person types them, neighbors as one span: `1-3,7`."""
     spans: list[list[int]] = []
     for device in sorted(set(devices)):
         if spans and device == spans[-1][1] + 1:

@@ -51,7 +51,7 @@ def known_profiles() -> list[Profile]:
 def strangers_of(link: Link, network_wait: float, *, patient: bool = False) -> Strangers:
     """How addresses of a line are asked; reads files.
 
-    A line over a network, or one whose time-out a person has set, is waited for `network_wait`
+    A line over a network, or one whose timeout a person has set, is waited for `network_wait`
     seconds, as are all where that is to be `patient`.
     """
     profiles = known_profiles()

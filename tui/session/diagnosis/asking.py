@@ -69,11 +69,11 @@ async def sight_of_drive(
     profile: Profile | None,
     *,
     changed: str = "",
-    neighbours: Sequence[int] = (),
+    neighbors: Sequence[int] = (),
 ) -> Sight:
     """Ask a drive on an open line a few times, and see what becomes of it."""
     seen = await asyncio.to_thread(sight_of_port, line.link, device)
-    seen = replace(seen, profile=profile, changed=changed, neighbours=tuple(neighbours))
+    seen = replace(seen, profile=profile, changed=changed, neighbors=tuple(neighbors))
     if _attached(line) and seen.port is not None:
         # the program that owns the line has the port, as it should
         seen = replace(seen, port=replace(seen.port, holder="", others=""))

@@ -76,10 +76,10 @@ async def _examined(
     if ready and not isinstance(line.link, TcpLink) and (others := await _others(line)):
         seen = await asyncio.to_thread(sight_of_port, line.link, device)
         return replace(seen, profile=profile, changed=changed, overheard=others)
-    sight = await sight_of_drive(line, device, profile, changed=changed, neighbours=answering)
+    sight = await sight_of_drive(line, device, profile, changed=changed, neighbors=answering)
     cut = isinstance(sight.trouble, LineLost) and ready
     if cut and not isinstance(line.link, SerialLink) and await _connected_again(line):
-        sight = await sight_of_drive(line, device, profile, changed=changed, neighbours=answering)
+        sight = await sight_of_drive(line, device, profile, changed=changed, neighbors=answering)
         cut = isinstance(sight.trouble, LineLost)
     if any(behind):
         return sight

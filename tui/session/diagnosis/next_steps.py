@@ -173,7 +173,7 @@ def ask_gateway(sight: Sight) -> Iterator[str]:
         yield f"In the gateway: is address {sight.device} routed to its serial side?"
         return
     yield "The way to the gateway is right; look at its serial side."
-    yield "Its time-out must be longer than the drive takes; its baud and format the drive's."
+    yield "Its timeout must be longer than the drive takes; its baud and format the drive's."
     yield from end_silence(sight)
 
 

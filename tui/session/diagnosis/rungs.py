@@ -129,8 +129,8 @@ def _silent(sight: Sight) -> bool:
 
 
 def _says_silent(sight: Sight) -> str:
-    if sight.neighbours:
-        others = ", ".join(map(str, sight.neighbours))
+    if sight.neighbors:
+        others = ", ".join(map(str, sight.neighbors))
         return f"Nobody answers at address {sight.device}, while {others} on this line does."
     return f"Nobody answers at address {sight.device}: not one byte came back."
 

@@ -66,7 +66,7 @@ class Sight:
     """True if the connection was closed as nothing was sent."""
     idle: float = 0.0
     """Seconds for which no request was sent, to see that; 0 if it was not tried."""
-    neighbours: tuple[int, ...] = ()
+    neighbors: tuple[int, ...] = ()
     """Other addresses of this line that answer."""
 
     @property

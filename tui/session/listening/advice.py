@@ -1,4 +1,4 @@
-"""What a master could do better: fewer reads for the same values, a time-out with room to spare."""
+"""What a master could do better: fewer reads for the same values, a timeout with room to spare."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _readable(profile: Profile, code: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Feeding:
-    """A drive's communication time-out, against how long nobody asked it; times in seconds."""
+    """A drive's communication timeout, against how long nobody asked it; times in seconds."""
 
     code: str
     seconds: float | None
@@ -81,9 +81,9 @@ class Feeding:
 
 
 def feeding(profile: Profile, drive: DriveTally, now: float) -> Feeding | None:
-    """How a drive's time-out is fed; None where it has none, or its value is not known at all.
+    """How a drive's timeout is fed; None where it has none, or its value is not known at all.
 
-    What the drive has told to whoever asked goes before its factory setting; of several time-outs
+    What the drive has told to whoever asked goes before its factory setting; of several timeouts
     the shortest counts.
     """
     rules = profile.data.communication_fault

@@ -167,13 +167,13 @@ def _writes_text(writes: dict[str, WriteTally]) -> str:
 
 
 def feeding_text(feeding: Feeding) -> str:
-    """Whether a drive's time-out is fed, and by what margin."""
+    """Whether a drive's timeout is fed, and by what margin."""
     heard = feeding.known == "heard"
     known = "as heard" if heard else "factory setting; its own was not heard"
     if feeding.seconds is None or feeding.margin is None:
         follows = ": it does not notice a lost master" if heard else ""
-        return f"time-out {feeding.code} off ({known}){follows}"
-    head = f"time-out {feeding.code} {feeding.seconds:g} s ({known})"
+        return f"timeout {feeding.code} off ({known}){follows}"
+    head = f"timeout {feeding.code} {feeding.seconds:g} s ({known})"
     if not feeding.begun:
         return f"{head}: begins with a first command, and none was heard"
     if feeding.fed:

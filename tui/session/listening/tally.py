@@ -87,7 +87,7 @@ class DriveTally:
     turnaround_least: float = float("inf")
     turnaround_most: float = 0.0
     fed: float | None = None
-    """When it was last asked and answered, which is what starts its time-out anew."""
+    """When it was last asked and answered, which is what starts its timeout anew."""
     longest_pause: float = 0.0
 
     @property

@@ -36,7 +36,7 @@ _OBJECTS_FROM = 7
 
 @dataclass(frozen=True, slots=True)
 class WordSpan:
-    """Neighbouring words of a request: those that are read, or those that are written."""
+    """Neighboring words of a request: those that are read, or those that are written."""
 
     function: int
     """That of the addresses: 4 for input registers, else 3."""

@@ -1,1 +1,1 @@
-"""Watching a drive: the running monitor, feeding time-outs, the record of a trip."""
+"""Watching a drive: the running monitor, feeding timeouts, the record of a trip."""

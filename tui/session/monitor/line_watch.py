@@ -1,7 +1,7 @@
 """Looking after every drive found on a line, watched or not.
 
-Some drives watch the line and trip when it falls silent (communication time-out). The holder of
-the line reads them as long as this program is on it, at least three times in each time-out, before
+Some drives watch the line and trip when it falls silent (communication timeout). The holder of
+the line reads them as long as this program is on it, at least three times in each timeout, before
 polls and before an operator's own requests. Other requests tell the state of the drives in a list.
 """
 
@@ -47,7 +47,7 @@ GLANCE = 3.0
 GLANCE_EACH = 0.15
 """Seconds of that for each drive of the line."""
 LEARN_AGAIN = 20.0
-"""Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
+"""Seconds after which a drive's timeout and reaction are read anew: they may be changed."""
 SHORTEST = 0.02
 
 
@@ -95,7 +95,7 @@ class LineWatch:
         return state is not None and state.motion == "running" and not state.local
 
     def left_alone(self) -> dict[int, TimeoutWatch]:
-        """Drives that act on their communication time-out once nobody asks them, at rest too."""
+        """Drives that act on their communication timeout once nobody asks them, at rest too."""
         found = {device: self.watch(device) for device in self._kept}
         return {
             device: watch
@@ -104,7 +104,7 @@ class LineWatch:
         }
 
     def unread(self) -> list[DriveSession]:
-        """Drives whose time-out was not read yet: what they do left alone is not known."""
+        """Drives whose timeout was not read yet: what they do left alone is not known."""
         return [
             kept.session
             for kept in self._kept.values()
@@ -158,7 +158,7 @@ class LineWatch:
         return {device: state for device, state in seen.items() if state is not None}
 
     def warnings(self) -> list[TimeoutWarning]:
-        """Drives that are about to act on their time-out, or have, for want of an answer."""
+        """Drives that are about to act on their timeout, or have, for want of an answer."""
         found = []
         for device, kept in self._kept.items():
             watch = self._watch(kept)
@@ -241,7 +241,7 @@ class LineWatch:
             told = channel_codes(profile)
             codes += [code for code in told if profile[code].access == "r"]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
-            # settings are read with the time-out: another channel is set up at rest only
+            # settings are read with the timeout: another channel is set up at rest only
             settings = {c: one for c in told if (one := kept.session.image.get(c)) is not None}
             state = drive_state(profile, settings | readings)
             self.onsets.note(device, state, kept.session.clock.wall())
@@ -265,7 +265,7 @@ class LineWatch:
         return max(GLANCE, GLANCE_EACH * len(self._kept))
 
     async def _learn(self, kept: _Kept) -> float:
-        """Read the drive's time-out and its reaction; before that, how its words arrive."""
+        """Read the drive's timeout and its reaction; before that, how its words arrive."""
         await check_byte_order(kept.reader, Priority.POLL)
         found = await read_timeout(kept.reader, Priority.POLL, deciding_codes(kept.session.profile))
         kept.session.timeout = found

@@ -19,7 +19,7 @@ class Look:
     error: str
     time: float
     timeout: float | None
-    """The drive's communication time-out in seconds, if it is one that runs already."""
+    """The drive's communication timeout in seconds, if it is one that runs already."""
     readings: Mapping[str, Reading] = field(default_factory=dict)
     """What was read with the state: output frequency, its reference, motor current."""
     before: Look | None = None

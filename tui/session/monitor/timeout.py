@@ -1,4 +1,4 @@
-"""A drive's communication time-out: how long it waits for the line, and what it does then."""
+"""A drive's communication timeout: how long it waits for the line, and what it does then."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..reading import Reading
 from ..timeout_told import Timeout, TimeoutWatch
 
 TOLD_SHARE = 0.5
-"""Share of its time-out after which a drive that was not heard is told of."""
+"""Share of its timeout after which a drive that was not heard is told of."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeoutWarning:
-    """A drive that was not heard for a good part of its time-out; times in seconds."""
+    """A drive that was not heard for a good part of its timeout; times in seconds."""
 
     device: int
     profile: Profile
@@ -39,7 +39,7 @@ def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
     """What drives of one family do when nobody asks them any more, in a sentence."""
     it = "it" if len(sessions) == 1 else "each"
     if watch is None:
-        return f"{names_of(sessions)}: without communication {it} goes on: it has no time-out."
+        return f"{names_of(sessions)}: without communication {it} goes on: it has no timeout."
     if watch.reaction is not None and not watch.acts:
         reaction = watch.reaction.name
         return (
@@ -86,7 +86,7 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
 async def timeouts_of_ports(
     reader: Reader, rules: CommunicationFault, priority: Priority
 ) -> list[Reading]:
-    """The time-out of each port of a drive; a port that it does not have may meet silence.
+    """The timeout of each port of a drive; a port that it does not have may meet silence.
 
     Raises the line's errors, NoAnswer only where the drive does not tell its state either.
     """
@@ -118,7 +118,7 @@ def _told_with_it(session: DriveSession, rules: CommunicationFault) -> list[str]
 
 
 def timeout_now(session: DriveSession) -> Timeout:
-    """What a drive has told of its time-out, and whether that has begun by now."""
+    """What a drive has told of its timeout, and whether that has begun by now."""
     found = session.timeout or Timeout(known=False)
     if found.watch is not None and found.watch.acts and has_begun(session):
         return replace(found, watch=replace(found.watch, active=True))
@@ -139,7 +139,7 @@ def has_begun(session: DriveSession) -> bool:
 
 
 def timeout_seconds(reading: Reading, off: int | None) -> float | None:
-    """The time-out in seconds; None where it is off or could not be read."""
+    """The timeout in seconds; None where it is off or could not be read."""
     number = reading.number
     if reading.raw is None or reading.raw == off or not number:
         return None

@@ -26,7 +26,7 @@ from ..work import Permit
 from .result import UNNAMED_FAULT, ProofResult
 from .silences import Bracket, silences
 
-LEFT_ALONE_FOR_PROOF = "Its communication time-out is being proved: nobody asks it meanwhile."
+LEFT_ALONE_FOR_PROOF = "Its communication timeout is being proved: nobody asks it meanwhile."
 LOOK_FOR_STOP = 0.05
 """Seconds between two looks, in a silence, whether a stop was given."""
 RECONNECTED_BY_THEN = 10.0
@@ -38,7 +38,7 @@ SLOWER = 0.8
 
 
 class NothingToProve(DriveError):
-    """The drive has no communication time-out in force."""
+    """The drive has no communication timeout in force."""
 
 
 def hidden_at_rest(reaction: Reaction | None) -> str:
@@ -52,7 +52,7 @@ def hidden_at_rest(reaction: Reaction | None) -> str:
 
 
 def _nothing_runs(rules: CommunicationFault, told: Mapping[str, Reading]) -> str:
-    """Why there is nothing to prove, by what each port of the drive has told of its time-out."""
+    """Why there is nothing to prove, by what each port of the drive has told of its timeout."""
     ports = (rules.timeout, *rules.other_timeouts)
     silent = " and ".join(code for code in ports if code not in told)
     missing = f"{silent} cannot be read: perhaps this drive has no such word"
@@ -78,7 +78,7 @@ class Prover:
         self._reader = Reader(self.session)
 
     async def prove(self) -> ProofResult:
-        """Prove the communication time-out of the drive.
+        """Prove the communication timeout of the drive.
 
         Raises NothingToProve, OrderRefused where the drive is not fit for it, Stopped where a stop
         came, and the line's errors. Whatever happens others may ask the drive again afterwards.
@@ -86,7 +86,7 @@ class Prover:
         session, facts = self.session, self.session.line.facts
         rules = session.profile.data.communication_fault
         if rules is None or not rules.timeout:
-            raise NothingToProve(f"{session.profile.name} has no communication time-out.")
+            raise NothingToProve(f"{session.profile.name} has no communication timeout.")
         watch = (rules.timeout, *rules.other_timeouts, rules.reaction)
         before = {code: session.image.get(code) for code in watch if code}
         # before it is left alone: a port that it does not have meets silence, and what is asked
@@ -109,7 +109,7 @@ class Prover:
             session.stir()
 
     async def _settings(self, rules: CommunicationFault) -> dict[str, Reading]:
-        """The time-out of each port that the drive has."""
+        """The timeout of each port that the drive has."""
         told = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)
         return {one.parameter.code: one for one in told if one.raw is not None}
 

@@ -19,7 +19,7 @@ class ProofResult:
 
     device: int
     configured: float
-    """The communication time-out that is set, in seconds."""
+    """The communication timeout that is set, in seconds."""
     reaction: Reaction | None
     """The reaction that is set; None where the family has none to set, or it is not known."""
     bracket: Bracket

@@ -6,22 +6,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 COARSE = (0.25, 0.5, 0.7)
-"""Silences well before the time-out, as shares of it: a shorter one shows up there."""
+"""Silences well before the timeout, as shares of it: a shorter one shows up there."""
 FINE_FROM, SILENCE_STEP = 0.82, 0.12
 """From here on they grow by so much, so that two are at most 300 ms apart at 2 s."""
 LATEST_FINE = 1.3
 PAST_TIMEOUT = (1.6, 2.2, 3.0)
-"""Silences after the time-out should have run out; none longer is tried."""
+"""Silences after the timeout should have run out; none longer is tried."""
 LONGEST_SILENCE = 90.0
-"""Seconds that no silence exceeds, unless the time-out itself needs longer ones."""
+"""Seconds that no silence exceeds, unless the timeout itself needs longer ones."""
 LONGEST_SHARE = 1.6
-"""Of a long time-out, the longest silence."""
+"""Of a long timeout, the longest silence."""
 TIMEOUT_TOLERANCE, LEAST_TIMEOUT_TOLERANCE = 0.05, 0.05
-"""Share of the time-out, and seconds, by which a drive may be earlier or later than set."""
+"""Share of the timeout, and seconds, by which a drive may be earlier or later than set."""
 
 
 def silences(timeout: float) -> Iterator[float]:
-    """Seconds of each silence, growing around the time-out that is set."""
+    """Seconds of each silence, growing around the timeout that is set."""
     shares = list(COARSE)
     share = FINE_FROM
     while share < LATEST_FINE:
@@ -54,7 +54,7 @@ class Bracket:
         return None if self.not_after is None else (self.not_before + self.not_after) / 2
 
     def holds(self, timeout: float) -> bool:
-        """Whether a time-out that is set agrees with what was seen."""
+        """Whether a timeout that is set agrees with what was seen."""
         if self.not_after is None:
             return False
         slack = max(TIMEOUT_TOLERANCE * timeout, LEAST_TIMEOUT_TOLERANCE)

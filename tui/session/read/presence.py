@@ -32,10 +32,10 @@ class PresenceRead:
 def presence_read(profile: Profile) -> PresenceRead | None:
     """The request that is answered by whichever drive of the family; None where none is known.
 
-    Where a word that a drive does not have meets silence, two neighbours of the monitoring set:
+    Where a word that a drive does not have meets silence, two neighbors of the monitoring set:
     their reply is longer than one that may yet come to such a word, and taken for none.
     """
-    pair = _neighbours(profile) if meets_silence(profile) else None
+    pair = _neighbors(profile) if meets_silence(profile) else None
     if pair is not None:
         return PresenceRead(pair.address, 2, pair.function)
     code = next(iter(watched_codes(profile)), profile.data.faults.parameter)
@@ -75,7 +75,7 @@ def meets_silence(profile: Profile) -> bool:
     return function is not None and function.past_limit == "silence"
 
 
-def _neighbours(profile: Profile) -> Parameter | None:
+def _neighbors(profile: Profile) -> Parameter | None:
     """The first of two words of the monitoring set, side by side, that documents confirm."""
     codes = [value.parameter for value in profile.data.monitoring.values]
     words = {

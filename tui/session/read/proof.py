@@ -136,7 +136,7 @@ def _off(parameter: Parameter, raw: int, first: int, second: int) -> int:
 
 
 def _tremble(raws: Sequence[int]) -> int:
-    """By how much a value left the straight way between its neighbours, in raw units, rounded up.
+    """By how much a value left the straight way between its neighbors, in raw units, rounded up.
 
     A value that goes evenly up or down does not tremble.
     """

@@ -27,7 +27,7 @@ PLANNED_AT_ONCE = 60
 """How many parameters are planned at once: planning more would hold up the line's loop."""
 
 
-def neighbours(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
+def neighbors(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
     """The codes by address, parted where no read could go over the gap, and where they get many."""
     function = profile.function(3)
     longest = (function.max_read if function else None) or 1
@@ -90,7 +90,7 @@ class RetryingReader:
     async def ask_many(self, codes: Iterable[str]) -> dict[str, int]:
         """The raw values of any number of parameters, planned a part at a time."""
         found: dict[str, int] = {}
-        for part in neighbours(self.session.profile, dict.fromkeys(codes)):
+        for part in neighbors(self.session.profile, dict.fromkeys(codes)):
             found |= await self.ask_raws(part)
         return found
 

@@ -15,7 +15,7 @@ from tui.drive.settings.writable import is_setting
 from tui.drive.shown import scale_sources
 
 from ..drive import DriveSession
-from .retrying_reader import RetryingReader, neighbours
+from .retrying_reader import RetryingReader, neighbors
 
 ReadProgress = Callable[[int, int], None]
 """Called with how many parameters were asked for, and how many there are."""
@@ -73,7 +73,7 @@ class Upload:
         profile = self.session.profile
         sources = scale_sources(profile)
         first = [code for code in self.left if code in sources]
-        for codes in (first, *neighbours(profile, self.left)):
+        for codes in (first, *neighbors(profile, self.left)):
             for group in self.retrying.reader.groups(codes):
                 await self._ask(group)
             # what the drive refuses is in no group

@@ -17,7 +17,7 @@ from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
 
 from ..drive import DriveSession
-from ..read.retrying_reader import RetryingReader, neighbours
+from ..read.retrying_reader import RetryingReader, neighbors
 from ..read.upload import readable_codes
 
 IDLE_POLL_INTERVAL = 0.1
@@ -97,7 +97,7 @@ class WatchedValues:
         later = RetryingReader(self.session, Priority.BACKGROUND)
         follow = {code for p in profile.parameters for code in factory_sources(p)}
         rest = [*sorted(scale_sources(profile) | follow), *readable_codes(profile)]
-        parts = iter(neighbours(profile, dict.fromkeys(rest)))
+        parts = iter(neighbors(profile, dict.fromkeys(rest)))
         waiting: list[tuple[str, ...]] = []
         while True:
             try:

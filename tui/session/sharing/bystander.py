@@ -1,6 +1,6 @@
 """When a drive may be asked by who only looks on, for hours, without a person before it.
 
-Each request feeds the drive's communication time-out: asked on, the motor of a commander that has
+Each request feeds the drive's communication timeout: asked on, the motor of a commander that has
 died would run for ever.
 """
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 COMMANDER_SILENT = "Not asked: whoever started its motor gives no sign of life."
 UNKNOWN_TIMEOUT_ACTED = 60.0
-"""Seconds of silence after which a drive has acted that does not tell its time-out."""
+"""Seconds of silence after which a drive has acted that does not tell its timeout."""
 GRACE_SHARE = 0.25
-"""Share of its time-out for which a drive is asked on after the last sign of its commander."""
+"""Share of its timeout for which a drive is asked on after the last sign of its commander."""
 ACTED_AFTER = 1.0
-"""Seconds beyond its time-out after which a drive has begun to act."""
+"""Seconds beyond its timeout after which a drive has begun to act."""
 
 
 class Bystander:
@@ -32,8 +32,8 @@ class Bystander:
 
     `sign` tells when whoever started its motor was last heard (monotonic), or None where nobody
     is known to have. The drive is asked once for each such sign, and for a quarter of its
-    time-out after it, until its motor was seen to stand; one that was silent for longer than its
-    time-out has acted: it is looked at once.
+    timeout after it, until its motor was seen to stand; one that was silent for longer than its
+    timeout has acted: it is looked at once.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Bystander:
         return self._now() - (heard if heard is not None else self._asked)
 
     def _timeout(self) -> float | None:
-        """The drive's communication time-out in seconds, 0 for one that has none; None: unknown."""
+        """The drive's communication timeout in seconds, 0 for one that has none; None: unknown."""
         told = self._session.timeout
         if told is None or not told.known:
             return None

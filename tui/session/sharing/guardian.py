@@ -1,7 +1,7 @@
 """Stops the motors of a program that is gone; at work in whichever program owns the line.
 
 The records of starts tell which motors they are. A recorder goes on asking a drive, so its own
-time-out would never stop a motor whose commander died.
+timeout would never stop a motor whose commander died.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 TAKEN_OVER_WITHIN = 2.0
-"""Seconds in which a person may take a motor over, where the drive's own time-out is not known."""
+"""Seconds in which a person may take a motor over, where the drive's own timeout is not known."""
 LONGEST_GRACE = 10.0
 GONE, ABSENT = "is gone", "is not on the line any more"
 """What is told of a program that has ended, and of one that lives: frozen, or gone by itself."""
@@ -123,7 +123,7 @@ class Guardian:
     async def _stop_unless_taken(
         self, record: StartRecord, program: Program, *, takers: bool, left: float
     ) -> None:
-        """Stop a motor, unless an attached person takes it over within the drive's time-out.
+        """Stop a motor, unless an attached person takes it over within the drive's timeout.
 
         With such a person, a program that lives has as long to look after it again.
         """

@@ -1,4 +1,4 @@
-"""The drive's watch over the line: time-out, when it starts, and what the drive does then.
+"""The drive's watch over the line: timeout, when it starts, and what the drive does then.
 
 Sources: ATV21 Modbus manual 6.4 (F803, F603); ATV71 Modbus manual, communication fault
 management, and ATV312 communication variables (ttO, SLL); PX-MODBUS manual 4 (15.07).
@@ -71,7 +71,7 @@ class SilenceWatch:
 
     @property
     def timeout(self) -> float | None:
-        """Time-out in force, in s; None where the watch is off."""
+        """Timeout in force, in s; None where the watch is off."""
         if self._data is None:
             return None
         parameter = self._body.registers.named(self._data.timeout)
@@ -95,7 +95,7 @@ class SilenceWatch:
         return self._spoken and (given or not self._data.needs_write)
 
     def step(self, dt: float) -> Consequence | None:
-        """Let time pass; what has to happen if the time-out has just run out."""
+        """Let time pass; what has to happen if the timeout has just run out."""
         if self._body.forced_local:
             self._silent = -self._resumes_after
             return None

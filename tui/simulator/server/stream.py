@@ -14,10 +14,10 @@ STREAM_PAUSE = 0.005
 
 
 class ByteStream(Protocol):
-    """An opened port that the caller gives: reads with a short time-out, writes, closes."""
+    """An opened port that the caller gives: reads with a short timeout, writes, closes."""
 
     def read(self, size: int, /) -> bytes:
-        """Up to `size` bytes; b"" when the time-out passes."""
+        """Up to `size` bytes; b"" when the timeout passes."""
 
     def write(self, data: bytes, /) -> int | None:
         """Write all bytes."""

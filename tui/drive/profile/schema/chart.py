@@ -14,7 +14,7 @@ StateKind = Literal[
 
 
 class State(Table, frozen=True, kw_only=True):
-    """A state of the drive, recognised in a status word; the first that fits counts."""
+    """A state of the drive, recognized in a status word; the first that fits counts."""
 
     id: Identifier
     name: str

@@ -1,4 +1,4 @@
-"""What a profile says of itself, and how a drive of its family is recognised."""
+"""What a profile says of itself, and how a drive of its family is recognized."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Model(Table, frozen=True, kw_only=True):
 
 
 class Identification(Table, frozen=True, kw_only=True):
-    """How a drive of this family is recognised."""
+    """How a drive of this family is recognized."""
 
     reference_prefixes: list[str] = []
     """Beginnings of object 1 (reference) that belong to this family."""

@@ -116,9 +116,9 @@ class CommunicationFault(Table, frozen=True, kw_only=True):
 
     timeout: str
     other_timeouts: list[str] = []
-    """Time-outs of other ports of the drive; which port the line is on, nobody knows."""
+    """Timeouts of other ports of the drive; which port the line is on, nobody knows."""
     off: int | None = None
-    """Raw time-out at which the watch is off."""
+    """Raw timeout at which the watch is off."""
     reaction: str = ""
     reactions: list[Reaction] = []
     starts: str
