@@ -196,6 +196,7 @@ def test_screens_of_commanding(
         await app.push_screen(monitor)
         await pilot.pause()
         await pilot.press(*keys)
+        await app.workers.wait_for_complete()
         await pilot.pause()
         await pilot.pause()
 
