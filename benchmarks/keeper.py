@@ -36,12 +36,14 @@ from benchmarks.quota import slow_group
 from benchmarks.terminal import Terminal
 from tests.sources import ROOT
 from tui.bus.share.keeping import NO_KEEPER
-from tui.bus.share.place import has_ended, owner_of_lock
+from tui.bus.share.place import DEATHS_WITHIN, MOST_DEATHS, has_ended, owner_of_lock
 
 PROGRAM = (sys.executable, "-m", "tui")
 DRIVES = ("atv71@1", "atv31@2", "atv312@3", "atv71@4", "atv31@5")
 TICKS = os.sysconf("SC_CLK_TCK")
 WARM_UP = 3.0
+APART = DEATHS_WITHIN / (MOST_DEATHS - 1) + 1.0
+"""Seconds between two kills of a keeper: no program starts one that dies more often."""
 SIZE = 80, 24
 
 
@@ -229,7 +231,11 @@ def _measured(bench: Bench, rounds: int, seconds: float) -> dict[str, Any]:
         with no_keeper(bench):
             times["none"].append(seconds_to_read(bench))
     with_keeper = load(bench, seconds)
-    gaps = [gap(bench) for _ in range(rounds)]
+    gaps = []
+    for _ in range(rounds):
+        next_kill = time.monotonic() + APART
+        gaps.append(gap(bench))
+        time.sleep(max(0.0, next_kill - time.monotonic()))
     with no_keeper(bench):
         alone = load(bench, seconds)
     return {
