@@ -105,9 +105,10 @@ class ChaosLine:
 
     def record(self) -> LineRecord:
         """All that the line has seen so far."""
-        told = self._worker.ask()
+        reported = self._worker.ask()
         return LineRecord(
-            [(at, word) for at, word in told["commands"]], [Moment(*one) for one in told["moments"]]
+            [(at, word) for at, word in reported["commands"]],
+            [Moment(*one) for one in reported["moments"]],
         )
 
     def plug(self, *, plugged: bool) -> None:
@@ -219,7 +220,7 @@ class ProgramOnTerminal:
                 self._picture.feed(data)
 
     @property
-    def said(self) -> str:
+    def output(self) -> str:
         """All that it has written to its terminal, and what stands there."""
         return b"".join(self._pieces).decode(errors="replace") + self.picture
 
@@ -304,7 +305,7 @@ class Observer:
             self.lines.append((time.time(), json.loads(text)))
 
     @property
-    def said(self) -> str:
+    def output(self) -> str:
         """What it said on standard error."""
         return self._errors.read_text("utf-8")
 
@@ -334,10 +335,10 @@ def wrong_values(observer: Observer, record: LineRecord) -> list[str]:
     for come, line in list(observer.lines):
         if come > record.moments[-1].at - STEP:
             break  # newer than the record
-        for code, told in (line.get("values") or {}).items():
-            if told["quality"] != "good":
+        for code, reported in (line.get("values") or {}).items():
+            if reported["quality"] != "good":
                 continue
-            device, raw, at = line["device"], told["raw"], _seconds(told["time"])
+            device, raw, at = line["device"], reported["raw"], _seconds(reported["time"])
             truth = record.between(at - FRESH, at + 0.1)
             low = high = CONSTANTS[device].get(code, 0)
             if code == COUNTER and device == 2:
@@ -400,7 +401,7 @@ class Stage:
         try:
             wait_until(lambda: len(observer.good()) > 1, "the observer has values")
         except AssertionError as error:
-            raise AssertionError(f"{error}: {observer.said}{observer.lines[-1:]}") from None
+            raise AssertionError(f"{error}: {observer.output}{observer.lines[-1:]}") from None
 
     def start(self, *arguments: str, module: str = "tui") -> ProgramOnTerminal:
         """Start a program; the LINE takes the place of `LINE`."""
@@ -427,11 +428,11 @@ class Stage:
         wait_until(lambda: self.line.record().started_after(0.0), "the motor runs")
         return program
 
-    def said(self) -> str:
+    def output(self) -> str:
         """What all programs said, with the log and the journal."""
-        texts = [one.said for one in self.programs]
+        texts = [one.output for one in self.programs]
         texts += [one.read_text("utf-8") for one in self.state.glob("*.[lj]*") if one.is_file()]
-        return "\n".join(texts) + (self.observer.said if self.observer else "")
+        return "\n".join(texts) + (self.observer.output if self.observer else "")
 
     def send(self, pid: int, number: signal.Signals) -> None:
         """Send a keeper a signal, if it still lives."""

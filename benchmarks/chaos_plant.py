@@ -183,10 +183,10 @@ class PlantStage(Stage):
                     return pid
         return None
 
-    def said(self) -> str:
+    def output(self) -> str:
         """What all programs said, with the logs and journals of all users."""
         logs = [one.read_text("utf-8", "replace") for one in self.folder.glob("state-*/*.[lj]*")]
-        return "\n".join([super().said(), *logs])
+        return "\n".join([super().output(), *logs])
 
     def end_programs(self) -> bool:
         """End all of them; False if one did not end."""
@@ -348,7 +348,7 @@ class ForeignKeeper(_InBox):
         self._owner.send(signal.SIGINT)
         time.sleep(SHOWN_WITHIN)
         if self._stage.line.record().stop_after(begun) is None and not REPORTED.search(
-            self._victim.said
+            self._victim.output
         ):
             self._outcome.broken.append(f"not shown in {SHOWN_WITHIN} s: no stop can be sent")
         time.sleep(self._chance.uniform(0.0, 4.0))

@@ -202,7 +202,7 @@ class Round:
 
     def _judge_report(self, record: LineRecord) -> None:
         """A motor that turns yet has to be reported somewhere."""
-        if record.turns(time.time()) and not REPORTED.search(self._stage.said()):
+        if record.turns(time.time()) and not REPORTED.search(self._stage.output()):
             self._outcome.unreported = 1
             self._outcome.broken.append("the motor turns, unreported")
 

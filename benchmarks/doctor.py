@@ -185,11 +185,11 @@ def examine(case: Case, folder: Path, seed: int) -> Result:
         )  # fmt: skip
         seconds = time.monotonic() - began
         functions = list(simulation.functions)
-    told = json.loads(done.stdout) if done.stdout else {}
+    reported = json.loads(done.stdout) if done.stdout else {}
     return Result(
         case,
-        told.get("rung", f"status {done.returncode}"),
-        told.get("certainty", ""),
+        reported.get("rung", f"status {done.returncode}"),
+        reported.get("certainty", ""),
         done.returncode,
         seconds,
         len(functions),

@@ -51,8 +51,8 @@ class Faults:
 
     def shares(self) -> Mapping[str, float]:
         """The shares by kind."""
-        told = asdict(self)
-        return {kind: share for kind, share in told.items() if not kind.startswith("late_")}
+        reported = asdict(self)
+        return {kind: share for kind, share in reported.items() if not kind.startswith("late_")}
 
 
 RIGHT = ("good", "late", "duplicated", "noise")
@@ -100,8 +100,8 @@ class FaultyLine:
 
     def close(self) -> dict[str, int]:
         """End the line; returns how often each fault was made."""
-        told, _ = self._process.communicate(timeout=10)
-        counts: dict[str, int] = json.loads(told)
+        reported, _ = self._process.communicate(timeout=10)
+        counts: dict[str, int] = json.loads(reported)
         return counts
 
 
@@ -232,8 +232,8 @@ def _longer(body: bytes) -> bytes:
 
 def main() -> None:
     """Serve the line that the only argument describes."""
-    told = json.loads(sys.argv[1])
-    setting = Setting(**(told | {"faults": Faults(**told["faults"])}))
+    reported = json.loads(sys.argv[1])
+    setting = Setting(**(reported | {"faults": Faults(**reported["faults"])}))
     master, slave = pty.openpty()
     tty.setraw(slave)
     print(json.dumps({"path": os.ttyname(slave)}), flush=True)

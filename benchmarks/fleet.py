@@ -99,10 +99,10 @@ def _state(line: Line, monitors: Mapping[int, Monitor]) -> dict[str, object]:
 
 
 def figures(
-    record: Record, drives: Mapping[int, str], told: dict[str, Any], chosen: int
+    record: Record, drives: Mapping[int, str], reported: dict[str, Any], chosen: int
 ) -> dict[str, Any]:
     """Figures of one stretch of time; the others are all but the drive that is chosen to die."""
-    before, after = told["before"], told["after"]
+    before, after = reported["before"], reported["after"]
     seconds = after["time"] - before["time"]
     inside = [e for e in record.exchanges if before["time"] <= e.began < after["time"]]
     record = Record(record.times, inside)
@@ -334,8 +334,8 @@ def stretch(
         time.sleep(SETTLING)
         if dies:
             wire.kill(chosen)
-        told = worker.ask(seconds=given.seconds)
-        return figures(Record(wire.times, wire.take()), drives, told, chosen)
+        reported = worker.ask(seconds=given.seconds)
+        return figures(Record(wire.times, wire.take()), drives, reported, chosen)
     finally:
         worker.close()
 

@@ -65,8 +65,8 @@ def mbpoll_reads(seconds: float, *where: str) -> int:
     )
     time.sleep(seconds)
     process.send_signal(signal.SIGTERM)
-    told, _ = process.communicate(timeout=10)
-    return len(re.findall(rf"^\[{ADDRESS}\]:", told, re.MULTILINE))
+    reported, _ = process.communicate(timeout=10)
+    return len(re.findall(rf"^\[{ADDRESS}\]:", reported, re.MULTILINE))
 
 
 async def client_reads(port: int, clients: int, seconds: float) -> tuple[int, float]:

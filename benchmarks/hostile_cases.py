@@ -140,7 +140,7 @@ def profile_case(chance: random.Random, folder: Path) -> None:
     path = folder / f"{family}.toml"
     path.write_bytes(mutated(_profile_text(family), chance))
     heads.file_head(path, True, library.packaged_folder())
-    heads.asked_of(path, True, library.packaged_folder())
+    heads.request_prefixes(path, True, library.packaged_folder())
     heads.quick_head(path)
     faults = library.all_faults_of(path)
     try:
@@ -293,7 +293,7 @@ def _read_state(folder: Path, taught: Any) -> None:
 
     no_commands("".join(printable(line, "utf-8") for line in paths.recent_lines()))
     paths.remember_line("sim:atv71")
-    paths.addresses_asked("tcp:x:502")
+    paths.address_text("tcp:x:502")
     paths.remember_addresses("tcp:x:502", "1")
     save_marks("atv71", load_marks("atv71").edited(["ACC"]))
     session = _Session()
@@ -388,8 +388,10 @@ def _understood(request: Request, pdu: bytes) -> None:
 
     match request:
         case Identify():
-            told = Objects().with_more(pdu)
-            identity = identity_from(1, IdentificationObjects(told.conformity, told.objects))
+            reported = Objects().with_more(pdu)
+            identity = identity_from(
+                1, IdentificationObjects(reported.conformity, reported.objects)
+            )
             # whoever shows it, and wherever
             no_commands(f"{identity.vendor}{identity.reference}{identity.version}{identity.name}")
         case Diagnose():

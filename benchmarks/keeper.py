@@ -163,8 +163,8 @@ def load_of(
 def read_line(process: subprocess.Popen[str]) -> bool:
     """Take one line of a watch; True if it has only good values."""
     assert process.stdout is not None
-    told = json.loads(process.stdout.readline())
-    return told["error"] is None and "stale" not in json.dumps(told)
+    reported = json.loads(process.stdout.readline())
+    return reported["error"] is None and "stale" not in json.dumps(reported)
 
 
 def gap(bench: Bench) -> float:

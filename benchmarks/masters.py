@@ -214,8 +214,8 @@ def by_worker(worker: Worker, who: str, spans: str = "blocks", silence: bool = F
         quiet = cell.wire.times.silence if silence else 0.0
         reads = cell.values if spans == "values" else cell.blocks
         cell.wire.take()
-        told = worker.ask(**cell.job(who=who, spans=reads, silence=quiet))
-        return Record(cell.wire.times, cell.wire.take(), told["ends"])
+        reported = worker.ask(**cell.job(who=who, spans=reads, silence=quiet))
+        return Record(cell.wire.times, cell.wire.take(), reported["ends"])
 
     return run
 

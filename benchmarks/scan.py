@@ -124,9 +124,9 @@ def command(wire: WireLine, last: int) -> dict[str, Any]:
     shown: dict[int, float] = {}
     assert process.stdout is not None
     for line in process.stdout:
-        told = json.loads(line)
-        if told["event"] == "hit":
-            shown[told["device"]] = time.monotonic()
+        reported = json.loads(line)
+        if reported["event"] == "hit":
+            shown[reported["device"]] = time.monotonic()
     process.wait()
     seconds = time.monotonic() - began
     first: dict[int, float] = {}
@@ -154,9 +154,9 @@ def show(console: Console, rows: Sequence[dict[str, Any]]) -> None:
     console.print(table)
 
 
-def _to_limit(told: dict[str, Any], which: str = "") -> str:
+def _to_limit(reported: dict[str, Any], which: str = "") -> str:
     """Seconds, those that the line allows, and how the two compare."""
-    seconds, least = told[f"{which}seconds"], told[f"{which}limit"]
+    seconds, least = reported[f"{which}seconds"], reported[f"{which}limit"]
     return f"{seconds:.1f} s, limit {least:.1f} s ({seconds / least:.3f})"
 
 
@@ -178,20 +178,26 @@ def main() -> None:
             for _ in range(given.rounds)
         ]
         show(console, rows)
-        figures["command"] = told = command(wire, given.addresses)
-        late = ", ".join(f"{one} {1000 * s:.0f} ms" for one, s in told["hit_shown_after"].items())
+        figures["command"] = reported = command(wire, given.addresses)
+        late = ", ".join(
+            f"{one} {1000 * s:.0f} ms" for one, s in reported["hit_shown_after"].items()
+        )
         console.print(
-            f"The command, with 1.5 s of listening: {told['seconds']:.2f} s (aim {AIM_ONE:g} s),"
-            f" {told['found']} of {len(IN_COMMAND)} found; from the first answer to the line that"
+            f"The command, with 1.5 s of listening: {reported['seconds']:.2f} s (aim {AIM_ONE:g}"
+            " s),"
+            f" {reported['found']} of {len(IN_COMMAND)} found; from the first answer to the line"
+            " that"
             f" tells of it: {late}."
         )
         if given.all:
-            figures["all"] = told = all_settings(wire, addresses)
+            figures["all"] = reported = all_settings(wire, addresses)
             console.print(
-                f"The {told['likely']} likely settings: {_to_limit(told, 'likely_')} (aim"
-                f" {AIM_ALL:g} s). All {told['settings']}: {_to_limit(told)}; in {AIM_ALL:g} s"
-                f" {told['within_60_s']} of them, by the limit {told['within_60_s_by_the_limit']}."
-                f" Left then: {', '.join(told['not_within_60_s'])}."
+                f"The {reported['likely']} likely settings: {_to_limit(reported, 'likely_')} (aim"
+                f" {AIM_ALL:g} s). All {reported['settings']}: {_to_limit(reported)}; in"
+                f" {AIM_ALL:g} s"
+                f" {reported['within_60_s']} of them, by the limit"
+                f" {reported['within_60_s_by_the_limit']}."
+                f" Left then: {', '.join(reported['not_within_60_s'])}."
             )
     finally:
         wire.close()

@@ -69,8 +69,8 @@ def program() -> None:
     attached = line.facts.voice is not None and bool(line.facts.others)
     print(json.dumps({"attached": attached}), flush=True)
     monitors: list[Monitor] = []
-    for told in sys.stdin:
-        job = json.loads(told)
+    for reported in sys.stdin:
+        job = json.loads(reported)
         answer: dict[str, Any] = {}
         match job["do"]:
             case "reads":
@@ -134,10 +134,10 @@ class Programs:
         self.all: list[Worker] = []
         for number in range(count):
             worker = Worker(CODE)
-            told = worker.ask(
+            reported = worker.ask(
                 text=wire.text, folder=self._folder.name, name=f"p{number}", drives=drives
             )
-            if told["attached"] != bool(number):
+            if reported["attached"] != bool(number):
                 raise RuntimeError("the programs of the benchmark do not share their line")
             self.all.append(worker)
 
@@ -159,8 +159,8 @@ def one_request(wire: WireLine, count: int) -> dict[str, float]:
         taken: dict[str, list[float]] = {"owner": [], "attached": []}
         for _ in range(10):  # in turns: what else the machine does hits both
             for name, worker in (("owner", owner), ("attached", client)):
-                told = worker.ask(do="reads", device=1, count=count // 10)
-                taken[name] += told["seconds"]
+                reported = worker.ask(do="reads", device=1, count=count // 10)
+                taken[name] += reported["seconds"]
         wire.take()
     finally:
         programs.close()

@@ -40,7 +40,7 @@ from benchmarks.faulty_line import (
     answered_right,
     value_of,
 )
-from benchmarks.truth import FAST, SCRATCH, WIDE, asked, right
+from benchmarks.truth import FAST, SCRATCH, WIDE, requested, right
 from tui.bus.api import Priority
 from tui.bus.errors import LineError
 from tui.bus.line import Line, Timing
@@ -75,8 +75,8 @@ def place_in(folder: str, path: str) -> SharePlace:
 
 def program() -> None:
     """Do what the first line of the input tells until the input ends; a count each second."""
-    told = json.loads(sys.stdin.readline())
-    asyncio.run(_Guest(told["path"], told["folder"], told["number"]).run())
+    reported = json.loads(sys.stdin.readline())
+    asyncio.run(_Guest(reported["path"], reported["folder"], reported["number"]).run())
 
 
 class _Guest:
@@ -141,15 +141,17 @@ class _Guest:
             return
         self.counts["writes"] += 1
         with suppress(LineError):
-            held = (await asked(self._line, device, address, 2)).words
+            held = (await requested(self._line, device, address, 2)).words
             self._note("written", device, address, list(held), values)
 
     def _note(self, what: str, device: int, address: int, got: list[int], due: list[int]) -> None:
         self.counts["good" if got == due else "wrong"] += 1
         if got != due:
             whose = [(one, _address_of(one, got[0])) for one in DEVICES]
-            told = f"{self._me.name} {what} {device}/{address}: {got}, not {due}; may be {whose}"
-            print(told, file=sys.stderr, flush=True)
+            reported = (
+                f"{self._me.name} {what} {device}/{address}: {got}, not {due}; may be {whose}"
+            )
+            print(reported, file=sys.stderr, flush=True)
 
     async def _stop(self, device: int) -> None:
         self._line.facts.give_stop([device], "a soak")
@@ -177,7 +179,7 @@ class _Guests:
     path: str
     folder: str
     there: list[subprocess.Popen[str]] = field(default_factory=list)
-    told: dict[int, dict[str, int]] = field(default_factory=dict)
+    reported: dict[int, dict[str, int]] = field(default_factory=dict)
     begun: int = 0
 
     def begin(self) -> None:
@@ -202,7 +204,7 @@ class _Guests:
         assert process.stdout is not None
         for line in process.stdout:
             with suppress(ValueError):  # a line that a kill cut off
-                self.told[process.pid] = json.loads(line)
+                self.reported[process.pid] = json.loads(line)
 
     def end(self, process: subprocess.Popen[str], blow: str) -> None:
         """Kill one, or let it end."""
@@ -255,7 +257,7 @@ def soak(minutes: float, seed: int, faults: Faults = FAULTS) -> dict[str, object
         left = [path.name for path in Path(folder).rglob("*.s*")]
     on_line = faulty.close()
     correct = answered_right(on_line)
-    sums = sum((Counter(told) for told in guests.told.values()), Counter[str]())
+    sums = sum((Counter(reported) for reported in guests.reported.values()), Counter[str]())
     return {
         **{name: sums[name] for name in ("good", "wrong", "errors", "writes", "stops")},
         "good, % of correct replies": round(100 * sums["good"] / max(1, correct), 1),

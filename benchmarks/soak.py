@@ -191,9 +191,9 @@ class Watched:
 
     def figures(self) -> dict[str, Any]:
         """All counts, with the line's own."""
-        told = asdict(self.tally)
-        recoveries = told.pop("recoveries")
-        return told | {
+        reported = asdict(self.tally)
+        recoveries = reported.pop("recoveries")
+        return reported | {
             "line": self.served.name,
             "recoveries": len(recoveries),
             "recovery_median_s": median(recoveries) if recoveries else None,
@@ -313,8 +313,8 @@ def show(console: Console, found: Mapping[str, Any]) -> None:
     console.print(table)
     for one in found["lines"]:
         for wrong in one["wrong_ones"]:
-            told = {key: value for key, value in wrong.items() if key != "frames"}
-            console.print(f"wrong on {one['line']}: {told}", *wrong["frames"], sep="\n    ")
+            reported = {key: value for key, value in wrong.items() if key != "frames"}
+            console.print(f"wrong on {one['line']}: {reported}", *wrong["frames"], sep="\n    ")
     show_memory(console, found)
 
 
@@ -323,8 +323,8 @@ def show_memory(console: Console, found: Mapping[str, Any]) -> None:
     samples = found["samples"]
     first, last = samples[0], samples[-1]
     if found["growth"] is not None:
-        told = " ".join(f"{one['memory'] / 1e6:.1f}" for one in samples)
-        console.print(f"Memory, MB, every {samples[1]['second']:.0f} s: {told}")
+        reported = " ".join(f"{one['memory'] / 1e6:.1f}" for one in samples)
+        console.print(f"Memory, MB, every {samples[1]['second']:.0f} s: {reported}")
         console.print(f"Memory of the last third over the middle third: {found['growth']:.4f}.")
     console.print(
         f"Threads {first['threads']} to {last['threads']},"
@@ -358,7 +358,7 @@ def main() -> None:
         return
     result |= {
         "checked": {str(device): len(own) for device, own in prepared.values.items()},
-        "faults": soak_peers.faults_told(),
+        "faults": soak_peers.fault_report(),
         "lines": [watched.figures() for watched in lines],
         "samples": [asdict(one) for one in samples],
         "growth": growth(samples),

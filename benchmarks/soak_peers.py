@@ -172,8 +172,8 @@ class _Server:
     def end(self) -> dict[str, int]:
         """End it; how many answers it gave, how many of them late and how many twice."""
         self._process.terminate()
-        told, _ = self._process.communicate(timeout=10)
-        return dict(zip(("answers", "late", "twice"), map(int, told.split()), strict=False))
+        reported, _ = self._process.communicate(timeout=10)
+        return dict(zip(("answers", "late", "twice"), map(int, reported.split()), strict=False))
 
 
 def cable() -> None:
@@ -195,6 +195,6 @@ def cable() -> None:
                     os.write(other, os.read(one, 4096))
 
 
-def faults_told() -> dict[str, object]:
+def fault_report() -> dict[str, object]:
     """What the peers were set to do wrong."""
     return {"simulated": asdict(FAULTS), "libmodbus": {"every": EVERY, "longest_s": LONGEST}}

@@ -377,7 +377,7 @@ def main() -> None:
         f"stop all, last frame of the first wave / {options.drives} exchanges:"
         f" median {median(ratios):.2f}, worst {ratios[-1]:.2f}, drives without a frame: {missing}"
     )
-    told = [
+    reported = [
         {
             "case": one.name,
             "busy": one.busy,
@@ -392,7 +392,7 @@ def main() -> None:
     everything = {"ratios": ratios, "missing": missing}
     print(
         json.dumps(
-            {"benchmark": "stop", "drives": options.drives, "cases": told, "all": everything}
+            {"benchmark": "stop", "drives": options.drives, "cases": reported, "all": everything}
         )
     )
 

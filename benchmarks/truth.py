@@ -175,7 +175,7 @@ async def ours(path: str, job: Job, place: SharePlace | None = None) -> Tally:
             tally.cancelled += 1
             return
         with suppress(LineError):
-            answer = (await asked(line, device, address, words)).words
+            answer = (await requested(line, device, address, words)).words
         tally.note(answer, right(device, address, words))
 
     async def write(device: int, at: int) -> None:
@@ -203,7 +203,7 @@ async def ours(path: str, job: Job, place: SharePlace | None = None) -> Tally:
     return tally
 
 
-async def asked(line: Line, device: int, address: int, words: int) -> Reply:
+async def requested(line: Line, device: int, address: int, words: int) -> Reply:
     """A read that waits while the line leaves the device alone, as monitoring does."""
     while True:
         try:
@@ -287,8 +287,8 @@ CONTESTANTS: dict[str, Callable[[str, Job], Tally]] = {
 
 def run_job() -> None:
     """The process of one contestant: a job comes as the argument, its tally goes out as JSON."""
-    told = json.loads(sys.argv[1])
-    job = Job(**(told | {"faults": Faults(**told["faults"])}))
+    reported = json.loads(sys.argv[1])
+    job = Job(**(reported | {"faults": Faults(**reported["faults"])}))
     line = FaultyLine(job.setting())
     tally = CONTESTANTS[job.contestant](line.path, job)
     faults = line.close()
@@ -299,7 +299,7 @@ def run(jobs: Sequence[Job], processes: int) -> list[dict[str, object]]:
     """Run jobs, so many at a time; returns their tallies in order."""
     code = "from benchmarks.truth import run_job; run_job()"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    told: list[dict[str, object]] = []
+    reported: list[dict[str, object]] = []
     for first in range(0, len(jobs), processes):
         started = [
             subprocess.Popen(
@@ -316,10 +316,10 @@ def run(jobs: Sequence[Job], processes: int) -> list[dict[str, object]]:
             out, err = process.communicate()
             if process.returncode:
                 last = err.strip().splitlines()[-1] if err.strip() else "it ended by itself"
-                told.append({"missing": last})
+                reported.append({"missing": last})
             else:
-                told.append(json.loads(out.splitlines()[-1]))
-    return told
+                reported.append(json.loads(out.splitlines()[-1]))
+    return reported
 
 
 def joined(name: str, parts: Sequence[dict[str, object]]) -> dict[str, object]:

@@ -194,9 +194,11 @@ class WireLine:
     def set_up(self, profiles: Mapping[int, str], timing: LineTiming) -> None:
         """Serve drives of these profiles, by address, in place of those served so far."""
         drives = list(profiles.items())
-        told = self._worker.ask(do="serve", drives=drives, baud=timing.baud, format=timing.format)
-        turnarounds = {int(address): wait for address, wait in told["turnarounds"].items()}
-        self.path, self.timing = told["path"], timing
+        reported = self._worker.ask(
+            do="serve", drives=drives, baud=timing.baud, format=timing.format
+        )
+        turnarounds = {int(address): wait for address, wait in reported["turnarounds"].items()}
+        self.path, self.timing = reported["path"], timing
         self.times = WireTimes(timing.character, timing.silence, turnarounds)
 
     @property
@@ -206,8 +208,8 @@ class WireLine:
 
     def take(self) -> list[Exchange]:
         """The exchanges since the last time."""
-        told = self._worker.ask(do="take")["exchanges"]
-        return [Exchange(began, bytes.fromhex(r), end, size) for began, r, end, size in told]
+        reported = self._worker.ask(do="take")["exchanges"]
+        return [Exchange(began, bytes.fromhex(r), end, size) for began, r, end, size in reported]
 
     def kill(self, address: int) -> None:
         """Switch a drive off."""

@@ -230,18 +230,18 @@ def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
 def last_run() -> dict[str, Planted]:
     """What became of each defect when it was planted last, by name."""
     try:
-        told = json.loads(LAST_RUN.read_text("utf-8"))
+        reported = json.loads(LAST_RUN.read_text("utf-8"))
     except (OSError, ValueError):
         return {}
-    return {name: Planted(**one) for name, one in told.items()}
+    return {name: Planted(**one) for name, one in reported.items()}
 
 
 def remember(result: Planted) -> None:
     """Keep a result beside those of the defects that were planted before."""
     names = {defect.name for defect in DEFECTS}
     kept = {**last_run(), result.name: result}
-    told = {name: asdict(one) for name, one in kept.items() if name in names}
-    LAST_RUN.write_text(json.dumps(told, indent=1), "utf-8")
+    reported = {name: asdict(one) for name, one in kept.items() if name in names}
+    LAST_RUN.write_text(json.dumps(reported, indent=1), "utf-8")
 
 
 def table(results: dict[str, Planted]) -> str:
@@ -283,14 +283,14 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="name the defects, plant nothing")
     parser.add_argument("--table", action="store_true", help="the last results as Markdown")
     parser.add_argument("--jobs", type=int, default=2, choices=(1, 2), help="copies at work")
-    asked = parser.parse_args()
-    if asked.table:
+    requested = parser.parse_args()
+    if requested.table:
         print(table(last_run()))
         return 0
-    defects = _chosen(asked.names)
-    if asked.list:
+    defects = _chosen(requested.names)
+    if requested.list:
         return _listed(defects)
-    results = plant_all(defects, min(asked.jobs, len(defects)))
+    results = plant_all(defects, min(requested.jobs, len(defects)))
     missed = [one for one in results if not one.noticed]
     print(f"\n{'defect':42} {'s':>6}  noticed by")
     for one in results:

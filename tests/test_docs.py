@@ -172,7 +172,7 @@ def test_the_documents_name_what_is_there() -> None:
     for path in DOCUMENTS:
         text = path.read_text("utf-8")
         found[path.relative_to(ROOT).as_posix()] = [*faults(text), *lost_links(path, text)]
-    assert {name: told for name, told in found.items() if told} == {}
+    assert {name: reported for name, reported in found.items() if reported} == {}
 
 
 def test_the_check_sees_what_it_is_for() -> None:
@@ -205,8 +205,8 @@ def test_the_check_sees_what_it_is_for() -> None:
 def test_a_link_that_leads_nowhere_is_seen(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("# A head, and more\n", "utf-8")
-    told = "[a](page.md) [b](page.md#a-head-and-more) [c](https://example.org/x)"
-    assert list(lost_links(page, told)) == []
+    reported = "[a](page.md) [b](page.md#a-head-and-more) [c](https://example.org/x)"
+    assert list(lost_links(page, reported)) == []
     assert list(lost_links(page, "[a](other.md) [b](page.md#no) [c](#no)")) == [
         "other.md",
         "page.md#no",
@@ -230,8 +230,8 @@ def rooms_that_know_a_family(package: Path) -> set[str]:
 def test_every_room_that_knows_a_family_is_told() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     section = text.partition(f"\n## {HOLDS_FAMILIES}")[2].partition("\n## ")[0]
-    told = {span for span in SPAN.findall(section) if span.startswith("tui")}
-    assert rooms_that_know_a_family(ROOT / "tui") - told == set()
+    reported = {span for span in SPAN.findall(section) if span.startswith("tui")}
+    assert rooms_that_know_a_family(ROOT / "tui") - reported == set()
 
 
 def test_a_room_that_knows_a_family_is_seen(tmp_path: Path) -> None:

@@ -57,20 +57,20 @@ def metadata(folder: Path, address: str = "") -> Message:
 
 
 def test_a_package_page_has_no_picture_and_no_link_that_leads_nowhere(tmp_path: Path) -> None:
-    told = metadata(tmp_path)
-    page = told.get_payload()
+    reported = metadata(tmp_path)
+    page = reported.get_payload()
     assert isinstance(page, str)
     assert "# Drive Panel" in page
     assert re.findall(r"\]\((?!https://)[^)]*\)", page) == []
     assert "![" not in page
-    assert told.get_all("Project-URL") is None
+    assert reported.get_all("Project-URL") is None
 
 
 def test_with_an_address_pictures_and_links_lead_to_their_version(tmp_path: Path) -> None:
-    told = metadata(tmp_path, ADDRESS)
-    page = told.get_payload()
+    reported = metadata(tmp_path, ADDRESS)
+    page = reported.get_payload()
     assert isinstance(page, str)
-    version = told["Version"]
+    version = reported["Version"]
     assert f"]({ADDRESS}/raw/v{version}/screenshots/monitor-80x24.svg)" in page
     assert f"]({ADDRESS}/blob/v{version}/docs/lines.md)" in page
     led = re.findall(r"\]\(([^)]*)\)", page)
@@ -79,7 +79,7 @@ def test_with_an_address_pictures_and_links_lead_to_their_version(tmp_path: Path
     paths = [target.partition(f"/v{version}/")[2] for target in led if target.startswith(ADDRESS)]
     assert paths
     assert [path for path in paths if not (ROOT / path.partition("#")[0]).exists()] == []
-    urls = dict(one.split(", ") for one in told.get_all("Project-URL") or [])
+    urls = dict(one.split(", ") for one in reported.get_all("Project-URL") or [])
     assert urls == addresses(ADDRESS)
     assert {"Homepage", "Documentation", "Changelog", "Issues", "Source"} <= urls.keys()
 

@@ -86,7 +86,7 @@ def test_the_architecture_tells_what_is_past_its_size_and_how_far() -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "told"),
+    ("source", "reported"),
     [
         ("x = 1\n" * (MOST_LINES + 1), ["m.py: 311, and 310 at most"]),
         ("x = 1\n" * MOST_LINES, []),
@@ -101,5 +101,5 @@ def test_the_architecture_tells_what_is_past_its_size_and_how_far() -> None:
     ],
     ids=["long", "just short enough", "many methods", "private methods"],
 )
-def test_what_is_too_large_is_told(source: str, told: list[str]) -> None:
-    assert too_large(list(sizes(source, ast.parse(source), "m.py"))) == told
+def test_what_is_too_large_is_told(source: str, reported: list[str]) -> None:
+    assert too_large(list(sizes(source, ast.parse(source), "m.py"))) == reported

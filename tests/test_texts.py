@@ -100,7 +100,7 @@ CHECKS: dict[int, Check] = {
         "one_colour",
     ),
     19: Check(
-        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), 1322, "told_by"
+        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), 300, "told_by"
     ),
     20: Check("N", of(r"^_?of_", 0), 64, "of_drives"),
     21: Check(

@@ -121,7 +121,7 @@ class Peer:
         if self._thread is not None:
             self._thread.join()
 
-    def asked(self, device: int) -> list[bytes]:
+    def requested(self, device: int) -> list[bytes]:
         """The requests to one device so far."""
         return [request for request in self.requests if request[0] == device]
 

@@ -33,8 +33,8 @@ async def main(port: str, folder: str, name: str, late: str) -> None:
     await asyncio.to_thread(line.open, wait=20)
     print("ready", flush=True)
     works: list[asyncio.Task[object]] = []
-    while told := (await asyncio.to_thread(sys.stdin.readline)).split():
-        match told:
+    while reported := (await asyncio.to_thread(sys.stdin.readline)).split():
+        match reported:
             case ["read", register]:
                 await line.read(1, int(register))
             case ["ask", register]:
@@ -43,7 +43,7 @@ async def main(port: str, folder: str, name: str, late: str) -> None:
                 works.append(asyncio.create_task(line.write(1, int(register), [int(value)])))
             case ["claim", device]:
                 line.facts.claim(int(device))
-        print("did", *told, flush=True)
+        print("did", *reported, flush=True)
     line.close()
 
 

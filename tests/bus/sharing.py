@@ -128,8 +128,8 @@ class OtherProgram:
     def hear(self, wanted: str) -> None:
         """Wait for a line that it prints."""
         assert self.process.stdout is not None
-        said = self.process.stdout.readline()
-        assert said.startswith(wanted), said
+        output = self.process.stdout.readline()
+        assert output.startswith(wanted), output
 
     def tell(self, text: str) -> None:
         """Have it do something, and wait until it did, or for a write began to."""

@@ -353,9 +353,9 @@ async def test_a_slow_answer_lets_others_go_on_and_the_words_are_those_of_the_re
     line: FakeLine,
 ) -> None:
     line.delay(THERE, 0.05)
-    asked = asyncio.ensure_future(line.read(THERE, 100))
+    requested = asyncio.ensure_future(line.read(THERE, 100))
     await asyncio.sleep(0)
     assert line.requests == [Read(THERE, 100, 1)]
     line.devices[THERE].words[100] = 1
-    assert not asked.done()
-    assert (await asked).words == (100,)
+    assert not requested.done()
+    assert (await requested).words == (100,)

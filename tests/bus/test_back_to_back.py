@@ -29,7 +29,7 @@ class Bench:
             self.come("panel", Priority.POLL)
 
     def come(self, program: str, priority: Priority, at: float = 0.0) -> None:
-        self.queue.put(Job(Read(1, 1, 1), priority, CAUTIOUS, program=program, asked=at))
+        self.queue.put(Job(Read(1, 1, 1), priority, CAUTIOUS, program=program, requested=at))
 
     def work(self) -> float | None:
         """Send what may be sent; returns when the next may, if nothing was."""

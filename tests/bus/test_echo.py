@@ -39,7 +39,7 @@ async def test_echo_alone_is_no_answer(after: str, open_line: OpenLine) -> None:
             await line.broadcast(5, [7], limits=WIDE)
         with pytest.raises(NoAnswer, match="echo"):
             await line.write(1, 5, [7])
-        writes = [request for request in peer.asked(1) if request[1] == 6]
+        writes = [request for request in peer.requested(1) if request[1] == 6]
         assert len(writes) == 1
 
 

@@ -157,7 +157,7 @@ async def test_wrong_reply_is_thrown_away(case: str, open_line: OpenLine) -> Non
         }
         with pytest.raises(WrongReply) as caught:
             await calls[function]()
-        assert "something else than asked" in str(caught.value)
+        assert "unexpected reply" in str(caught.value)
         assert line.counters.wrong == 1
 
 

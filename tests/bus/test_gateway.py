@@ -19,8 +19,8 @@ from tui.bus.gateway.pdu import (
     Unanswerable,
     WriteAsked,
     exception_pdu,
-    gateway_asked,
     identified_pdu,
+    parse_request,
     words_pdu,
     written_pdu,
 )
@@ -30,16 +30,16 @@ from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 
 
 def test_what_each_function_asks() -> None:
-    assert gateway_asked(bytes.fromhex("03 0C81 0002")) == ReadAsked(3, 3201, 2)
-    assert gateway_asked(bytes.fromhex("04 0000 007D")) == ReadAsked(4, 0, 125)
-    assert gateway_asked(bytes.fromhex("06 2135 0007")) == WriteAsked(6, 8501, (7,))
-    many = gateway_asked(bytes.fromhex("10 2135 0002 04 000F 01F4"))
+    assert parse_request(bytes.fromhex("03 0C81 0002")) == ReadAsked(3, 3201, 2)
+    assert parse_request(bytes.fromhex("04 0000 007D")) == ReadAsked(4, 0, 125)
+    assert parse_request(bytes.fromhex("06 2135 0007")) == WriteAsked(6, 8501, (7,))
+    many = parse_request(bytes.fromhex("10 2135 0002 04 000F 01F4"))
     assert many == WriteAsked(16, 8501, (15, 500))
     assert isinstance(many, WriteAsked)
     assert many.words == {8501: 15, 8502: 500}
-    both = gateway_asked(bytes.fromhex("17 0C81 0001 2135 0001 02 0007"))
+    both = parse_request(bytes.fromhex("17 0C81 0001 2135 0001 02 0007"))
     assert both == WriteAsked(23, 8501, (7,), 3201, 1)
-    assert gateway_asked(bytes.fromhex("2B 0E 01 00")) == IdentifyAsked(1, 0)
+    assert parse_request(bytes.fromhex("2B 0E 01 00")) == IdentifyAsked(1, 0)
 
 
 @pytest.mark.parametrize(
@@ -64,14 +64,14 @@ def test_what_each_function_asks() -> None:
 )
 def test_what_is_not_exactly_a_request_is_refused(pdu: str, code: int) -> None:
     with pytest.raises(Unanswerable) as refused:
-        gateway_asked(bytes.fromhex(pdu))
+        parse_request(bytes.fromhex(pdu))
     assert refused.value.code == code
 
 
 @given(st.binary(min_size=1, max_size=253))
 def test_no_bytes_break_it(pdu: bytes) -> None:
     with suppress(Unanswerable):
-        gateway_asked(pdu)
+        parse_request(pdu)
 
 
 def test_answers_as_bytes() -> None:
@@ -94,7 +94,7 @@ def test_an_identification_that_is_too_long_goes_on_at_its_next_object() -> None
 # The server
 
 
-async def _asked(writer: asyncio.StreamWriter, transaction: int, unit: int, pdu: bytes) -> None:
+async def _requested(writer: asyncio.StreamWriter, transaction: int, unit: int, pdu: bytes) -> None:
     writer.write(HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu)
     await writer.drain()
 
@@ -116,8 +116,8 @@ async def test_requests_that_pile_up_get_the_answers_of_their_own_transactions()
     gateway = TcpGateway(answer)
     reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
     read = struct.pack(">BHH", 3, 0, 1)
-    await _asked(writer, 7, 1, read)
-    await _asked(writer, 8, 2, read)
+    await _requested(writer, 7, 1, read)
+    await _requested(writer, 8, 2, read)
     await asyncio.sleep(0.05)
     free.set()
     assert await _answer(reader) == (7, 1, bytes([3, 2, 0, 1]))
@@ -138,9 +138,9 @@ async def test_a_write_waits_for_no_read_before_it() -> None:
 
     gateway = TcpGateway(answer)
     reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
-    await _asked(writer, 1, 1, struct.pack(">BHH", 3, 0, 1))
+    await _requested(writer, 1, 1, struct.pack(">BHH", 3, 0, 1))
     stop = struct.pack(">BHH", 6, 8501, 7)
-    await _asked(writer, 2, 1, stop)
+    await _requested(writer, 2, 1, stop)
     assert await asyncio.wait_for(_answer(reader), 30) == (2, 1, stop)
     free.set()
     assert (await _answer(reader))[0] == 1
@@ -163,7 +163,7 @@ async def test_a_write_that_does_not_wait_for_its_turn_goes_past_those_before_it
     reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
     write = struct.pack(">BHH", 6, 8501, 7)
     for number in (1, 2, 3):
-        await _asked(writer, number, number, write)
+        await _requested(writer, number, number, write)
     assert (await asyncio.wait_for(_answer(reader), 30))[0] == 3
     free.set()
     assert [(await _answer(reader))[0] for _ in range(2)] == [1, 2]
@@ -183,9 +183,9 @@ async def test_reads_that_pile_up_keep_no_write_in_the_socket() -> None:
     gateway = TcpGateway(answer)
     reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
     for number in range(MOST_AT_ONCE + 2):
-        await _asked(writer, number, 1, bytes([3, 0, 0, 0, 1]))
+        await _requested(writer, number, 1, bytes([3, 0, 0, 0, 1]))
     stop = struct.pack(">BHH", 6, 8501, 7)
-    await _asked(writer, 999, 1, stop)
+    await _requested(writer, 999, 1, stop)
     answers = [await asyncio.wait_for(_answer(reader), 30) for _ in range(3)]
     assert [pdu for number, _, pdu in answers if number != 999] == [bytes([0x83, 6])] * 2
     assert (999, 1, stop) in answers
@@ -210,7 +210,7 @@ async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> No
     gateway = TcpGateway(answer, lambda _: gone.set())
     _, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
     for word in (15, 7):
-        await _asked(writer, word, 1, struct.pack(">BHH", 6, 8501, word))
+        await _requested(writer, word, 1, struct.pack(">BHH", 6, 8501, word))
     writer.close()
     await asyncio.wait_for(both.wait(), 30)
     assert [pdu[-1] for pdu in done] == [15, 7]
@@ -233,7 +233,7 @@ async def test_what_waited_while_the_loop_stood_still_is_told_apart() -> None:
         now = moment
         if moment != 104.0:
             awake.look()
-        await _asked(writer, 1, 1, struct.pack(">BHH", 6, 8501, 15))
+        await _requested(writer, 1, 1, struct.pack(">BHH", 6, 8501, 15))
         await _answer(reader)
     assert stale == [False, True, True, False]
     writer.close()
@@ -253,11 +253,11 @@ async def test_one_client_that_waits_holds_up_no_other() -> None:
     gateway = TcpGateway(answer, lambda client: gone.append(client.peer))
     place = await gateway.listen("127.0.0.1", 0)
     _, stuck = await asyncio.open_connection(*place)
-    await _asked(stuck, 1, 1, bytes([3, 0, 0, 0, 1]))
+    await _requested(stuck, 1, 1, bytes([3, 0, 0, 0, 1]))
     reader, writer = await asyncio.open_connection(*place)
-    await _asked(writer, 2, 2, bytes([3, 0, 0, 0, 1]))
+    await _requested(writer, 2, 2, bytes([3, 0, 0, 0, 1]))
     assert await _answer(reader) == (2, 2, bytes([0x83, 4]))
-    await _asked(writer, 3, 3, bytes([3, 0, 0, 0, 1]))
+    await _requested(writer, 3, 3, bytes([3, 0, 0, 0, 1]))
     assert await _answer(reader) == (3, 3, bytes([3, 2, 0, 3]))
     writer.write(b"GET / HTTP/1.1\r\n\r\n")
     assert await reader.read() == b""
@@ -284,13 +284,13 @@ async def test_who_has_long_asked_nothing_makes_room_for_a_further_client(
     clients = [await asyncio.open_connection(*place) for _ in range(3)]
     for number, (reader, writer) in enumerate(clients, 1):
         # the first waits for its answer: it is not idle, however long ago it asked
-        await _asked(writer, number, number, bytes([3, 0, 0, 0, 1]))
+        await _requested(writer, number, number, bytes([3, 0, 0, 0, 1]))
         if number > 1:
             await _answer(reader)
     for number in (4, 5):
         reader, writer = await asyncio.open_connection(*place)
         clients.append((reader, writer))
-        await _asked(writer, number, number, bytes([6, 0x21, 0x35, 0, 7]))
+        await _requested(writer, number, number, bytes([6, 0x21, 0x35, 0, 7]))
         assert await _answer(reader) == (number, number, bytes([6, 0x21, 0x35, 0, 7]))
     names = [peer_text(writer.get_extra_info("sockname")) for _, writer in clients]
     assert gone == names[1:3], "in the order of their last requests, and not the one that waits"
@@ -315,7 +315,7 @@ async def test_no_number_of_connections_from_elsewhere_keeps_a_client_out(
 
     async def client(host: str, function: int) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
         made = await asyncio.open_connection(*place, local_addr=(host, 0))
-        await _asked(made[1], 1, 1, bytes([function, 0, 0, 0, 1]))
+        await _requested(made[1], 1, 1, bytes([function, 0, 0, 0, 1]))
         await asyncio.sleep(0.05)
         return made
 
@@ -352,11 +352,11 @@ async def test_connections_that_all_wait_for_writes_keep_no_client_out(
     clients = []
     for number in range(4):
         clients.append(await asyncio.open_connection(*place, local_addr=("127.0.0.2", 0)))
-        await _asked(clients[-1][1], 1, 1, bytes([6, 0, 0, 0, number]))
+        await _requested(clients[-1][1], 1, 1, bytes([6, 0, 0, 0, number]))
         await asyncio.sleep(0.05)
     assert [await reader.read() for reader, _ in clients[:2]] == [b"", b""]
     reader, writer = await asyncio.open_connection(*place, local_addr=("127.0.0.3", 0))
-    await _asked(writer, 7, 1, bytes([6, 0, 0, 0, 9]))
+    await _requested(writer, 7, 1, bytes([6, 0, 0, 0, 9]))
     assert (await _answer(reader))[0] == 7
     go_on.set()
     assert (await _answer(clients[3][0]))[0] == 1
@@ -372,22 +372,22 @@ async def test_answers_for_who_has_gone_are_dropped_without_a_word(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """A client that was killed left as many complaints as requests in the log of a service."""
-    gone, asked, go_on = asyncio.Event(), asyncio.Event(), asyncio.Event()
+    gone, requested, go_on = asyncio.Event(), asyncio.Event(), asyncio.Event()
     count = 0
 
     async def answer(request: TcpRequest) -> bytes:
         nonlocal count
         count += 1
         if count == 20:
-            asked.set()
+            requested.set()
         await go_on.wait()
         return request.pdu
 
     gateway = TcpGateway(answer, lambda _: gone.set())
     _, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
     for number in range(20):
-        await _asked(writer, number, 1, struct.pack(">BHH", 6, 8501, 7))
-    await asyncio.wait_for(asked.wait(), 30)
+        await _requested(writer, number, 1, struct.pack(">BHH", 6, 8501, 7))
+    await asyncio.wait_for(requested.wait(), 30)
     its_socket = writer.get_extra_info("socket")
     its_socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     writer.transport.abort()  # a reset, as of a program that was killed

@@ -99,8 +99,8 @@ async def test_what_came_while_the_program_stood_still_as_it_sent_is_no_answer()
         time.sleep(FROZEN_IN_SENDING + 0.05)
         transport.held = reply(b"\x01" + QUESTION + b"\0\0")
 
-    asked = Sending(1, QUESTION, REQUEST.expectation(), 0.05, look=freeze)
-    result = await master.exchange(asked)
+    requested = Sending(1, QUESTION, REQUEST.expectation(), 0.05, look=freeze)
+    result = await master.exchange(requested)
     assert result.kind is ResultKind.NOTHING
     await master.quiet()
     assert [piece.whole for piece in strays] == [True]

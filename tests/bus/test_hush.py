@@ -16,7 +16,7 @@ from .peer import PtyPeer, eventually, honest
 async def test_only_a_stop_asks_a_device_that_is_left_alone(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = open_line(peer.path)
-        line.facts.hush(1, "It is being proved.")
+        line.facts.pause_polling(1, "It is being proved.")
         for priority in (Priority.FEED, Priority.OPERATOR_READ, Priority.POLL):
             with pytest.raises(RequestRefused, match="being proved"):
                 await line.read(1, 5, priority=priority)
@@ -35,11 +35,11 @@ async def test_a_stop_ends_what_a_device_is_left_alone_for(share: Share, stopper
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         programs = {name: lines.open(name) for name in ("panel", "prove", "watch")}
-        programs["prove"].facts.hush(1, "It is being proved.")
-        programs["prove"].facts.hush(2, "It is being proved.")
-        await asyncio.to_thread(eventually, lambda: 1 in programs["watch"].facts.hushed)
+        programs["prove"].facts.pause_polling(1, "It is being proved.")
+        programs["prove"].facts.pause_polling(2, "It is being proved.")
+        await asyncio.to_thread(eventually, lambda: 1 in programs["watch"].facts.paused)
         programs[stopper].facts.give_stop([1], "the stop key")
         assert (await programs[stopper].read(1, 5)).words == (5,)
         await asyncio.to_thread(
-            eventually, lambda: all({*one.facts.hushed} == {2} for one in programs.values())
+            eventually, lambda: all({*one.facts.paused} == {2} for one in programs.values())
         )

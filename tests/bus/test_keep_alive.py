@@ -230,8 +230,8 @@ async def test_device_whose_polling_is_paused_is_not_read(share: Share) -> None:
         holder, program = lines.open("keeper"), lines.open("prove")
         holder.facts.keep_alives.keep(QUICKLY)
         await more(peer)
-        program.facts.hush(1, "a test of its timeout")
-        await asyncio.to_thread(eventually, lambda: 1 in holder.facts.hushed)
+        program.facts.pause_polling(1, "a test of its timeout")
+        await asyncio.to_thread(eventually, lambda: 1 in holder.facts.paused)
         await asyncio.sleep(QUICKLY.timeout / 2)  # what is on the wire
         count = reads(peer)
         await asyncio.sleep(3 * QUICKLY.timeout)

@@ -52,7 +52,7 @@ class TimedLine:
     ) -> Job:
         """Hand over a read, or the write of a word."""
         request = Read(device, 0, 1) if word is None else WriteOne(device, COMMAND, word)
-        job = Job(request, priority, WIDE, program=program, asked=self.now)
+        job = Job(request, priority, WIDE, program=program, requested=self.now)
         self._waiting.append(job)
         self.dispatcher.submit(job)
         return job

@@ -16,7 +16,7 @@ import pytest
 
 from tui.bus.model import Priority
 from tui.bus.program import KEEPER, Program
-from tui.bus.share.messages import VERSION, Alive, Asking, StopGiven, Told
+from tui.bus.share.messages import VERSION, Alive, Asking, Notified, StopGiven
 from tui.bus.share.owner_watch import (
     BY_HAND,
     DIES_WITHIN,
@@ -95,7 +95,7 @@ def test_a_keeper_that_does_not_acknowledge_a_stop_is_killed_after_a_second(benc
 def test_news_do_not_acknowledge_a_stop(bench: Bench) -> None:
     bench.watch.note_stop()
     bench.watch.note_stop()
-    for message in (Told(1, "a"), Alive(), Told(1, "b")):
+    for message in (Notified(1, "a"), Alive(), Notified(1, "b")):
         bench.wait(STOP_HEARD_WITHIN / 4)
         bench.watch.hear(message)
     bench.wait(STOP_HEARD_WITHIN / 4)

@@ -81,8 +81,10 @@ async def test_what_was_added_is_counted_where_an_answer_fails(answered: bool) -
     result = await master.exchange(Sending(1, QUESTION, REQUEST.expectation(), 0.05))
     assert result.kind is (ResultKind.REPLY if answered else ResultKind.DAMAGED)
     assert isinstance(REQUEST, Read)
-    told = tally.frozen()
-    assert (told.framing, told.parity, told.breaks) == ((0, 0, 0) if answered else (3, 0, 2))
+    reported = tally.frozen()
+    assert (reported.framing, reported.parity, reported.breaks) == (
+        (0, 0, 0) if answered else (3, 0, 2)
+    )
     master.close()
 
 

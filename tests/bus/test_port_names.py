@@ -81,7 +81,7 @@ def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> 
 
 
 @pytest.mark.parametrize(
-    ("seen", "said"),
+    ("seen", "output"),
     [
         (
             PortSeen(PORT_PATH, permitted=False, group="rs485", user="ann"),
@@ -98,8 +98,8 @@ def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> 
     ],
 )
 def test_a_port_that_this_user_may_not_use_names_its_group(
-    seen: PortSeen, said: str, monkeypatch: pytest.MonkeyPatch
+    seen: PortSeen, output: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.transport.port_seen.see_port", lambda _: seen)
     error = port_error(PORT_PATH, 19200, "8E1", PermissionError(errno.EACCES, "denied"))
-    assert said in str(error)
+    assert output in str(error)

@@ -150,8 +150,8 @@ async def test_dead_drive_costs_one_time_out_a_back_off_period(open_line: OpenLi
             with pytest.raises(NoAnswer) as caught:
                 await line.read(DEAD, address)
             assert (await line.read(1, address)).words == (address,)
-        assert len(peer.asked(DEAD)) == 1
-        assert len(peer.asked(1)) == 20
+        assert len(peer.requested(DEAD)) == 1
+        assert len(peer.requested(1)) == 20
         assert caught.value.retry_in is not None
         assert 0 < caught.value.retry_in <= 60.0
         assert "asked again in" in str(caught.value)

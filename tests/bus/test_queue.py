@@ -348,15 +348,15 @@ def test_what_repeats_quickly_stands_in_the_line(devices: Devices) -> None:
 
 
 def test_a_copy_of_the_reply_before_is_known_by_its_time(devices: Devices) -> None:
-    asked, reply = Read(1, 5, 1).pdu(), bytes([3, 2, 0, 7])
+    requested, reply = Read(1, 5, 1).pdu(), bytes([3, 2, 0, 7])
     for _ in range(5):
-        devices.answered(1, EXPECTED, 0.01, 10.0, (asked, reply))
+        devices.answered(1, EXPECTED, 0.01, 10.0, (requested, reply))
     other = Read(1, 6, 1).pdu()
     assert devices.is_repeat(1, other, reply, 0.03)
     assert devices.is_repeat(1, other, reply, 0.001)
     assert not devices.is_repeat(1, other, reply, 0.01), "as long as ever"
     assert not devices.is_repeat(1, other, reply, 0.0215), "a little more than twice as long"
-    assert not devices.is_repeat(1, asked, reply, 0.03), "the same register"
+    assert not devices.is_repeat(1, requested, reply, 0.03), "the same register"
     assert not devices.is_repeat(1, other, bytes([3, 2, 0, 8]), 0.03), "another value"
 
 

@@ -34,8 +34,8 @@ LINE = SerialLink("x", 19200)
 
 
 def missing_after(data: bytes, request: Request = READ, **more: bool | int | None) -> int:
-    asked = frame(request.device, request.pdu())
-    exchange = RtuExchange(asked, request.expectation(), **more)  # type: ignore[arg-type]
+    requested = frame(request.device, request.pdu())
+    exchange = RtuExchange(requested, request.expectation(), **more)  # type: ignore[arg-type]
     exchange.feed(data)
     return exchange.missing
 
@@ -54,9 +54,9 @@ def test_missing_is_unknown_before_the_reply_to_this_request() -> None:
 
 
 def test_missing_waits_for_a_known_echo_first() -> None:
-    asked = frame(1, READ.pdu())
-    assert missing_after(asked, echo=True) == 0
-    assert missing_after(asked + REPLY[:9], echo=True) == len(REPLY) - 9
+    requested = frame(1, READ.pdu())
+    assert missing_after(requested, echo=True) == 0
+    assert missing_after(requested + REPLY[:9], echo=True) == len(REPLY) - 9
     write = WriteOne(1, 5, 7)
     assert missing_after(frame(1, write.pdu()), write, echo=True) == 0
 

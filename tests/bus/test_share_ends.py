@@ -29,7 +29,7 @@ from tui.bus.share.messages import (
     AnyMessage,
     Failed,
     Hello,
-    Told,
+    Notified,
     TurnedAway,
     packed,
     unpacked,
@@ -242,17 +242,17 @@ def answer(connection: socket.socket) -> AnyMessage:
 
 def answer_of_kind(connection: socket.socket, kind: type[M]) -> M:
     """The next message of a kind, whatever is told besides."""
-    while not isinstance(told := answer(connection), kind):
+    while not isinstance(reported := answer(connection), kind):
         pass
-    return told
+    return reported
 
 
 def ask(**fields: object) -> bytes:
-    asked: dict[str, object] = {
+    requested: dict[str, object] = {
         "number": 1, "kind": "Read", "fields": {"device": 1, "address": 1, "count": 1},
-        "priority": 4, "replaceable": False, "max_age": 0.0, "stamp": 0, "asked": 1e9,
+        "priority": 4, "replaceable": False, "max_age": 0.0, "stamp": 0, "requested": 1e9,
     }  # fmt: skip
-    data = msgspec.msgpack.encode({"type": "Asking", **asked, **fields})
+    data = msgspec.msgpack.encode({"type": "Asking", **requested, **fields})
     return len(data).to_bytes(4, "big") + data
 
 
@@ -271,14 +271,14 @@ NONSENSE = {
 }
 
 
-@pytest.mark.parametrize("said", NONSENSE.values(), ids=NONSENSE.keys())
-async def test_what_one_program_says_costs_the_others_nothing(share: Share, said: bytes) -> None:
+@pytest.mark.parametrize("output", NONSENSE.values(), ids=NONSENSE.keys())
+async def test_what_one_program_says_costs_the_others_nothing(share: Share, output: bytes) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
         with raw(lines) as connection:
             with suppress(OSError):  # the owner does not hear it out
-                connection.sendall(said)
+                connection.sendall(output)
             for line in (owner, other):
                 assert (await asyncio.wait_for(line.read(1, 5), 10)).words == (5,)
         eventually(lambda: [one.name for one in owner.facts.others] == ["watch"])
@@ -293,12 +293,12 @@ async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Shar
         write = {"device": 1, "address": 9, "value": 1}
         with raw(lines) as connection:
             old = time.monotonic() - 5
-            connection.sendall(hello() + ask(kind="WriteOne", fields=write, asked=old))
-            told = await asyncio.to_thread(answer_of_kind, connection, Failed)
-            assert told.error == "RequestRefused"
-            assert "stood still for 5 s" in told.form.text
+            connection.sendall(hello() + ask(kind="WriteOne", fields=write, requested=old))
+            reported = await asyncio.to_thread(answer_of_kind, connection, Failed)
+            assert reported.error == "RequestRefused"
+            assert "stood still for 5 s" in reported.form.text
             # a stop is never too late
-            stop = ask(number=2, kind="WriteOne", fields=write, asked=old, priority=0)
+            stop = ask(number=2, kind="WriteOne", fields=write, requested=old, priority=0)
             connection.sendall(stop)
             assert (await asyncio.to_thread(answer_of_kind, connection, Answer)).number == 2
         assert [one[1] for one in peer.requests] == [3, 6]
@@ -338,10 +338,10 @@ async def test_another_version_is_turned_away_in_words(share: Share) -> None:
         lines.open("panel")
         with raw(lines) as connection:
             connection.sendall(hello(VERSION + 1))
-            told = answer(connection)
-        assert isinstance(told, TurnedAway)
-        assert "panel" in told.why
-        assert "another version" in told.why
+            reported = answer(connection)
+        assert isinstance(reported, TurnedAway)
+        assert "panel" in reported.why
+        assert "another version" in reported.why
 
 
 async def test_another_user_is_turned_away_in_words(
@@ -364,8 +364,8 @@ async def test_an_owner_that_cannot_be_reached_is_named_at_once(
     assert lock.take()
     lock.tell(Owner(VERSION, STRANGER, str(tmp_path / "nothing.sock")))
     try:
-        told = r"stranger \(pid 1\) holds the line and cannot be reached"
-        with PtyPeer(honest) as peer, pytest.raises(NotShared, match=told):
+        reported = r"stranger \(pid 1\) holds the line and cannot be reached"
+        with PtyPeer(honest) as peer, pytest.raises(NotShared, match=reported):
             share(peer.path).open("panel")
     finally:
         lock.give_back()
@@ -383,9 +383,9 @@ async def test_an_owner_that_talks_nonsense_is_left_again(share: Share, tmp_path
         lock.tell(Owner(VERSION, STRANGER, str(path)))
         with PtyPeer(honest) as peer:
             line = share(peer.path).open("panel", wait=None)
-            for said in (b"\xff" * 9, packed(Told(1, "hm")), b""):
+            for output in (b"\xff" * 9, packed(Notified(1, "hm")), b""):
                 connection, _ = listening.accept()
-                connection.sendall(said)
+                connection.sendall(output)
                 connection.close()
             lock.give_back()
             eventually(lambda: line.state.status is LineStatus.CONNECTED)

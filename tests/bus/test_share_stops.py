@@ -311,13 +311,13 @@ async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share
         lines = share(peer.path)
         lines.open("run")
         other = lines.open("remote")
-        said: list[str] = []
-        other.on_state(lambda state: said.append(state.reason))
+        output: list[str] = []
+        other.on_state(lambda state: output.append(state.reason))
         with frozen(other):
             await asyncio.sleep(1.3)
         await other.read(1, 1)
         await asyncio.sleep(0.15)
-        assert [one for one in said if "does not answer" in one] == []
+        assert [one for one in output if "does not answer" in one] == []
 
 
 async def test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew(
@@ -359,11 +359,11 @@ async def test_the_lock_tells_of_stops_where_the_owner_is_killed(share: Share) -
         panel, place = lines.open("panel"), place_in(lines.folder)
         panel.facts.give_stop([1], "the stop key")
 
-        def is_told() -> bool:
+        def is_reported() -> bool:
             owner = owner_of(place)
             return owner is not None and owner.stopped == panel.facts.stops.times
 
-        await asyncio.to_thread(eventually, is_told)
+        await asyncio.to_thread(eventually, is_reported)
 
 
 def test_a_time_to_come_is_none_of_this_run_of_the_machine() -> None:

@@ -49,23 +49,23 @@ def run(status: int, *arguments: str | Path) -> str:
 
 def refused(status: int, *arguments: str | Path) -> str:
     """What a command says on standard error, from its first word, when it ends with this status."""
-    said = ended(status, *arguments).stderr
-    assert said.startswith("drivepanel: ")
-    return said
+    output = ended(status, *arguments).stderr
+    assert output.startswith("drivepanel: ")
+    return output
 
 
 def put(line: str, address: int, word: int) -> None:
     """What somebody else writes, as a person at the keypad would set it."""
     pdu = struct.pack(">BHH", 6, address, word)
-    assert asked(line, pdu) == pdu
+    assert requested(line, pdu) == pdu
 
 
 def held(line: str, address: int) -> int:
     """A word as it is on the wire."""
-    return int.from_bytes(asked(line, struct.pack(">BHH", 3, address, 1))[2:], "big")
+    return int.from_bytes(requested(line, struct.pack(">BHH", 3, address, 1))[2:], "big")
 
 
-def asked(line: str, pdu: bytes) -> bytes:
+def requested(line: str, pdu: bytes) -> bytes:
     """One Modbus TCP exchange of another master."""
     _, host, port = line.split(":")
     with socket.create_connection((host, int(port)), timeout=30) as other:

@@ -37,9 +37,9 @@ def run(status: int, *arguments: str | Path) -> str:
 
 def refused(status: int, *arguments: str | Path) -> str:
     """What `block` says on standard error; faults of an assignment stand before the refusal."""
-    said = commands.ended(status, "block", *arguments).stderr
-    assert "drivepanel: " in said
-    return said
+    output = commands.ended(status, "block", *arguments).stderr
+    assert "drivepanel: " in output
+    return output
 
 
 def slots(text: str) -> dict[str, Any]:
@@ -77,10 +77,10 @@ def test_set_show_verify_save_load_factory(line: str, tmp_path: Path) -> None:
 
 def test_json_is_one_document_after_writing_too(line: str) -> None:
     done = run(0, line, "set", "NCA3=ACC", "--arm", "--json", "-d", "2")
-    told = json.loads(done)
-    assert {b["id"] for b in told["blocks"]} == {"scanner-read", "scanner-write"}
+    reported = json.loads(done)
+    assert {b["id"] for b in reported["blocks"]} == {"scanner-read", "scanner-write"}
     assert slots(done)["NCA3"]["code"] == "ACC"
-    costs = told["monitoring_us"]
+    costs = reported["monitoring_us"]
     assert 0 < costs["with_blocks"] <= costs["direct"]
 
 
@@ -123,9 +123,9 @@ def test_a_drive_that_does_not_answer() -> None:
 
 def test_a_running_motor_keeps_its_assignment() -> None:
     with tcp_line("atv71@2", "--run", "30") as line:
-        said = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
-        assert "motor stopped only" in said
-        assert "Nothing was written" in said
+        output = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
+        assert "motor stopped only" in output
+        assert "Nothing was written" in output
 
 
 def test_what_a_signal_cuts_short_is_told_by_slot(
@@ -135,16 +135,18 @@ def test_what_a_signal_cuts_short_is_told_by_slot(
     came = nullcontext([signal.SIGTERM])
     monkeypatch.setattr("tui.cli.shared.signals.cancelled_by_signal", lambda _: came)
     fail_write(monkeypatch, "NMA4", asyncio.CancelledError())
-    said = refused(143, line, "set", "NMA3=LCR", "NMA4=OTR", "NMA5=THD", "--arm", "-d", "2")
-    assert "Slots written and read back: NMA3. NMA4 may have been written too: look at it." in said
+    output = refused(143, line, "set", "NMA3=LCR", "NMA4=OTR", "NMA5=THD", "--arm", "-d", "2")
+    assert (
+        "Slots written and read back: NMA3. NMA4 may have been written too: look at it." in output
+    )
 
 
 def test_a_line_that_is_lost_meanwhile_is_no_refusal(
     line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fail_write(monkeypatch, "NMA4", LineLost("The owner ended."))
-    said = refused(3, line, "set", "NMA3=LCR", "NMA4=OTR", "--arm", "-d", "2")
-    assert "NMA4 was not taken: The owner ended. Written before: NMA3." in said
+    output = refused(3, line, "set", "NMA3=LCR", "NMA4=OTR", "--arm", "-d", "2")
+    assert "NMA4 was not taken: The owner ended. Written before: NMA3." in output
 
 
 def fail_write(monkeypatch: pytest.MonkeyPatch, code: str, error: BaseException) -> None:
@@ -175,8 +177,8 @@ def test_a_family_without_blocks_says_so_and_shows_its_neighbors(family: str) ->
     text = run(0, line, "-p", family)
     assert "neither an indirect block nor a communication scanner" in text
     assert "words from" in text
-    told = json.loads(run(0, line, "--json", "-p", family))
-    assert told["blocks"] == []
-    assert all(r["us"] < r["one_by_one_us"] and r["count"] >= 2 for r in told["reads"])
+    reported = json.loads(run(0, line, "--json", "-p", family))
+    assert reported["blocks"] == []
+    assert all(r["us"] < r["one_by_one_us"] and r["count"] >= 2 for r in reported["reads"])
     refused(5, line, "verify", "-p", family)
     refused(5, line, "factory", "--arm", "-p", family)

@@ -97,10 +97,10 @@ def test_every_option_is_in_the_help_of_its_command() -> None:
     for line, _ in printed(PAGE.read_text("utf-8")):
         words = shlex.split(line)[1:]
         if words and words[0] in COMMANDS:
-            told = ended(0, words[0], "--help").stdout
+            reported = ended(0, words[0], "--help").stdout
             for word in words:
                 if word.startswith("--"):
-                    assert word in told, line
+                    assert word in reported, line
 
 
 def test_every_metric_is_on_the_page_of_the_plant() -> None:

@@ -21,15 +21,15 @@ def line() -> Iterator[str]:
 
 
 def test_the_control_is_taken_and_given_back(line: str) -> None:
-    said = motor(5, line, *DRIVE, "--arm", "--for", "1")
-    assert "run --take-control takes the control first." in said
+    output = motor(5, line, *DRIVE, "--arm", "--for", "1")
+    assert "run --take-control takes the control first." in output
     assert held(line, COMMAND_WORD) == 0
     status = run(0, "status", line, *DRIVE)
     assert "drivepanel run --take-control takes it, in the panel t on Monitor." in status
-    told = motor(0, line, *DRIVE, "--arm", "--take-control", "--for", "1")
-    assert told.index("Control by the line") < told.index("Unlock and run forward:")
-    assert "stop --give-back --arm gives it back" in told
-    assert told.rstrip().endswith("stopped.")
+    reported = motor(0, line, *DRIVE, "--arm", "--take-control", "--for", "1")
+    assert reported.index("Control by the line") < reported.index("Unlock and run forward:")
+    assert "stop --give-back --arm gives it back" in reported
+    assert reported.rstrip().endswith("stopped.")
     assert held(line, IN_FORCE) == 1
     control = json.loads(run(0, "status", line, *DRIVE, "--json"))["control"]
     assert control == {
@@ -56,8 +56,8 @@ def test_6_a_stop_gives_nothing_back_unarmed_but_stops(line: str) -> None:
 
 def test_5_the_control_is_not_taken_where_that_would_start_the_motor(line: str) -> None:
     put(line, COMMAND_WORD, 0x0003)
-    said = motor(5, line, *DRIVE, "--arm", "--take-control")
-    assert "the motor would start as soon as it is in force" in said
+    output = motor(5, line, *DRIVE, "--arm", "--take-control")
+    assert "the motor would start as soon as it is in force" in output
     assert held(line, IN_FORCE) == 0
 
 
@@ -66,13 +66,13 @@ def test_2_giving_back_is_for_one_drive() -> None:
 
 
 def test_5_a_family_without_a_control_to_take() -> None:
-    said = motor(5, "sim:atv71@1", "--arm", "--take-control")
-    assert "has no control to take" in said
+    output = motor(5, "sim:atv71@1", "--arm", "--take-control")
+    assert "has no control to take" in output
 
 
 def test_6_a_family_without_a_control_to_give_back_is_stopped() -> None:
-    said = refused(6, "stop", "sim:atv71@1", "--give-back", "--arm")
-    assert "has no control to give back" in said
+    output = refused(6, "stop", "sim:atv71@1", "--give-back", "--arm")
+    assert "has no control to give back" in output
 
 
 def test_status_names_no_control_where_a_family_has_none() -> None:

@@ -13,30 +13,32 @@ def counted(status: int, *words: str) -> Any:
 
 
 def test_a_good_line_ends_with_0() -> None:
-    told = counted(0, "sim:atv71", "--frames", "7")
-    assert told["test"] == {"frames": 7, "answered": 7}
-    assert told["agree"] is True
-    assert told["differences"] == []
-    names = {one["name"]: one for one in told["drive"]}
+    reported = counted(0, "sim:atv71", "--frames", "7")
+    assert reported["test"] == {"frames": 7, "answered": 7}
+    assert reported["agree"] is True
+    assert reported["differences"] == []
+    names = {one["name"]: one for one in reported["drive"]}
     assert names["function 8"]["counts_this_line"] is True
     assert names["Modbus network"]["counts_this_line"] is True
     assert names["Keypad port"]["frames"] == 0
-    assert sum(one["count"] for one in told["ours"]["turnarounds"]) == told["ours"]["replies"]
-    assert told["since_opened"]["frames"] > told["ours"]["frames"]
-    minutes = told["last_minute"]
+    assert (
+        sum(one["count"] for one in reported["ours"]["turnarounds"]) == reported["ours"]["replies"]
+    )
+    assert reported["since_opened"]["frames"] > reported["ours"]["frames"]
+    minutes = reported["last_minute"]
     assert minutes["line"]["share"] == minutes["device"]["share"] == 1.0
-    assert minutes["device"]["good"] == told["since_opened"]["replies"]
+    assert minutes["device"]["good"] == reported["since_opened"]["replies"]
     assert (minutes["line"]["foreign"], minutes["line"]["strays"]) == (0, 0)
 
 
 def test_lost_answers_end_with_1_and_are_told() -> None:
     with tcp_line("atv71@2", "--line-fault", "lost=0.2", "--seed", "3") as line:
-        told = counted(1, line, "-d", "2", "--frames", "10")
-        (found,) = told["differences"]
+        reported = counted(1, line, "-d", "2", "--frames", "10")
+        (found,) = reported["differences"]
         assert found["kind"] == "not-answered"
         assert found["count"] >= 1
         assert found["text"].startswith("The drive saw ")
-        own = told["last_minute"]["device"]
+        own = reported["last_minute"]["device"]
         assert own["lost"] + own["silent"] >= 1
         assert own["share"] < 1.0
 

@@ -52,55 +52,56 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
-    "a value": (0, ("read", *DRIVE, "ACC", "ETA"), "ReadTold"),
-    "two drives": (3, ("read", *DRIVE, "-d", "9", "ACC"), "ErrorTold"),
-    "why not": (3, ("why", "sim:atv71@2", "-d", "9"), "WhyTold"),
-    "who it is": (0, ("identify", *DRIVE), "IdentityTold"),
-    "who is there": (0, ("scan", DRIVE[0], "--addresses", "2-3"), "ScanHitTold"),
-    "what it does": (0, ("status", *DRIVE), "StatusTold"),
-    "its counters": (0, ("counters", *DRIVE, "--frames", "5"), "CountersTold"),
-    "cycles": (0, ("watch", *DRIVE, "--every", "0.1", "--count", "2"), "CycleTold"),
-    "a reference": (0, ("reference", *DRIVE, "20", "--arm"), "CommandTold"),
-    "stops": (0, ("stop", DRIVE[0], "--all"), "StopTold"),
-    "a stop": (0, ("stop", *DRIVE), "StopTold"),
-    "a write": (0, ("write", *DRIVE, "ACC=4", "--arm"), "WriteTold"),
-    "a write that would be": (0, ("write", *DRIVE, "ACC=4", "--dry-run"), "WriteTold"),
-    "a write that is refused": (5, ("write", *DRIVE, "BIR=1", "--arm"), "WriteTold"),
-    "a backup": (0, ("backup", *DRIVE, "FOLDER/new.toml"), "BackupTold"),
-    "a report": (0, ("report", *DRIVE, "FOLDER/new.md"), "ReportTold"),
+    "a value": (0, ("read", *DRIVE, "ACC", "ETA"), "ReadDocument"),
+    "two drives": (3, ("read", *DRIVE, "-d", "9", "ACC"), "ErrorDocument"),
+    "why not": (3, ("why", "sim:atv71@2", "-d", "9"), "WhyDocument"),
+    "who it is": (0, ("identify", *DRIVE), "IdentityDocument"),
+    "who is there": (0, ("scan", DRIVE[0], "--addresses", "2-3"), "ScanHitDocument"),
+    "what it does": (0, ("status", *DRIVE), "StatusDocument"),
+    "its counters": (0, ("counters", *DRIVE, "--frames", "5"), "CountersDocument"),
+    "cycles": (0, ("watch", *DRIVE, "--every", "0.1", "--count", "2"), "CycleDocument"),
+    "a reference": (0, ("reference", *DRIVE, "20", "--arm"), "CommandDocument"),
+    "stops": (0, ("stop", DRIVE[0], "--all"), "StopDocument"),
+    "a stop": (0, ("stop", *DRIVE), "StopDocument"),
+    "a write": (0, ("write", *DRIVE, "ACC=4", "--arm"), "WriteDocument"),
+    "a write that would be": (0, ("write", *DRIVE, "ACC=4", "--dry-run"), "WriteDocument"),
+    "a write that is refused": (5, ("write", *DRIVE, "BIR=1", "--arm"), "WriteDocument"),
+    "a backup": (0, ("backup", *DRIVE, "FOLDER/new.toml"), "BackupDocument"),
+    "a report": (0, ("report", *DRIVE, "FOLDER/new.md"), "ReportDocument"),
     "a bundle": (0, ("bundle", DRIVE[0], "--output", "FOLDER/new.zip"), "BundleDocument"),
     "a plan": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--dry-run", *DRIVE[1:]),
-               "RestoreTold"),
+               "RestoreDocument"),
     "a restoring": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--arm", *DRIVE[1:]),
-                    "RestoreTold"),
-    "the journal": (0, ("journal", "--since", "1h"), "JournalTold"),
-    "a comparison": (1, ("compare", "FOLDER/set.toml", "FOLDER/other.toml"), "CompareTold"),
-    "blocks": (0, ("block", *DRIVE), "BlocksTold"),
-    "blocks compared": (0, ("block", DRIVE[0], "verify", *DRIVE[1:]), "BlocksTold"),
-    "no blocks": (0, ("block", "sim:atv312"), "BlocksTold"),
+                    "RestoreDocument"),
+    "the journal": (0, ("journal", "--since", "1h"), "JournalDocument"),
+    "a comparison": (1, ("compare", "FOLDER/set.toml", "FOLDER/other.toml"), "CompareDocument"),
+    "blocks": (0, ("block", *DRIVE), "BlocksDocument"),
+    "blocks compared": (0, ("block", DRIVE[0], "verify", *DRIVE[1:]), "BlocksDocument"),
+    "no blocks": (0, ("block", "sim:atv312"), "BlocksDocument"),
     "a block that would be": (
-        0, ("block", DRIVE[0], "set", "NMA3=LCR", "--dry-run", *DRIVE[1:]), "BlockChangeTold",
+        0, ("block", DRIVE[0], "set", "NMA3=LCR", "--dry-run", *DRIVE[1:]), "BlockChangeDocument",
     ),
     "a block that is": (0, ("block", DRIVE[0], "set", "NMA3=LCR", "--arm", *DRIVE[1:]),
-                        "BlocksTold"),
+                        "BlocksDocument"),
     "a block in a file": (0, ("block", DRIVE[0], "save", "FOLDER/more.toml", *DRIVE[1:]),
-                          "BlockFileTold"),
-    "what is taught": (0, ("teach", "sim:powerdrive", "-p", "powerdrive"), "TaughtTold"),
+                          "BlockFileDocument"),
+    "what is taught": (0, ("teach", "sim:powerdrive", "-p", "powerdrive"), "TaughtDocument"),
     "a lesson": (0, ("teach", "sim:powerdrive", "-p", "powerdrive", "1.21", "90", "rpm"),
-                 "LessonTold"),
+                 "LessonDocument"),
     "what is forgotten": (
-        0, ("teach", "sim:powerdrive", "-p", "powerdrive", "1.21", "--forget"), "TeachChangeTold",
+        0, ("teach", "sim:powerdrive", "-p", "powerdrive", "1.21", "--forget"),
+        "TeachChangeDocument",
     ),
-    "profiles": (0, ("profiles",), "ProfileTold"),
+    "profiles": (0, ("profiles",), "ProfileDocument"),
     "a profile": (0, ("profiles", "atv312"), "ProfileShown"),
-    "its wiring": (0, ("profiles", "atv312", "--wiring"), "WiringTold"),
+    "its wiring": (0, ("profiles", "atv312", "--wiring"), "WiringDocument"),
     "its folder": (0, ("profiles", "path"), "ProfileFolder"),
     "a new one": (0, ("profiles", "new", "mine", "--from", "atv312"), "ProfileBegun"),
-    "a check": (2, ("profiles", "--check", "FOLDER/set.toml"), "CheckTold"),
+    "a check": (2, ("profiles", "--check", "FOLDER/set.toml"), "CheckDocument"),
     "ports": (0, ("ports",), ""),
-    "names of lines": (0, ("lines",), "LinesTold"),
-    "what others say": (0, ("listen", "sim:atv71@2", "--for", "0.5"), "HeardSummaryTold"),
-    "no such code": (2, ("read", *DRIVE, "NOSUCH"), "ErrorTold"),
+    "names of lines": (0, ("lines",), "LinesDocument"),
+    "what others say": (0, ("listen", "sim:atv71@2", "--for", "0.5"), "HeardSummaryDocument"),
+    "no such code": (2, ("read", *DRIVE, "NOSUCH"), "ErrorDocument"),
 }  # fmt: skip
 
 
@@ -108,8 +109,8 @@ RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
 def test_what_a_command_prints_fits_the_schema(name: str, folder: Path) -> None:
     status, words, form = RUNS[name]
     typed = [word.replace("FOLDER", str(folder)) for word in words]
-    told = documents(ended(status, *typed, "--json").stdout)
-    assert all(one["command"] == words[0] for one in told)
+    reported = documents(ended(status, *typed, "--json").stdout)
+    assert all(one["command"] == words[0] for one in reported)
     assert not form or form in SEEN
 
 
@@ -122,33 +123,33 @@ def test_a_motor_that_runs_and_its_stop() -> None:
 
 def test_a_drive_that_is_held() -> None:
     with served([*DRIVEPANEL, "hold", *DRIVE, "--json"], ready="{") as holding:
-        (told,) = documents(holding.ready)
-    assert (told["event"], told["timeout"]["seconds"]) == ("holding", 10.0)
-    assert "HoldTold" in SEEN
+        (reported,) = documents(holding.ready)
+    assert (reported["event"], reported["timeout"]["seconds"]) == ("holding", 10.0)
+    assert "HoldDocument" in SEEN
 
 
 def test_what_a_stop_sent_first_is_told() -> None:
-    (told,) = documents(ended(0, "stop", *DRIVE, "--json").stdout)
-    (first,) = told["first"]
+    (reported,) = documents(ended(0, "stop", *DRIVE, "--json").stdout)
+    (first,) = reported["first"]
     assert (first["address"], first["word"], first["answer"]) == (8501, 7, "ok")
     assert "atv71" in first["families"]
-    assert told["timeout"]["begun"] is True
+    assert reported["timeout"]["begun"] is True
 
 
 def test_a_proof() -> None:
     with tcp_line("atv312@1", "--set", "ttO=5", "--any-settings") as line:
-        (told,) = documents(ended(0, "prove", line, "--arm", "--reset", "--json").stdout)
-    assert told["as_set"] is True
-    assert told["not_before_ms"] < 500 < told["not_after_ms"]
-    assert told["reset"] is True
+        (reported,) = documents(ended(0, "prove", line, "--arm", "--reset", "--json").stdout)
+    assert reported["as_set"] is True
+    assert reported["not_before_ms"] < 500 < reported["not_after_ms"]
+    assert reported["reset"] is True
 
 
 async def test_a_drive_in_fault() -> None:
     async with fault_status.line("atv71") as opened:
         fault_status.provoke(opened, "ObF")
         status = await fault_status.status_of(opened, "atv71")
-    told = {"schema": 1, "command": "status", **status_json("demo", status)}
-    (one,) = documents(json.dumps(told))
+    reported = {"schema": 1, "command": "status", **status_json("demo", status)}
+    (one,) = documents(json.dumps(reported))
     assert one["fault"]["look_at"]
     assert one["fault"]["reset"]
 
@@ -156,26 +157,30 @@ async def test_a_drive_in_fault() -> None:
 def test_a_simulated_line() -> None:
     simulate = [*DRIVEPANEL, "simulate", "atv71@2", "--tcp", "127.0.0.1:0", "--json"]
     with served(simulate, ready="{") as simulation:
-        (told,) = documents(simulation.ready)
-    assert port_of(told["line"])
-    assert told["drives"] == [{"profile": "atv71", "device": 2}]
+        (reported,) = documents(simulation.ready)
+    assert port_of(reported["line"])
+    assert reported["drives"] == [{"profile": "atv71", "device": 2}]
 
 
 def test_lines_that_are_served() -> None:
     options = ["--tcp", ":0", "--allow-writes", "all", "--metrics", ":0", "--json"]
     with served([*DRIVEPANEL, "serve", "sim:atv71@2", *options], ready="{") as program:
-        (told,) = documents(program.ready)
-    assert port_of(told["tcp"])
-    assert (told["lines"], told["writes"], told["commands"]) == (["sim:atv71@2"], ["all"], False)
-    assert told["metrics"].startswith("http://127.0.0.1:")
-    assert told["mqtt"] is None
+        (reported,) = documents(program.ready)
+    assert port_of(reported["tcp"])
+    assert (reported["lines"], reported["writes"], reported["commands"]) == (
+        ["sim:atv71@2"],
+        ["all"],
+        False,
+    )
+    assert reported["metrics"].startswith("http://127.0.0.1:")
+    assert reported["mqtt"] is None
 
 
 def test_values_that_are_published() -> None:
     url = f"mqtt://127.0.0.1:{free_port()}/plant"
     with served([*DRIVEPANEL, "publish", *DRIVE, "--mqtt", url, "--json"], ready="{") as program:
-        (told,) = documents(program.ready)
-    assert told["mqtt"] == url
+        (reported,) = documents(program.ready)
+    assert reported["mqtt"] == url
 
 
 def test_every_command_has_json() -> None:
@@ -206,9 +211,9 @@ WRONG: dict[str, Any] = {
 
 @pytest.mark.parametrize("change", WRONG.values(), ids=WRONG.keys())
 def test_the_check_sees_what_it_is_for(change: dict[str, Any]) -> None:
-    (told,) = documents(ended(0, "read", *DRIVE, "ACC", "--json").stdout)
-    with pytest.raises(ValueError, match="ReadTold"):
-        document_of(json.dumps({**told, **change}))
+    (reported,) = documents(ended(0, "read", *DRIVE, "ACC", "--json").stdout)
+    with pytest.raises(ValueError, match="ReadDocument"):
+        document_of(json.dumps({**reported, **change}))
 
 
 def forms() -> Iterator[str]:

@@ -47,18 +47,18 @@ async def test_a_fault_with_causes_checks_and_live_values() -> None:
         opened.simulation.drive(1).set("DEC", 5)
         provoke(opened, "ObF")
         status = await status_of(opened, "atv71")
-    told = json.loads(json.dumps(status_json("demo", status)))["fault"]
-    assert (told["raw"], told["code"], told["name"]) == (18, "ObF", "Overbraking")
-    assert told["causes"][0] == "The braking is too sudden for the inertia"
-    assert told["confidence"] == "public"
-    assert "AAV49428" in told["source"]
-    assert "Lengthen DEC" in told["checks"]
-    (ramp,) = [row for row in told["look_at"] if row["code"] == "DEC"]
+    reported = json.loads(json.dumps(status_json("demo", status)))["fault"]
+    assert (reported["raw"], reported["code"], reported["name"]) == (18, "ObF", "Overbraking")
+    assert reported["causes"][0] == "The braking is too sudden for the inertia"
+    assert reported["confidence"] == "public"
+    assert "AAV49428" in reported["source"]
+    assert "Lengthen DEC" in reported["checks"]
+    (ramp,) = [row for row in reported["look_at"] if row["code"] == "DEC"]
     assert (ramp["value"]["text"], ramp["value"]["unit"], ramp["value"]["quality"]) == (
         "0.5", "s", "good",
     )  # fmt: skip
     assert ramp["why"] == "the ramp in force"
-    assert told["reset"] == {
+    assert reported["reset"] == {
         "way": "automatic",
         "confidence": "practice",
         "possible_now": True,
@@ -90,9 +90,9 @@ async def test_a_wait_before_the_reset() -> None:
     async with line("atv21") as opened:
         provoke(opened, "OL2")
         status = await status_of(opened, "atv21")
-    told = status_json("demo", status)["fault"]
-    assert told["reset"]["wait_s"] == 120
-    assert told["reset"]["possible_now"] is None
+    reported = status_json("demo", status)["fault"]
+    assert reported["reset"]["wait_s"] == 120
+    assert reported["reset"]["possible_now"] is None
     assert "wait about 120 s before it (general practice)" in text_of(status)
 
 
@@ -100,10 +100,10 @@ async def test_a_trip_without_a_number() -> None:
     async with line("varmeca") as opened:
         provoke(opened, 1)
         status = await status_of(opened, "varmeca")
-    told = status_json("demo", status)["fault"]
-    assert (told["raw"], told["code"], told["name"]) == (None, None, None)
-    assert told["confidence"] == "manual"
-    assert {row["code"] for row in told["look_at"]} == {"11.63", "15.07", "10.33"}
+    reported = status_json("demo", status)["fault"]
+    assert (reported["raw"], reported["code"], reported["name"]) == (None, None, None)
+    assert reported["confidence"] == "manual"
+    assert {row["code"] for row in reported["look_at"]} == {"11.63", "15.07", "10.33"}
 
 
 async def test_an_alarm_has_its_causes_and_no_reset() -> None:
@@ -111,8 +111,8 @@ async def test_an_alarm_has_its_causes_and_no_reset() -> None:
         assert opened.simulation is not None
         opened.simulation.drive(1).set("LRS6", 1 << 8)
         status = await status_of(opened, "atv71")
-    told = status_json("demo", status)
-    assert (told["fault"], told["alarms"]) == (None, ["Undervoltage alarm"])
+    reported = status_json("demo", status)
+    assert (reported["fault"], reported["alarms"]) == (None, ["Undervoltage alarm"])
     rows = text_of(status).splitlines()
     at = rows.index("Alarms: Undervoltage alarm")
     assert rows[at + 1] == "  probably: Undervoltage alarm: Mains low or a dip (general practice)"
@@ -131,7 +131,7 @@ async def test_nothing_is_read_or_told_where_there_is_no_fault(family: str) -> N
 
 def test_a_profile_is_checked_with_its_help(tmp_path: Path) -> None:
     profile = own_drive(tmp_path, '[[faults]]\nraw = 900\nprobable = ["A jam"]\n')
-    said = refused(2, "profiles", "--check", profile)
-    assert "help/mine.toml:1: help of fault 900: there is no such fault." in said
+    output = refused(2, "profiles", "--check", profile)
+    assert "help/mine.toml:1: help of fault 900: there is no such fault." in output
     own_drive(tmp_path, '[[faults]]\nraw = 9\nprobable = ["A jam"]\n')
     assert "no fault found" in run(0, "profiles", "--check", profile)

@@ -64,10 +64,10 @@ FILES: dict[str, tuple[Callable[[Path], None], str]] = {
 @pytest.fixture(params=FILES)
 def odd(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
     """A file, and what is told of it."""
-    make, told = FILES[request.param]
+    make, reported = FILES[request.param]
     path = tmp_path / "odd.toml"
     make(path)
-    return path, told
+    return path, reported
 
 
 def test_as_a_profile(odd: tuple[Path, str]) -> None:

@@ -39,22 +39,22 @@ def test_5_a_drive_that_is_another_is_told_and_not_written(
 ) -> None:
     words = [one.format(line=atv71, folder=tmp_path) for one in COMMANDS[command]]
     before = [held(atv71, address) for address in (CMD, ACC)]
-    said = refused(5, *words, "-p", "atv312")
-    assert "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312." in said
-    assert "-p atv71" in said
+    output = refused(5, *words, "-p", "atv312")
+    assert "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312." in output
+    assert "-p atv71" in output
     assert [held(atv71, address) for address in (CMD, ACC)] == before
 
 
 def test_restore_is_refused_too(atv71: str, tmp_path: object) -> None:
     backup = f"{tmp_path}/b.toml"
     run(0, "backup", atv71, backup)
-    said = refused(5, "restore", atv71, backup, "--arm", "-p", "atv312")
-    assert "says it is ATV71HU15M3" in said
+    output = refused(5, "restore", atv71, backup, "--arm", "-p", "atv312")
+    assert "says it is ATV71HU15M3" in output
 
 
 def test_run_is_refused_too(atv71: str) -> None:
-    said = motor(5, atv71, "--arm", "--for", "1", "-p", "atv312")
-    assert "says it is ATV71HU15M3" in said
+    output = motor(5, atv71, "--arm", "--for", "1", "-p", "atv312")
+    assert "says it is ATV71HU15M3" in output
     assert held(atv71, CMD) == 0
 
 
@@ -81,8 +81,8 @@ NEVER = ("run", "reference", "reset", "restore", "block", "teach", "backup", "re
 def test_2_what_moves_or_keeps_goes_by_the_drives_own_only(atv71: str, command: str) -> None:
     more = {"reference": ["20Hz"], "restore": ["x"], "backup": ["x"], "report": ["x"]}
     words = [command, atv71, *more.get(command, ["factory"] if command == "compare" else [])]
-    said = refused(2, *words, "-p", "atv312", "--force-profile")
-    assert f"--force-profile does not apply to {command}" in said
+    output = refused(2, *words, "-p", "atv312", "--force-profile")
+    assert f"--force-profile does not apply to {command}" in output
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "varmeca"])

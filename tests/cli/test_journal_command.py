@@ -63,17 +63,17 @@ def test_every_kind_of_entry_has_its_line_and_its_form(kind: Any, journal: Path)
     made = replace(entry(1), kind=kind, new="4.0 s", answer="as it was")
     journal.write_text(json.dumps(asdict(made)) + "\n")
     document_of(run(0, "journal", "--json"))
-    told = run(0, "journal")
-    assert told.count("as it was") == 1
-    assert ("->" in told) is (kind == "write")
+    reported = run(0, "journal")
+    assert reported.count("as it was") == 1
+    assert ("->" in reported) is (kind == "write")
 
 
 def test_as_json(journal: Path) -> None:
-    told = json.loads(run(0, "journal", "--json", "--drive", "1"))
-    assert told["journal"] == str(journal)
-    assert [one["new_raw"] for one in told["entries"]] == [1, 3]
-    assert set(told["entries"][0]) == set(asdict(entry(1)))
-    assert told["damaged"] == [{"file": str(journal), "line": 4, "text": '{"ha\x1b]0;lf'}]
+    reported = json.loads(run(0, "journal", "--json", "--drive", "1"))
+    assert reported["journal"] == str(journal)
+    assert [one["new_raw"] for one in reported["entries"]] == [1, 3]
+    assert set(reported["entries"][0]) == set(asdict(entry(1)))
+    assert reported["damaged"] == [{"file": str(journal), "line": 4, "text": '{"ha\x1b]0;lf'}]
 
 
 def test_no_journal_yet_and_one_that_cannot_be_read() -> None:

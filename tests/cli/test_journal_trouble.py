@@ -95,8 +95,8 @@ def test_a_disk_that_does_not_answer_is_told_at_the_end(
     monkeypatch.setattr(Journal, "close", lambda _: False)
     monkeypatch.setattr(Journal, "unkept", 3)
     close_journal(journal)
-    said = capsys.readouterr().err
-    assert said == (
+    output = capsys.readouterr().err
+    assert output == (
         f"drivepanel: 3 entries are not in the journal: the disk does not answer: {journal.path}.\n"
     )
 

@@ -19,7 +19,7 @@ HEAD = {"schema", "command"}
 VALUE_KEYS = {"address", "raw", "value", "unit", "text", "taught", "quality"}
 
 
-def told(*arguments: str, status: int = 0) -> Any:
+def reported(*arguments: str, status: int = 0) -> Any:
     """The one JSON document on standard output."""
     done = ended(status, *arguments, "--json")
     if status == 0:
@@ -28,7 +28,7 @@ def told(*arguments: str, status: int = 0) -> Any:
 
 
 def test_read() -> None:
-    read = told("read", *LINE, "ETA", "ACC", "LFT")
+    read = reported("read", *LINE, "ETA", "ACC", "LFT")
     assert set(read) == {*HEAD, "line", "device", "profile", "timeout", "values"}
     assert (read["line"], read["device"], read["profile"]) == ("sim:atv71@2", 2, "atv71")
     assert list(read["values"]) == ["ETA", "ACC", "LFT"]
@@ -46,12 +46,12 @@ def test_read() -> None:
 
 @pytest.mark.parametrize("typed", ["acc", "Acc", "w9001", "W9001", "16#2329", "0x2329", "9001"])
 def test_read_takes_any_notation_in_any_case(typed: str) -> None:
-    assert list(told("read", *LINE, typed)["values"]) == ["ACC"]
+    assert list(reported("read", *LINE, typed)["values"]) == ["ACC"]
 
 
 def test_a_parameter_that_the_drive_refuses_is_null_and_the_others_are_not_hurt() -> None:
     with tcp_line("atv71@2", "--protect", "ACC") as line:
-        read = told("read", line, "-d", "2", "ETA", "ACC", status=4)
+        read = reported("read", line, "-d", "2", "ETA", "ACC", status=4)
     refused = read["values"]["ACC"]
     assert (refused["raw"], refused["value"], refused["quality"]) == (None, None, "bad")
     assert read["values"]["ETA"]["quality"] == "good"
@@ -84,7 +84,7 @@ def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
 
 
 def test_identify() -> None:
-    who = told("identify", *LINE)
+    who = reported("identify", *LINE)
     keys = {"line", "device", "vendor", "reference", "version", "name", "profile", "model"}
     assert set(who) == HEAD | keys | {"timeout"}
     assert (who["device"], who["profile"]) == (2, "atv71")
@@ -92,7 +92,7 @@ def test_identify() -> None:
 
 
 def test_profiles() -> None:
-    listed = told("profiles")
+    listed = reported("profiles")
     assert [set(one) for one in listed] == [
         {*HEAD, "id", "name", "vendor", "parameters", "own", "file", "remark"}
     ] * len(listed)
@@ -103,11 +103,11 @@ def test_profiles() -> None:
 
 
 def test_one_profile() -> None:
-    shown = told("profiles", "atv71")
+    shown = reported("profiles", "atv71")
     assert shown["profile"]["id"] == "atv71"
     assert {p["code"] for p in shown["parameters"]} >= {"ETA", "ACC"}
 
 
 def test_ports() -> None:
-    for port in told("ports"):
+    for port in reported("ports"):
         assert set(port) >= {"path", "description"}

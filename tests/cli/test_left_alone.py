@@ -64,10 +64,10 @@ def test_it_is_told_which_drive_how_long_what_follows_and_what_to_do(
 @pytest.mark.parametrize("command", READING)
 def test_one_object_of_json_everywhere(atv21: str, command: str) -> None:
     words = [one.format(line=atv21) for one in READING[command]]
-    told = json.loads(run(0, *words, "--json"))
-    assert told["timeout"] == ERR5
+    reported = json.loads(run(0, *words, "--json"))
+    assert reported["timeout"] == ERR5
     if command == "status":
-        assert told["watch"]["timeout_s"] == told["timeout"]["seconds"]
+        assert reported["watch"]["timeout_s"] == reported["timeout"]["seconds"]
 
 
 def test_it_is_told_where_the_command_failed(atv21: str) -> None:
@@ -88,8 +88,8 @@ def test_none_where_it_is_off() -> None:
 def test_a_drive_that_refuses_the_words_fails_no_command() -> None:
     with tcp_line("atv21@1", "--protect", "F803") as line:
         done = ended(0, "read", line, "FD01", "--json")
-        told = json.loads(done.stdout)["timeout"]
-        assert set(told.values()) == {None}
+        reported = json.loads(done.stdout)["timeout"]
+        assert set(reported.values()) == {None}
         assert "its communication timeout cannot be read; it may react" in done.stderr
 
 
@@ -109,22 +109,26 @@ def test_a_lost_line_that_goes_unnoticed_is_not_told_as_an_act() -> None:
         put(line, CMD, 6)
         done = ended(0, "read", line, "ETA", "--json")
         assert done.stderr == ""
-        told = json.loads(done.stdout)["timeout"]
-        assert (told["reaction"], told["fault"], told["begun"]) == ("Ignored", None, False)
+        reported = json.loads(done.stdout)["timeout"]
+        assert (reported["reaction"], reported["fault"], reported["begun"]) == (
+            "Ignored",
+            None,
+            False,
+        )
         assert json.loads(ended(0, "status", line, "--json").stdout)["timeout"]["begun"] is False
 
 
 def test_what_no_document_says_is_not_told_as_sure() -> None:
     with tcp_line("atv31@1") as line:
-        said = ended(0, "read", line, "ETA").stderr
-        assert "timeout ttO runs (when it begins is in no document). After 10 s" in said
+        output = ended(0, "read", line, "ETA").stderr
+        assert "timeout ttO runs (when it begins is in no document). After 10 s" in output
 
 
 def test_a_family_that_was_named_is_named_again() -> None:
     with tcp_line("powerdrive@1", "--set", "11.63=20") as line:
-        said = ended(0, "read", line, "10.40", "-p", "powerdrive").stderr
-        assert f"drivepanel hold {line} -d 1 -p powerdrive." in said
-        assert "timeout 11.63 runs" in said
+        output = ended(0, "read", line, "10.40", "-p", "powerdrive").stderr
+        assert f"drivepanel hold {line} -d 1 -p powerdrive." in output
+        assert "timeout 11.63 runs" in output
 
 
 def test_run_does_not_end_in_a_trip_without_a_word() -> None:
@@ -132,10 +136,10 @@ def test_run_does_not_end_in_a_trip_without_a_word() -> None:
         done = drivepanel("run", line, "--reference", "10Hz", "--for", "0.5", "--arm", "--json")
         assert done.returncode == 0, done.stderr
         assert "timeout TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
-        told: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
+        reported: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
         last = {"seconds": 30.0, "reaction": "Freewheel", "fault": "SLF1", "begun": True}
-        assert told[-1]["timeout"] == last
-        assert told[-1]["event"] == "stopped"
+        assert reported[-1]["timeout"] == last
+        assert reported[-1]["event"] == "stopped"
 
 
 @pytest.mark.parametrize("command", ["reference", "reset"])
@@ -159,10 +163,10 @@ def test_hold_prints_at_once_asks_on_and_tells_what_follows() -> None:
         hold = (*DRIVEPANEL, "read", line, "FD01", "--hold", "6")
         with served(hold, ready="Code") as program:
             assert program.process.poll() is None, "the value comes before the end"
-            _, said = program.process.communicate(timeout=PATIENCE)
+            _, output = program.process.communicate(timeout=PATIENCE)
         assert program.process.returncode == 0
-        assert "After 2 s without a request" in said
-        assert "is in fault" not in said
+        assert "After 2 s without a request" in output
+        assert "is in fault" not in output
         assert not in_fault(line)
 
 
@@ -174,11 +178,11 @@ def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) ->
     with tcp_line("atv21@1", "atv71@2") as line:
         hold = (*DRIVEPANEL, "hold", line, "-d", "1", "-d", "2")
         with served(hold, ready="Device 2, Altivar 71: kept alive") as program:
-            status, said = program.end(number)
-        assert status == SIGNALS[number], said
-        assert "the communication timeout gives no protection" in said
-        assert "Device 1, Altivar 21: its communication timeout F803 runs. After 3 s" in said
-        assert "Device 2" not in said, "nobody has commanded it"
+            status, output = program.end(number)
+        assert status == SIGNALS[number], output
+        assert "the communication timeout gives no protection" in output
+        assert "Device 1, Altivar 21: its communication timeout F803 runs. After 3 s" in output
+        assert "Device 2" not in output, "nobody has commanded it"
 
 
 @pytest.mark.parametrize(
@@ -186,8 +190,8 @@ def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) ->
 )
 def test_what_a_signal_ends_says_it_too(atv21: str, number: signal.Signals) -> None:
     with served((*DRIVEPANEL, "watch", atv21, "FD01"), ready="FD01") as program:
-        status, said = program.end(number)
-    assert (status, "F803 runs" in said) == (SIGNALS[number], True)
+        status, output = program.end(number)
+    assert (status, "F803 runs" in output) == (SIGNALS[number], True)
 
 
 @pytest.mark.parametrize("failure", ["", "The drive refused it."])
@@ -225,9 +229,9 @@ def test_a_signal_that_comes_while_it_is_said_takes_nothing_from_what_was_done(
 def test_hold_in_json() -> None:
     with tcp_line("atv21@1") as line:
         with served((*DRIVEPANEL, "hold", line, "--json"), ready='"holding"') as program:
-            told = json.loads(program.ready)
+            reported = json.loads(program.ready)
             program.end()
-        assert (told["device"], told["event"], told["timeout"]) == (1, "holding", ERR5)
+        assert (reported["device"], reported["event"], reported["timeout"]) == (1, "holding", ERR5)
 
 
 def test_hold_tells_of_a_drive_that_is_lost_and_of_one_that_never_was() -> None:

@@ -52,7 +52,7 @@ def slow_family() -> str:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
 @pytest.mark.parametrize(
-    ("settings", "more", "told"),
+    ("settings", "more", "reported"),
     [
         ("", ["-p", "slow"], "9600 baud and 8N2 (the profile's own)"),
         (",38400,8E1", ["-p", "slow"], "38400 baud and 8E1 (as typed)"),
@@ -60,10 +60,10 @@ def slow_family() -> str:
     ],
 )
 def test_silence_says_to_check_the_settings(
-    slow_family: str, settings: str, more: list[str], told: str
+    slow_family: str, settings: str, more: list[str], reported: str
 ) -> None:
     with pty_pair() as (near, _):
         done = CliRunner().invoke(main, ["read", f"serial:{near}{settings}", "ACC", *more])
     assert done.exit_code == 3
-    assert told in done.output
+    assert reported in done.output
     assert "did not answer" in done.output

@@ -55,8 +55,8 @@ def test_a_name_stands_where_a_line_is_typed(line: str) -> None:
     named(line)
     assert json.loads(run(0, "read", "pump", "ACC", "--json"))["line"] == line
     assert json.loads(run(0, "identify", "PUMP", "--json"))["profile"] == "atv71"
-    told = json.loads(run(0, "read", "fan", "5.01", "--json"))
-    assert (told["device"], told["profile"]) == (5, "powerdrive")
+    reported = json.loads(run(0, "read", "fan", "5.01", "--json"))
+    assert (reported["device"], reported["profile"]) == (5, "powerdrive")
 
 
 def test_what_is_typed_goes_before_what_the_name_says(line: str) -> None:
@@ -113,15 +113,15 @@ def test_the_environment_may_hold_a_name(line: str, monkeypatch: pytest.MonkeyPa
 
 def test_a_name_that_is_none_is_told_with_those_there_are(line: str) -> None:
     named(line)
-    told = refused(2, "read", "pumb", "ACC")
-    assert "'pumb' is not a LINE or a name from" in told
-    assert "pump, fan" in told
+    reported = refused(2, "read", "pumb", "ACC")
+    assert "'pumb' is not a LINE or a name from" in reported
+    assert "pump, fan" in reported
 
 
 def test_a_fault_in_the_settings_is_told_where_a_name_is_used_and_nowhere_else(line: str) -> None:
     settings(f'[lines]\npump = "{line}"\nfan = 5\n')
-    told = refused(2, "read", "fan", "ACC")
-    assert "settings.toml:3: lines.fan: a LINE in quotes" in told
+    reported = refused(2, "read", "fan", "ACC")
+    assert "settings.toml:3: lines.fan: a LINE in quotes" in reported
     for where in ("pump", line):
         done = invoked("read", where, "ACC")
         assert (done.exit_code, done.stderr) == (0, "")
@@ -141,22 +141,22 @@ def test_no_settings_file_keeps_a_stop_from_its_drive(line: str, profile: str) -
 
 def test_the_profile_of_one_drive_stops_no_other(line: str) -> None:
     settings(f'[lines.fan]\nline = "{line}"\ndevice = 1\nprofile = "atv71"\n')
-    told = refused(4, "stop", "fan", "--all", "--addresses", "5")
-    assert "Read as Powerdrive, it is at standstill" in told
+    reported = refused(4, "stop", "fan", "--all", "--addresses", "5")
+    assert "Read as Powerdrive, it is at standstill" in reported
 
 
 def test_lines_lists_the_names_and_what_is_remembered(line: str) -> None:
     assert "No line has a name" in run(0, "lines")
     named(line)
     run(0, "identify", "pump")
-    told = json.loads(run(0, "lines", "--json"))
-    assert told["settings"] == str(settings_file())
-    assert told["faults"] == []
-    assert told["lines"] == [
+    reported = json.loads(run(0, "lines", "--json"))
+    assert reported["settings"] == str(settings_file())
+    assert reported["faults"] == []
+    assert reported["lines"] == [
         {"name": "pump", "line": line, "device": None, "profile": None},
         {"name": "fan", "line": line, "device": 5, "profile": "powerdrive"},
     ]
-    (known,) = told["known"]
+    (known,) = reported["known"]
     assert (known["line"], known["drives"][0]["profile"]) == (line, "atv71")
     text = run(0, "lines")
     assert "fan" in text

@@ -40,7 +40,7 @@ def packets(path: Path) -> list[bytes]:
     return [body[20 : 20 + struct.unpack_from("<I", body, 12)[0]] for body in found]
 
 
-def told(*arguments: str | Path) -> list[dict[str, Any]]:
+def reported(*arguments: str | Path) -> list[dict[str, Any]]:
     """The objects that `listen --json` prints; all fit the schema."""
     return documents(run(0, "listen", *arguments, "--json"))
 
@@ -72,7 +72,7 @@ def test_a_line_of_text_for_each_exchange_and_a_summary() -> None:
 
 
 def test_an_object_for_each_exchange_and_a_summary() -> None:
-    *exchanges, summary = told(TWO, "--for", "0.8")
+    *exchanges, summary = reported(TWO, "--for", "0.8")
     assert {one["event"] for one in exchanges} == {"exchange"}
     read = next(one for one in exchanges if one["device"] == 1 and "RFR" in one["values"])
     assert (read["function"], read["answer"], read["how"]) == (3, "ok", "identified")
@@ -91,19 +91,19 @@ def test_an_object_for_each_exchange_and_a_summary() -> None:
 
 
 def test_profiles_of_all_drives_and_of_one() -> None:
-    *exchanges, _ = told(TWO, "--for", "0.5", "-p", "atv31", "-p", "2=atv71")
+    *exchanges, _ = reported(TWO, "--for", "0.5", "-p", "atv31", "-p", "2=atv71")
     taken = {(one["device"], one["profile"], one["how"]) for one in exchanges}
     assert taken == {(1, "atv31", "named"), (2, "atv71", "named")}
 
 
 def test_summaries_on_the_way() -> None:
-    found = told(TWO, "--for", "2.5", "--every", "1")
+    found = reported(TWO, "--for", "2.5", "--every", "1")
     assert [one["event"] for one in found].count("summary") == 3
 
 
 def test_a_file_of_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
-    *exchanges, summary = told(TWO, "--for", "0.8", "--pcap", path)
+    *exchanges, summary = reported(TWO, "--for", "0.8", "--pcap", path)
     found = packets(path)
     assert len(found) == summary["frames"]
     mbap = [packet[40:] for packet in found]
@@ -183,7 +183,7 @@ def test_a_kill_leaves_a_whole_file(tmp_path: Path) -> None:
 def test_silence_and_refusals_of_a_plc_cycle() -> None:
     with plc(*CYCLE, NOBODY) as master:
         master.start()
-        *exchanges, summary = told(master.path, "--for", "2")
+        *exchanges, summary = reported(master.path, "--for", "2")
     answers = {(one["device"], one["function"], one["answer"]) for one in exchanges}
     assert {(2, 3, "ok"), (2, 6, "ok"), (2, 3, "exception"), (9, 3, "none")} <= answers
     two, nine = summary["drives"]
@@ -216,7 +216,7 @@ def test_the_name_of_a_line_names_the_profile_of_its_drive() -> None:
     path.write_text(
         f'[lines.fan]\nline = "{TWO}"\ndevice = 2\nprofile = "atv71"\n', encoding="utf-8"
     )
-    *exchanges, _ = told("fan", "--for", "0.5")
+    *exchanges, _ = reported("fan", "--for", "0.5")
     assert {(one["device"], one["profile"], one["how"]) for one in exchanges} == {
         (1, "atv71", "identified"),
         (2, "atv71", "named"),

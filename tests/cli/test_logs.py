@@ -26,11 +26,11 @@ def test_work_that_dies_leaves_its_traceback_in_the_log() -> None:
     finally:
         opened.close()
     stop_logging()
-    said = log_file().read_text()
-    assert "watching device 1 ended by an error" in said
-    assert "Traceback" in said
-    assert "in unforeseen" in said
-    assert "ZeroDivisionError: nobody thought of this" in said
+    output = log_file().read_text()
+    assert "watching device 1 ended by an error" in output
+    assert "Traceback" in output
+    assert "in unforeseen" in output
+    assert "ZeroDivisionError: nobody thought of this" in output
 
 
 def test_every_module_logs_by_its_own_name() -> None:

@@ -65,8 +65,8 @@ def test_what_is_not_good_has_no_value(why: str) -> None:
 
 def test_a_fault_is_told_by_its_code_and_its_name_is_escaped() -> None:
     seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x88, LFT=18))))
-    told = f'drivepanel_drive_fault_info{{{WHERE},fault="ObF",name="Over\\"braking\\\\"}} 1'
-    assert told in seen
+    reported = f'drivepanel_drive_fault_info{{{WHERE},fault="ObF",name="Over\\"braking\\\\"}} 1'
+    assert reported in seen
     assert f"drivepanel_drive_alarm{{{WHERE}}} 1" in seen
     past = text_of(line_of(drive_of(cycle(small_drive(), ETA=0x27, LFT=18))))
     assert "fault_info" not in past
@@ -174,7 +174,7 @@ async def served() -> AsyncIterator[int]:
     await server.close()
 
 
-async def asked(port: int, request: bytes) -> bytes:
+async def requested(port: int, request: bytes) -> bytes:
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     writer.write(request)
     try:
@@ -187,41 +187,43 @@ async def asked(port: int, request: bytes) -> bytes:
 
 
 async def test_metrics_are_told_and_nothing_else(served: int) -> None:
-    answer = await asked(served, b"GET /metrics HTTP/1.1\r\nHost: LOCALHOST:1\r\n\r\n")
+    answer = await requested(served, b"GET /metrics HTTP/1.1\r\nHost: LOCALHOST:1\r\n\r\n")
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4;")
     assert body == b"drivepanel_x 1\n"
-    assert (await asked(served, b"GET /metrics?a=1 HTTP/1.0\r\n\r\n")).startswith(b"HTTP/1.1 200")
-    head_only = await asked(served, b"HEAD /metrics HTTP/1.1\r\n\r\n")
+    assert (await requested(served, b"GET /metrics?a=1 HTTP/1.0\r\n\r\n")).startswith(
+        b"HTTP/1.1 200"
+    )
+    head_only = await requested(served, b"HEAD /metrics HTTP/1.1\r\n\r\n")
     assert head_only.endswith(b"Content-Length: 15\r\nConnection: close\r\n\r\n")
-    assert (await asked(served, b"GET / HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 404")
-    assert (await asked(served, b"POST /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 405")
-    assert (await asked(served, b"\x16\x03\r\n\r\n")).startswith(b"HTTP/1.1 405")
+    assert (await requested(served, b"GET / HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 404")
+    assert (await requested(served, b"POST /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 405")
+    assert (await requested(served, b"\x16\x03\r\n\r\n")).startswith(b"HTTP/1.1 405")
 
 
 async def test_an_error_that_nobody_foresaw_ends_no_service() -> None:
     wrong = ["once"]
 
-    def told() -> str:
+    def reported() -> str:
         if wrong:
             raise RuntimeError(wrong.pop())
         return 'x{name="\udcff"} 1\n'
 
-    server = MetricsServer(told)
+    server = MetricsServer(reported)
     _, port = await server.listen("127.0.0.1", 0)
-    assert (await asked(port, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 500")
-    assert (await asked(port, b"GET /metrics HTTP/1.1\r\n\r\n")).endswith(b'x{name="?"} 1\n')
+    assert (await requested(port, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 500")
+    assert (await requested(port, b"GET /metrics HTTP/1.1\r\n\r\n")).endswith(b'x{name="?"} 1\n')
     await server.close()
 
 
 async def test_a_client_that_asks_too_much_is_let_go(served: int) -> None:
-    assert await asked(served, b"GET /" + b"x" * 2 * LONGEST_REQUEST) == b""
-    assert (await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    assert await requested(served, b"GET /" + b"x" * 2 * LONGEST_REQUEST) == b""
+    assert (await requested(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
 
 
 async def test_idle_connections_keep_nobody_out(served: int) -> None:
     idle = [await asyncio.open_connection("127.0.0.1", served) for _ in range(MOST_SCRAPES)]
-    assert (await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    assert (await requested(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
     assert await idle[0][0].read() == b"", "the oldest one has made room"
     for _, writer in idle:
         writer.close()
@@ -245,5 +247,5 @@ async def test_metrics_are_for_who_asks_by_a_name_of_this_server(
     served: int, host: bytes, status: int
 ) -> None:
     """A web page in a browser of this network could read them under a name of its own."""
-    answer = await asked(served, b"GET /metrics HTTP/1.1\r\nhost: " + host + b"\r\n\r\n")
+    answer = await requested(served, b"GET /metrics HTTP/1.1\r\nhost: " + host + b"\r\n\r\n")
     assert answer.startswith(b"HTTP/1.1 %d " % status)

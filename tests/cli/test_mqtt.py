@@ -36,22 +36,22 @@ BROKER = Broker("broker", 1883, False, None, None, "plant")
 def test_a_cycle_of_a_drive_is_one_message() -> None:
     seen = drive_of(cycle(small_drive(), ETA=0x88, RFR=499, LFT=18))
     ((topic, text),) = drive_messages("plant/hall", [line_of(seen)]).items()
-    told = json.loads(text)
+    reported = json.loads(text)
     assert topic == "plant/hall/pump/2"
-    assert (told["device"], told["state"]) == (2, "fault")
-    assert told["fault"] == {"code": "ObF", "name": 'Over"braking\\'}
-    assert told["values"]["RFR"]["value"] == 49.9
-    assert told["values"]["RFR"]["unit"] == "Hz"
-    assert told["values"]["RFR"]["quality"] == "good"
-    assert told["values"]["RFR"]["time"].startswith("2023-11-14T22:13:20")
+    assert (reported["device"], reported["state"]) == (2, "fault")
+    assert reported["fault"] == {"code": "ObF", "name": 'Over"braking\\'}
+    assert reported["values"]["RFR"]["value"] == 49.9
+    assert reported["values"]["RFR"]["unit"] == "Hz"
+    assert reported["values"]["RFR"]["quality"] == "good"
+    assert reported["values"]["RFR"]["time"].startswith("2023-11-14T22:13:20")
 
 
 def test_what_is_not_good_says_so() -> None:
     seen = drive_of(failed(cycle(small_drive(), ETA=0x27, RFR=499), "No answer."))
     (text,) = drive_messages("plant", [line_of(seen)]).values()
-    told = json.loads(text)
-    assert (told["state"], told["error"]) == (None, "No answer.")
-    assert {one["quality"] for one in told["values"].values()} == {"stale"}
+    reported = json.loads(text)
+    assert (reported["state"], reported["error"]) == (None, "No answer.")
+    assert {one["quality"] for one in reported["values"].values()} == {"stale"}
     (text,) = drive_messages("plant", [line_of(DriveSight(2, error="Nobody."))]).values()
     assert json.loads(text) | {"error": "Nobody.", "values": {}, "profile": None} == json.loads(
         text
@@ -61,9 +61,13 @@ def test_what_is_not_good_says_so() -> None:
 def test_a_line_is_told_with_what_it_counted() -> None:
     ((topic, text),) = line_messages("plant", [line_of()]).items()
     assert topic == "plant/pump/line"
-    told = json.loads(text)
-    assert (told["state"], told["reason"], told["counters"]["requests"]) == ("connected", None, 0)
-    assert told["last_minute"]["share"] is None
+    reported = json.loads(text)
+    assert (reported["state"], reported["reason"], reported["counters"]["requests"]) == (
+        "connected",
+        None,
+        0,
+    )
+    assert reported["last_minute"]["share"] is None
 
 
 def test_a_line_is_one_level_of_a_topic() -> None:
@@ -87,7 +91,7 @@ def test_a_url_says_which_broker() -> None:
 
 
 @pytest.mark.parametrize(
-    ("url", "told"),
+    ("url", "reported"),
     [
         ("broker", "write mqtt://"),
         ("http://broker", "write mqtt://"),
@@ -100,9 +104,9 @@ def test_a_url_says_which_broker() -> None:
         ("mqtt://me:secret@h", "seen by every user"),
     ],
 )
-def test_what_is_no_broker_is_refused(url: str, told: str) -> None:
-    assert told in refused(2, "serve", "sim:atv71", "--mqtt", url)
-    assert told in refused(2, "publish", "sim:atv71", "--mqtt", url)
+def test_what_is_no_broker_is_refused(url: str, reported: str) -> None:
+    assert reported in refused(2, "serve", "sim:atv71", "--mqtt", url)
+    assert reported in refused(2, "publish", "sim:atv71", "--mqtt", url)
 
 
 def test_the_password_comes_out_of_a_file_or_the_environment(
@@ -209,11 +213,11 @@ async def test_everything_is_retained_anew_after_a_lost_connection(
     publisher.end()
     await task
     assert clients.made[3].retained["plant/status"] == "offline"
-    said = capsys.readouterr().err
-    assert said.count("It is tried on.") == 2
-    assert said.count("is connected again.") == 2
-    assert ": Connection refused. It is tried on." in said
-    assert "Errno" not in said
+    output = capsys.readouterr().err
+    assert output.count("It is tried on.") == 2
+    assert output.count("is connected again.") == 2
+    assert ": Connection refused. It is tried on." in output
+    assert "Errno" not in output
 
 
 async def test_an_error_that_nobody_foresaw_ends_no_publishing(

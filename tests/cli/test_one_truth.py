@@ -28,13 +28,13 @@ ELSEWHERE = {
 def test_what_status_tells_is_what_run_says(family: str, sets: dict[str, int], why: str) -> None:
     words = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
     with tcp_line(f"{family}@1", *words) as line:
-        told = json.loads(run(0, "status", line, "-p", family, "--json"))
-        assert told["commandable"] is False
-        assert why in told["why_not"]
+        reported = json.loads(run(0, "status", line, "-p", family, "--json"))
+        assert reported["commandable"] is False
+        assert why in reported["why_not"]
         done = drivepanel("run", line, "-p", family, "--arm")
         assert (done.returncode, done.stdout) == (5, "")
-        assert told["why_not"] in done.stderr
-        assert told["why_not"] in run(0, "status", line, "-p", family)
+        assert reported["why_not"] in done.stderr
+        assert reported["why_not"] in run(0, "status", line, "-p", family)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_an_idle_drive_set_up_for_the_line_is_commanded_by_it(
 ) -> None:
     words = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
     with tcp_line(f"{family}@1", *words) as line:
-        told = json.loads(run(0, "status", line, "-p", family, "--json"))
-    assert (told["commandable"], told["why_not"]) == (True, None)
+        reported = json.loads(run(0, "status", line, "-p", family, "--json"))
+    assert (reported["commandable"], reported["why_not"]) == (True, None)
     if family != "powerdrive":
-        assert told["commanded_by"] == "Modbus"
+        assert reported["commanded_by"] == "Modbus"

@@ -114,13 +114,13 @@ def test_the_demo_opens_a_line_of_its_own(panel: type[FakePanel]) -> None:
 def test_a_line_chosen_in_the_demo_is_that_line(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[tuple[str, dict[str, Any]]] = []
+    requested: list[tuple[str, dict[str, Any]]] = []
     monkeypatch.setattr(
-        "tui.session.connect.open_line.open_line", lambda text, **how: asked.append((text, how))
+        "tui.session.connect.open_line.open_line", lambda text, **how: requested.append((text, how))
     )
     assert CliRunner().invoke(main, ["demo"]).exit_code == 0
     panel.given["open_line"]("/dev/ttyUSB0", read_only=True, wait=4.0)
-    assert asked == [("/dev/ttyUSB0", {"read_only": True, "wait": 4.0, "program": ""})]
+    assert requested == [("/dev/ttyUSB0", {"read_only": True, "wait": 4.0, "program": ""})]
 
 
 def test_a_panel_that_had_to_stop_is_no_success(

@@ -46,7 +46,7 @@ class Bench:
         seen = self.sight(device)
         return seen.cycle is not None and not seen.error
 
-    def asked(self, device: int) -> int:
+    def requested(self, device: int) -> int:
         """Requests that went out to a device."""
         counted = self.opened.line.counters.devices.get(device)
         return counted.requests if counted is not None else 0
@@ -84,15 +84,15 @@ async def test_a_drive_that_is_away_keeps_no_other_from_being_read(
     assert bench.sight(HERE).contact == "not_polled"
     await wait_for(lambda: bench.good(HERE) and bench.good(OTHER))
     assert bench.changes
-    before = bench.asked(HERE)
-    await wait_for(lambda: bench.asked(HERE) > before + 20)
-    assert bench.asked(AWAY) < before
+    before = bench.requested(HERE)
+    await wait_for(lambda: bench.requested(HERE) > before + 20)
+    assert bench.requested(AWAY) < before
     assert "did not answer" in bench.sight(AWAY).error
     assert (bench.sight(AWAY).contact, bench.sight(HERE).contact) == ("silent", "answers")
     await wait_for(lambda: "name its profile" in bench.sight(NAMELESS).error)
-    said = capsys.readouterr().err
-    assert said.count("Device 9 did not answer") == 1
-    assert said.count("It is tried on.") == 2
+    output = capsys.readouterr().err
+    assert output.count("Device 9 did not answer") == 1
+    assert output.count("It is tried on.") == 2
 
 
 async def test_drive_never_polled_comes_before_one_that_is_away(

@@ -116,11 +116,11 @@ def test_who_watches_the_line_is_named_before_the_first_request() -> None:
         done = invoked("scan", peer.path, "--addresses", "1-2", "--json")
     assert documents(done.stdout)[0]["event"] == "families"
     assert "watch the line" in done.stderr.splitlines()[0]
-    (told,) = events(done.stdout, "families")
-    assert {"profile": "atv21", "name": "Altivar 21", "timeout": "F803", "sure": True} in told[
+    (reported,) = events(done.stdout, "families")
+    assert {"profile": "atv21", "name": "Altivar 21", "timeout": "F803", "sure": True} in reported[
         "families"
     ]
-    assert "atv71" not in {one["profile"] for one in told["families"]}
+    assert "atv71" not in {one["profile"] for one in reported["families"]}
 
 
 @pytest.mark.parametrize("options", [(), ("--all-settings", "--yes")], ids=["one", "all"])
@@ -175,8 +175,8 @@ def test_two_drives_at_one_address_are_told_as_unclear() -> None:
     with PtyPeer(script) as peer:
         done = invoked("scan", peer.path, "--addresses", "2-4", "--json")
     assert done.exit_code == 3
-    (told,) = events(done.stdout, "unclear")
-    assert told["device"] == 3
+    (reported,) = events(done.stdout, "unclear")
+    assert reported["device"] == 3
 
 
 def test_damaged_identification_is_unclear_and_no_family_is_likely() -> None:
@@ -272,8 +272,8 @@ def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
     with PtyPeer(silent) as peer:
         done = invoked("scan", peer.path, "--addresses", "1", "--all-settings", "--json")
-    (told,) = events(done.stdout, "slow")
-    assert [one["baud"] for one in told["settings"]] == [600, 300]
+    (reported,) = events(done.stdout, "slow")
+    assert [one["baud"] for one in reported["settings"]] == [600, 300]
     text = "Left are 300 and 600 baud: 1 s more, for Powerdrive, Proxidrive and Varmeca 33/34 alone"
     assert text in done.stderr
     (end,) = events(done.stdout, "ended")
@@ -282,13 +282,13 @@ def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.MonkeyPatch
 
 def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() -> None:
     with line_of(DriveSpec("atv21", 1), SLOW) as line:
-        asked = "scan", line, "--addresses", "1,4", "--all-settings", "--json"
-        held = ended(0, *asked)
+        requested = "scan", line, "--addresses", "1,4", "--all-settings", "--json"
+        held = ended(0, *requested)
         (end,) = events(held.stdout, "ended")
         assert len(end["settings"]) == 1
         assert "Device 1, Altivar 21" in end["held_back"]
         assert "--yes" in held.stderr
-        text = ended(0, *asked, "--yes").stdout
+        text = ended(0, *requested, "--yes").stdout
         assert [one["device"] for one in events(text, "hit")] == [1, 4]
 
 
@@ -296,9 +296,9 @@ def test_a_line_that_others_use_is_not_taken_for_other_settings() -> None:
     with line_of(DriveSpec("atv71", 1)) as line:
         watch = [*DRIVEPANEL, "watch", line, "RFR", "--json"]
         with served(watch, ready="RFR"):
-            said = ended(5, "scan", line, "--addresses", "1-2", "--all-settings").stderr
-            assert "needs the line for itself" in said
-            assert "watch" in said
+            output = ended(5, "scan", line, "--addresses", "1-2", "--all-settings").stderr
+            assert "needs the line for itself" in output
+            assert "watch" in output
             # beside it at the line's own setting
             assert "Altivar 71" in ended(0, "scan", line, "--addresses", "1-2").stdout
 
@@ -308,11 +308,11 @@ def test_ctrl_c_keeps_what_was_found() -> None:
         scan = [*DRIVEPANEL, "scan", line, "--all-settings", "--json"]
         with served(scan, ready='"hit"') as program:
             program.process.send_signal(signal.SIGINT)
-            rest, said = program.process.communicate(timeout=PATIENCE)
+            rest, output = program.process.communicate(timeout=PATIENCE)
     assert program.process.returncode == 130
     (end,) = events(rest, "ended")
     assert (end["done"], end["found"]) == (False, 1)
-    assert "Ended by Ctrl-C. 1 drive found" in said
+    assert "Ended by Ctrl-C. 1 drive found" in output
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from .commands import refused
 
 
 @pytest.mark.parametrize(
-    ("typed", "told"),
+    ("typed", "reported"),
     [
         ([], "Missing argument 'LINE...'"),
         (["sim:atv71", "--fresh", "1"], "require --tcp"),
@@ -41,18 +41,18 @@ from .commands import refused
         (["tcp:10.0.0.1", "sim:atv71", "--metrics", ":1", "-d", "1", "-p", "atv71"], "which line"),
     ],
 )
-def test_what_makes_no_sense_is_usage(typed: list[str], told: str) -> None:
-    assert told in refused(2, "serve", *typed)
+def test_what_makes_no_sense_is_usage(typed: list[str], reported: str) -> None:
+    assert reported in refused(2, "serve", *typed)
 
 
 def test_a_port_that_is_taken_is_told() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port: int = taken.getsockname()[1]
         place = f"127.0.0.1:{port}"
-        told = refused(3, "serve", "sim:atv71", "--tcp", place)
-        assert f"Nothing can be served at {place}: Address already in use." in told
-        told = refused(3, "serve", "sim:atv71", "--metrics", place)
-        assert f"No metrics can be served at {place}: Address already in use." in told
+        reported = refused(3, "serve", "sim:atv71", "--tcp", place)
+        assert f"Nothing can be served at {place}: Address already in use." in reported
+        reported = refused(3, "serve", "sim:atv71", "--metrics", place)
+        assert f"No metrics can be served at {place}: Address already in use." in reported
 
 
 def test_a_line_without_a_keeper_is_told(

@@ -67,13 +67,13 @@ def test_back_up_write_compare_restore(line: str, tmp_path: Path) -> None:
 
 def test_two_drives_of_a_line(tmp_path: Path) -> None:
     with tcp_line("atv31@1", "atv31@2", "--set", "2:ACC=99") as line:
-        told = run(1, "compare", line, line, "-d", "1", "-d", "2")
-        assert {row.split()[1] for row in told.splitlines()[1:]} == {"ACC", "Add"}
+        reported = run(1, "compare", line, line, "-d", "1", "-d", "2")
+        assert {row.split()[1] for row in reported.splitlines()[1:]} == {"ACC", "Add"}
 
 
 def test_the_factory_settings(line: str) -> None:
-    told = run(1, "compare", "factory", line, "-d", "2")
-    assert "LAC" in told
+    reported = run(1, "compare", "factory", line, "-d", "2")
+    assert "LAC" in reported
     assert "ACC" in run(1, "compare", "factory", line, "-d", "2", "--all")
 
 
@@ -96,8 +96,8 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
         finally:
             process.send_signal(signal.SIGKILL)
             process.communicate(timeout=PATIENCE)
-        told = run(0, "restore", line, file, "--arm")
-        assert "did not come to its end" in told
+        reported = run(0, "restore", line, file, "--arm")
+        assert "did not come to its end" in reported
         run(0, "compare", file, line)
         assert "did not come" not in run(0, "restore", line, file, "--arm")
 
@@ -116,8 +116,8 @@ def test_3_a_restore_that_cannot_look_again_says_why(
         return await looks.pop()(*what, **how)
 
     monkeypatch.setattr("tui.session.settings.restore.plan_for", once)
-    said = refused(3, "restore", line, file, "--arm", "-d", "2")
-    assert "Not all of it was seen again: The gateway is gone." in said
+    output = refused(3, "restore", line, file, "--arm", "-d", "2")
+    assert "Not all of it was seen again: The gateway is gone." in output
 
 
 def test_130_a_restore_ended_by_ctrl_c_tells_what_was_written(tmp_path: Path) -> None:
@@ -135,14 +135,14 @@ def test_130_a_restore_ended_by_ctrl_c_tells_what_was_written(tmp_path: Path) ->
         while held(line, SP2) == 100:
             assert time.monotonic() < end
         process.send_signal(signal.SIGINT)
-        out, said = process.communicate(timeout=PATIENCE)
+        out, output = process.communicate(timeout=PATIENCE)
         if process.returncode == 0:
             pytest.skip("the restore was done before the signal came")
         assert process.returncode == 130
-        told = json.loads(out)
-        assert told["status"] == 130
-        assert re.search(r"Ended by Ctrl-C: \d of 7 written: SP2|may have been written", said)
-        assert said.endswith(f"{told['error']}\n")
+        reported = json.loads(out)
+        assert reported["status"] == 130
+        assert re.search(r"Ended by Ctrl-C: \d of 7 written: SP2|may have been written", output)
+        assert output.endswith(f"{reported['error']}\n")
 
 
 def _unbuffered() -> dict[str, str]:
@@ -172,8 +172,8 @@ def test_a_backup_on_standard_output(line: str, tmp_path: Path) -> None:
 
 def test_4_a_backup_that_is_not_whole(tmp_path: Path) -> None:
     with tcp_line("atv71@2", "--protect", "ACC") as line:
-        said = refused(4, "backup", line, tmp_path / "set.toml", "-d", "2")
-    assert "ACC could not be read" in said
+        output = refused(4, "backup", line, tmp_path / "set.toml", "-d", "2")
+    assert "ACC could not be read" in output
     assert "[absent]" in (tmp_path / "set.toml").read_text("utf-8")
 
 
@@ -188,8 +188,8 @@ def test_drives_of_one_line_are_told_apart_by_their_address(tmp_path: Path) -> N
 
 def test_line_settings_are_not_compared_with_the_factory() -> None:
     with tcp_line("atv31@5", "--set", "ACC=99") as line:
-        told = run(1, "compare", line, "factory", "-d", "5")
-        codes = {row.split()[1] for row in told.splitlines()[1:]}
+        reported = run(1, "compare", line, "factory", "-d", "5")
+        codes = {row.split()[1] for row in reported.splitlines()[1:]}
         assert "ACC" in codes
         assert "Add" not in codes
         every = run(1, "compare", line, "factory", "-d", "5", "--all")
@@ -203,16 +203,16 @@ ROUNDED = [("LSP=0.04", "LSP: 0.04 would be held as 0.0 Hz"), ("ACC=3.55s", "3.5
 def test_5_a_value_that_rounding_makes_another_of(line: str, wanted: str, text: str) -> None:
     drive = (line, "-d", "2")
     for how in ("--arm", "--dry-run"):
-        said = refused(5, "write", *drive, wanted, how)
-        assert text in said
-        assert "--round" in said
+        output = refused(5, "write", *drive, wanted, how)
+        assert text in output
+        assert "--round" in output
     code = wanted.partition("=")[0]
     assert code in run(0, "write", *drive, wanted, "--arm", "--round")
 
 
 def test_what_is_a_little_rounded_is_written_and_told(line: str) -> None:
-    told = run(0, "write", line, "-d", "2", "ACC=3.56", "--arm")
-    assert "3.56 is held as 3.6 s" in told
+    reported = run(0, "write", line, "-d", "2", "ACC=3.56", "--arm")
+    assert "3.56 is held as 3.6 s" in reported
 
 
 def test_2_a_code_that_is_given_twice(line: str) -> None:
@@ -232,10 +232,10 @@ def test_a_set_does_not_round_in_silence(line: str, tmp_path: Path) -> None:
     file.write_text(text, encoding="utf-8")
     planned = run(0, "restore", line, file, "-d", "2", "--dry-run")
     assert "leave  ACC" in planned
-    told = run(0, "restore", line, file, "-d", "2", "--arm")
-    assert "3.55 s is held as 3.6 s. Use --round to write it anyway" in told
-    assert "3.56 s is held as 3.6 s" in told
-    assert "1 written and read back" in told
+    reported = run(0, "restore", line, file, "-d", "2", "--arm")
+    assert "3.55 s is held as 3.6 s. Use --round to write it anyway" in reported
+    assert "3.56 s is held as 3.6 s" in reported
+    assert "1 written and read back" in reported
     assert "write  ACC" in run(0, "restore", line, file, "-d", "2", "--dry-run", "--round")
 
 
@@ -269,9 +269,10 @@ def test_2_a_bad_file_is_told_with_its_line(tmp_path: Path) -> None:
     run(0, "backup", "sim:powerdrive", file, "-p", "powerdrive", "--force")
     file.write_text(text[: len(text) // 2], encoding="utf-8")
     for command in (("compare", file, "factory"), ("restore", "sim:powerdrive", file, "--dry-run")):
-        said = refused(2, *command)
+        output = refused(2, *command)
         assert (
-            f"{file}:{len((text[: len(text) // 2]).splitlines())}: " in said or "cut short" in said
+            f"{file}:{len((text[: len(text) // 2]).splitlines())}: " in output
+            or "cut short" in output
         )
 
 
@@ -318,9 +319,9 @@ def test_5_nothing_is_restored_unarmed(tmp_path: Path) -> None:
 
 def test_6_a_motor_that_runs_is_not_set_up_whole() -> None:
     with tcp_line("atv312", "--run", "30") as line:
-        said = refused(6, "write", line, "ACC=4", "FrS=60", "--arm")
-        assert "motor stopped only" in said
-        assert "1 to write" not in said
+        output = refused(6, "write", line, "ACC=4", "FrS=60", "--arm")
+        assert "motor stopped only" in output
+        assert "1 to write" not in output
         assert re.search(r"ACC .* 4\.0 +s ", run(0, "read", line, "ACC"))
 
 
@@ -353,8 +354,8 @@ def test_a_limit_is_raised_before_what_it_limits() -> None:
 
 def test_where_the_drive_is_found_after_its_address_was_written() -> None:
     with tcp_line("atv21") as line:
-        told = run(0, "write", line, "F802=7", "--arm")
-        assert "-d 7" in told
+        reported = run(0, "write", line, "F802=7", "--arm")
+        assert "-d 7" in reported
         end = time.monotonic() + PATIENCE
         while invoked("read", line, "F802", "-d", "7").exit_code != 0:
             assert time.monotonic() < end
@@ -363,9 +364,9 @@ def test_where_the_drive_is_found_after_its_address_was_written() -> None:
 def test_a_set_of_another_family_is_carried_over_by_quantity(line: str, tmp_path: Path) -> None:
     with tcp_line("atv71", "--set", "ACC=88") as other:
         run(0, "backup", other, tmp_path / "71.toml")
-    told = run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--dry-run")
-    assert "write  ACC: 3.0 s -> 8.8 s" in told
-    assert "of another family" in told
+    reported = run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--dry-run")
+    assert "write  ACC: 3.0 s -> 8.8 s" in reported
+    assert "of another family" in reported
     run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--arm")
     assert re.search(r"ACC .* 8\.8 +s ", run(0, "read", line, "ACC", "-d", "2"))
 
@@ -387,9 +388,11 @@ def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
     with tcp_line("atv312@1,atv312@2,atv21@3") as line:
         run(0, "write", line, "ACC=7", "HSP=40", "-d", "1", "--arm")
         run(0, "backup", line, file)
-        told = run(0, "restore", line, file, "-d", "1", "-d", "2", "--arm")
-        assert "Device 1:" in told
-        assert told.index("0 written") < told.index("Device 2:") < told.index("2 written")
+        reported = run(0, "restore", line, file, "-d", "1", "-d", "2", "--arm")
+        assert "Device 1:" in reported
+        assert (
+            reported.index("0 written") < reported.index("Device 2:") < reported.index("2 written")
+        )
         assert "equal" in run(0, "restore", line, file, "-d", "2", "--dry-run")
         # a drive that is not there keeps the set from no other
         run(0, "write", line, "ACC=3", "-d", "2", "--arm")

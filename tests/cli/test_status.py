@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from tests.programs import drivepanel, free_port
 from tui.bus.errors import RequestRefused
-from tui.cli.shared.errors import told
+from tui.cli.shared.errors import reported
 from tui.drive.errors import ValueRefused
 from tui.session.logs import log_file, start_logging, stop_logging
 
@@ -104,7 +104,7 @@ def test_4_the_drive_refused() -> None:
 @pytest.mark.parametrize("refusal", [RequestRefused, ValueRefused])
 def test_5_refused_here(refusal: type[Exception]) -> None:
     @click.command()
-    @told
+    @reported
     def command() -> None:
         raise refusal("ACC: 9999 is above 999.9 s.")
 
@@ -115,7 +115,7 @@ def test_5_refused_here(refusal: type[Exception]) -> None:
 
 def test_an_unforeseen_error_goes_to_the_log() -> None:
     @click.command()
-    @told
+    @reported
     def command() -> None:
         raise KeyError("nobody thought of this")
 
@@ -157,8 +157,8 @@ def test_a_time_out_that_the_drive_does_not_tell_is_not_called_none() -> None:
     """A Powerdrive is silent at the words of a port that it does not have."""
     both = ("powerdrive@1", "--protect", "15.07,11.63", "--any-settings")
     with tcp_line(*both) as line:
-        said = ended(0, "status", line, "-p", "powerdrive").stdout
-    assert "cannot be read: the drive may react when polling stops" in said
+        output = ended(0, "status", line, "-p", "powerdrive").stdout
+    assert "cannot be read: the drive may react when polling stops" in output
     with tcp_line("powerdrive@1", "--protect", "15.07", "--any-settings") as line:
-        said = ended(0, "status", line, "-p", "powerdrive").stdout
-    assert "none: it goes on without communication" in said
+        output = ended(0, "status", line, "-p", "powerdrive").stdout
+    assert "none: it goes on without communication" in output

@@ -35,9 +35,9 @@ def listed(text: str) -> list[dict[str, Any]]:
 
 def test_drives_are_told_with_their_lines_in_order(named: tuple[str, str]) -> None:
     pump, fan = named
-    told = listed(run(0, "status", "pump@2,1", "fan", "--json"))
+    reported = listed(run(0, "status", "pump@2,1", "fan", "--json"))
     drives = [(pump, 2, "atv312"), (pump, 1, "atv71"), (fan, 5, "atv71")]
-    assert [(one["line"], one["device"], one["profile"]) for one in told] == drives
+    assert [(one["line"], one["device"], one["profile"]) for one in reported] == drives
     text = run(0, "status", "pump@2,1", "fan").splitlines()
     assert [line for line in text if line.endswith(":")] == [
         "pump  device 2:", "pump  device 1:", "fan  device 5:",

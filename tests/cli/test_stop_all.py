@@ -30,12 +30,12 @@ def test_a_drive_that_another_program_leaves_alone_is_stopped_too() -> None:
     with tcp_line("atv71@1", "atv312@2") as line:
         opened = open_line(line, wait=5, program="prove")
         try:
-            opened.line.facts.hush(2, "Its communication timeout is being proved.")
-            told = run(0, "stop", line, "--all", "--addresses", "1-2")
+            opened.line.facts.pause_polling(2, "Its communication timeout is being proved.")
+            reported = run(0, "stop", line, "--all", "--addresses", "1-2")
         finally:
             opened.close()
-        assert "Device 1, Altivar 71: stopped" in told
-        assert "Device 2, Altivar 312: stopped" in told
+        assert "Device 1, Altivar 71: stopped" in reported
+        assert "Device 2, Altivar 312: stopped" in reported
         assert opened.line.facts.stops.totals == {1: 1, 2: 1}
 
 

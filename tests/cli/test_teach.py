@@ -39,8 +39,8 @@ def test_two_looks_teach_and_every_reading_has_the_unit_and_the_mark(line: str) 
     assert "Look again at another value" in teach(line, "1.21", "900 rpm")
     assert "taught" not in run(0, "read", line, *DRIVE, "1.21")
     put(line, PRESET, 600)
-    told = teach(line, "1.21", "600")
-    assert "1.21: 1 count is 1 rpm (raw 900 at 900 rpm, raw 600 at 600)." in told
+    reported = teach(line, "1.21", "600")
+    assert "1.21: 1 count is 1 rpm (raw 900 at 900 rpm, raw 600 at 600)." in reported
     row = run(0, "read", line, *DRIVE, "1.21").splitlines()[1]
     assert "600  rpm" in row
     assert row.rstrip().endswith("taught")
@@ -88,8 +88,8 @@ def test_a_number_below_zero_is_a_value_and_no_option(line: str) -> None:
 def test_1_a_look_that_disagrees_ends_it_and_says_so(line: str) -> None:
     preset_taught(line)
     teach(line, "1.21", "--reference")
-    said = teach(line, "1.21", "61.5", status=1)
-    assert "no longer taught (1 count is 1 rpm before)" in said
+    output = teach(line, "1.21", "61.5", status=1)
+    assert "no longer taught (1 count is 1 rpm before)" in output
     assert teach(line) == "Nothing is taught.\n"
     assert "no manual at hand" in refused(5, "reference", line, *DRIVE, "600rpm", "--arm")
 
@@ -137,8 +137,8 @@ def test_a_damaged_file_is_told_by_every_command_and_hinders_none(
 def test_a_reference_goes_to_the_taught_preset_once_it_is_confirmed(line: str) -> None:
     assert "teach 1.21" in refused(5, "reference", line, *DRIVE, "20", "--arm")
     preset_taught(line)
-    said = refused(5, "reference", line, *DRIVE, "700rpm", "--arm")
-    assert "1.21 --reference" in said
+    output = refused(5, "reference", line, *DRIVE, "700rpm", "--arm")
+    assert "1.21 --reference" in output
     assert held(line, PRESET) == 600
     confirmed = teach(line, "1.21", "--reference")
     assert "1.21 takes the reference, in rpm." in confirmed
@@ -154,20 +154,22 @@ def test_a_reference_goes_to_the_taught_preset_once_it_is_confirmed(line: str) -
 
 
 def test_taking_the_control_running_at_a_taught_reference_and_giving_it_back(line: str) -> None:
-    said = motor(5, line, *DRIVE, "--arm", "--for", "1")
-    assert "run --take-control takes the control first." in said
+    output = motor(5, line, *DRIVE, "--arm", "--for", "1")
+    assert "run --take-control takes the control first." in output
     assert held(line, COMMAND_WORD) == 0
     status = run(0, "status", line, *DRIVE)
     assert "drivepanel run --take-control takes it, in the panel t on Monitor." in status
     preset_taught(line)
     teach(line, "1.21", "--reference")
-    told = motor(0, line, *DRIVE, "--arm", "--take-control", "--reference", "750rpm", "--for", "1")
+    reported = motor(
+        0, line, *DRIVE, "--arm", "--take-control", "--reference", "750rpm", "--for", "1"
+    )
     order = ("Control by the line", "Reference 750 rpm (1.21)", "Unlock and run forward:")
-    places = [told.index(text) for text in order]
+    places = [reported.index(text) for text in order]
     assert places == sorted(places)
-    assert "stop --give-back --arm gives it back" in told
-    assert "1.21 Preset reference 1 750 rpm taught" in told
-    assert told.rstrip().endswith("stopped.")
+    assert "stop --give-back --arm gives it back" in reported
+    assert "1.21 Preset reference 1 750 rpm taught" in reported
+    assert reported.rstrip().endswith("stopped.")
     assert held(line, IN_FORCE) == 1
     control = json.loads(run(0, "status", line, *DRIVE, "--json"))["control"]
     assert control == {

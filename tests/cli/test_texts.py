@@ -104,8 +104,8 @@ def test_nothing_that_a_drive_or_a_profile_says_commands_a_terminal(
     done = invoked(command, line, *more, "-p", evil)
     assert done.exception is None or isinstance(done.exception, SystemExit), done.output
     assert "Traceback" not in done.output
-    said = done.output + run(0, "journal") + run(0, "journal", "--json")
-    assert tame(said), ascii(said)
+    output = done.output + run(0, "journal") + run(0, "journal", "--json")
+    assert tame(output), ascii(output)
     stop_logging()
     written = [path for path in tmp_path.rglob("*") if path.is_file() and "evil" not in path.name]
     for path in written:
@@ -133,9 +133,9 @@ def test_a_name_in_a_command_line() -> None:
 def test_a_name_of_a_file(tmp_path: Path) -> None:
     bad = tmp_path / "\x1b[31m[red].toml"
     bad.write_text("format = 1\n[drive\n", "utf-8")
-    said = refused(2, "compare", bad, "factory")
-    assert tame(said)
-    assert "␛[31m[red].toml" in said
+    output = refused(2, "compare", bad, "factory")
+    assert tame(output)
+    assert "␛[31m[red].toml" in output
 
 
 def test_a_profile_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,12 +14,12 @@ SIM = ("sim:atv71@2", "-d", "2")
 
 
 @pytest.mark.parametrize(
-    ("typed", "meant"), [("sttaus", "status"), ("Reed", "read"), ("wirte", "write")]
+    ("typed", "intended"), [("sttaus", "status"), ("Reed", "read"), ("wirte", "write")]
 )
-def test_a_misspelt_command_is_told_and_opens_no_panel(typed: str, meant: str) -> None:
+def test_a_misspelt_command_is_told_and_opens_no_panel(typed: str, intended: str) -> None:
     for words in ((typed, *SIM), ("--read-only", typed), (typed,)):
-        said = refused(2, *words)
-        assert f"{typed}: no such command, did you mean {meant}?" in said
+        output = refused(2, *words)
+        assert f"{typed}: no such command, did you mean {intended}?" in output
 
 
 def test_a_word_like_no_command_is_told_too() -> None:
@@ -58,10 +58,10 @@ def test_an_error_is_one_object_on_standard_output_too(
     words: tuple[str, ...], command: str, status: int
 ) -> None:
     done = ended(status, command, *words, "--json")
-    told = json.loads(done.stdout)
+    reported = json.loads(done.stdout)
     known = command if command in COMMANDS else None
-    assert told == {"schema": 1, "command": known, "error": told["error"], "status": status}
-    assert done.stderr == f"drivepanel: {told['error']}\n"
+    assert reported == {"schema": 1, "command": known, "error": reported["error"], "status": status}
+    assert done.stderr == f"drivepanel: {reported['error']}\n"
 
 
 def test_without_json_standard_output_stays_empty() -> None:
@@ -69,9 +69,9 @@ def test_without_json_standard_output_stays_empty() -> None:
 
 
 def test_the_statuses_stand_in_the_help() -> None:
-    told = invoked("--help").stdout
+    reported = invoked("--help").stdout
     for status in ("0  done", "1  a difference", "70  internal error", "130  ended by Ctrl-C"):
-        assert status in told
+        assert status in reported
 
 
 def test_an_end_by_ctrl_c_is_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,8 +24,8 @@ SHORT = ("--every", "0.1", "--count")
 
 def cycles(*arguments: str) -> list[dict[str, Any]]:
     """The objects that `watch --json` prints."""
-    told = run(0, "watch", *arguments, "--json")
-    return [json.loads(line) for line in told.splitlines()]
+    reported = run(0, "watch", *arguments, "--json")
+    return [json.loads(line) for line in reported.splitlines()]
 
 
 def test_nothing_is_good_once_the_server_is_gone() -> None:
@@ -40,16 +40,16 @@ def test_nothing_is_good_once_the_server_is_gone() -> None:
             assert watching.process.stdout is not None
             simulation.end()
             end = time.monotonic() + PATIENCE
-            while (told := json.loads(watching.process.stdout.readline()))["error"] is None:
+            while (reported := json.loads(watching.process.stdout.readline()))["error"] is None:
                 assert time.monotonic() < end
-                last = told
+                last = reported
             for _ in range(3):
-                assert {value["quality"] for value in told["values"].values()} == {"stale"}
-                assert (told["state"], told["direction"]) == (None, None)
+                assert {value["quality"] for value in reported["values"].values()} == {"stale"}
+                assert (reported["state"], reported["direction"]) == (None, None)
                 before = last["values"]["ETA"]["time"]
-                assert told["values"]["ETA"]["time"] == before
-                assert told["time"] > before
-                told = json.loads(watching.process.stdout.readline())
+                assert reported["values"]["ETA"]["time"] == before
+                assert reported["time"] > before
+                reported = json.loads(watching.process.stdout.readline())
             watching.process.kill()
 
 
@@ -59,17 +59,17 @@ def test_3_a_drive_that_is_gone_at_the_end() -> None:
         watch = ("watch", line, "-d", "2", "RFR", "--every", "0.1", "--count", "20", "--json")
         with served([*DRIVEPANEL, *watch], ready="{") as watching:
             simulation.end()
-            _, said = watching.process.communicate(timeout=PATIENCE)
+            _, output = watching.process.communicate(timeout=PATIENCE)
             assert watching.process.returncode == 3
             ways = ("the other end closed", "cannot be reached", "reset by peer")
-            assert any(way in said for way in ways), said
+            assert any(way in output for way in ways), output
 
 
 def test_every_value_has_its_own_time_and_is_read_in_its_cycle() -> None:
     # not SHORT: on a busy machine a value is truly old by the end of so short a cycle
-    told = cycles(*LINE, "--every", "0.5", "--count", "3")
-    assert len(told) == 3
-    for before, now in itertools.pairwise(told):
+    reported = cycles(*LINE, "--every", "0.5", "--count", "3")
+    assert len(reported) == 3
+    for before, now in itertools.pairwise(reported):
         for value in now["values"].values():
             assert value["quality"] == "good"
             read = datetime.fromisoformat(value["time"])
@@ -78,14 +78,14 @@ def test_every_value_has_its_own_time_and_is_read_in_its_cycle() -> None:
 
 
 def test_no_state_where_its_words_are_not_watched() -> None:
-    (told,) = cycles(*LINE, "RFR", *SHORT, "1")
-    assert (told["state"], told["direction"], told["error"]) == (None, None, None)
+    (reported,) = cycles(*LINE, "RFR", *SHORT, "1")
+    assert (reported["state"], reported["direction"], reported["error"]) == (None, None, None)
 
 
 def test_several_drives() -> None:
     line = ("sim:atv71@1,atv312@2", "-d", "1", "-d", "2", "-d", "1")
-    told = cycles(*line, "ETA", *SHORT, "2")
-    assert sorted((one["device"], one["profile"]) for one in told) == [
+    reported = cycles(*line, "ETA", *SHORT, "2")
+    assert sorted((one["device"], one["profile"]) for one in reported) == [
         (1, "atv71"), (1, "atv71"), (2, "atv312"), (2, "atv312"),
     ]  # fmt: skip
     text = run(0, "watch", *line, "ETA", *SHORT, "1")
@@ -197,8 +197,8 @@ def test_a_full_disk_is_told() -> None:
 )  # fmt: skip
 def test_2_a_command_for_one_drive_takes_one(command: tuple[str, ...]) -> None:
     name, *more = command
-    said = refused(2, name, "sim:atv71@1,atv71@2", *more, "-d", "1", "-d", "2")
-    assert "this command is for one drive" in said
+    output = refused(2, name, "sim:atv71@1,atv71@2", *more, "-d", "1", "-d", "2")
+    assert "this command is for one drive" in output
 
 
 def test_the_panel_takes_one_drive() -> None:
@@ -219,9 +219,9 @@ def test_several_drives_one_of_which_is_not_there(command: tuple[str, ...]) -> N
 
 def test_several_drives_are_stopped() -> None:
     line = ("sim:atv71@1,atv312@2", "-d", "2", "-d", "1")
-    told = run(0, "stop", *line)
-    assert "Device 1, Altivar 71: stopped" in told
-    assert "Device 2, Altivar 312: stopped" in told
+    reported = run(0, "stop", *line)
+    assert "Device 1, Altivar 71: stopped" in reported
+    assert "Device 2, Altivar 312: stopped" in reported
     done = ended(3, "stop", *line, "-d", "9")
     assert "no answer at 9" in done.stderr
     refused(2, "stop", *line, "--give-back", "--arm")

@@ -60,9 +60,11 @@ def test_every_output_tells_the_line_of_a_value(named: tuple[str, str], tmp_path
     pump, fan = named
     file = tmp_path / "run.csv"
     watched = ("watch", "pump@1,2", "fan", "ETA", *SHORT, "1")
-    told = objects(run(0, *watched, "--json", "--csv", file))
+    reported = objects(run(0, *watched, "--json", "--csv", file))
     drives = [(pump, 1, "atv71"), (pump, 2, "atv312"), (fan, 5, "atv71")]
-    assert sorted((one["line"], one["device"], one["profile"]) for one in told) == sorted(drives)
+    assert sorted((one["line"], one["device"], one["profile"]) for one in reported) == sorted(
+        drives
+    )
     with file.open(newline="", encoding="utf-8") as opened:
         rows = list(csv.DictReader(opened))
     assert sorted((row["line"], row["device"], row["ETA"]) for row in rows) == [
@@ -74,14 +76,16 @@ def test_every_output_tells_the_line_of_a_value(named: tuple[str, str], tmp_path
 
 
 def test_drives_of_one_address_on_two_lines_are_two(named: tuple[str, str]) -> None:
-    told = objects(run(0, "watch", "pump@1", "fan@1", "ETA", *SHORT, "2", "--json"))
-    assert sorted(one["line"] for one in told) == sorted(2 * named)
-    assert {one["device"] for one in told} == {1}
+    reported = objects(run(0, "watch", "pump@1", "fan@1", "ETA", *SHORT, "2", "--json"))
+    assert sorted(one["line"] for one in reported) == sorted(2 * named)
+    assert {one["device"] for one in reported} == {1}
 
 
 def test_simulated_lines_are_watched_with_all_their_drives() -> None:
-    told = objects(run(0, "watch", "sim:atv71@3", "sim:atv312@2,atv71@7", *SHORT, "1", "--json"))
-    assert sorted((one["line"], one["device"]) for one in told) == [
+    reported = objects(
+        run(0, "watch", "sim:atv71@3", "sim:atv312@2,atv71@7", *SHORT, "1", "--json")
+    )
+    assert sorted((one["line"], one["device"]) for one in reported) == [
         ("sim:atv312@2,atv71@7", 2), ("sim:atv312@2,atv71@7", 7), ("sim:atv71@3", 3),
     ]  # fmt: skip
 
@@ -116,14 +120,14 @@ def test_a_line_that_is_lost_does_not_stop_the_others_and_ctrl_c_ends_all() -> N
             first.end()
             lost, going_on = 0, 0
             while lost < 3 or going_on < 3:
-                told = json.loads(watching.process.stdout.readline())
-                lost += told["error"] is not None and told["device"] == 1
-                going_on += lost > 0 and told["error"] is None and told["device"] == 5
-            status, said = watching.end(signal.SIGINT)
+                reported = json.loads(watching.process.stdout.readline())
+                lost += reported["error"] is not None and reported["device"] == 1
+                going_on += lost > 0 and reported["error"] is None and reported["device"] == 5
+            status, output = watching.end(signal.SIGINT)
     assert status == 130
-    assert "drivepanel: pump: " in said
-    assert "Ended by Ctrl-C after" in said
-    assert "Traceback" not in said
+    assert "drivepanel: pump: " in output
+    assert "Ended by Ctrl-C after" in output
+    assert "Traceback" not in output
     end_keepers()
     assert sockets() == []
 
@@ -149,7 +153,7 @@ def drives(wishes: list[LineWish]) -> list[tuple[str, list[int], list[str | None
 
 
 @pytest.mark.parametrize(
-    ("words", "meant"),
+    ("words", "intended"),
     [
         (("pump",), [("pump", [1], [None])]),
         (("fan",), [("fan", [5], ["atv71"])]),
@@ -166,10 +170,10 @@ def drives(wishes: list[LineWish]) -> list[tuple[str, list[int], list[str | None
     ],
 )  # fmt: skip
 def test_the_drives_that_are_meant(
-    words: tuple[str, ...], meant: list[tuple[str, list[int], list[str | None]]]
+    words: tuple[str, ...], intended: list[tuple[str, list[int], list[str | None]]]
 ) -> None:
     settings("tcp:10.0.0.1", "tcp:10.0.0.2")
-    assert drives(wished(*words)) == meant
+    assert drives(wished(*words)) == intended
 
 
 def test_the_line_of_the_environment_gives_way_to_one_with_an_address(

@@ -28,17 +28,17 @@ def test_a_drive_that_answers() -> None:
         text = run(0, "why", line, "-d", "2")
         assert re.match(r"Address 2 answers: (1[45]\d) of \1 requests", text)
         assert "kept the connection for 3 s without a request" in text
-        told = json.loads(run(0, "why", line, "-d", "2", "--json"))
-    assert (told["rung"], told["answers"], told["next"]) == ("answers", True, [])
-    assert (told["profile"], told["seen"]["answered"]) == ("atv71", 4)
-    assert told["timeout"]["seconds"] == 10.0
+        reported = json.loads(run(0, "why", line, "-d", "2", "--json"))
+    assert (reported["rung"], reported["answers"], reported["next"]) == ("answers", True, [])
+    assert (reported["profile"], reported["seen"]["answered"]) == ("atv71", 4)
+    assert reported["timeout"]["seconds"] == 10.0
 
 
 def test_a_family_that_does_not_say_who_it_is() -> None:
     with tcp_line("powerdrive@2") as line:
         assert "Address 2 answers" in run(0, "why", line, "-d", "2")
-        told = json.loads(run(0, "why", line, "-d", "2", "-p", "powerdrive", "--json"))
-    assert (told["rung"], told["profile"]) == ("answers", "powerdrive")
+        reported = json.loads(run(0, "why", line, "-d", "2", "-p", "powerdrive", "--json"))
+    assert (reported["rung"], reported["profile"]) == ("answers", "powerdrive")
 
 
 @posix
@@ -58,17 +58,17 @@ def test_nobody_answers_and_the_family_says_what_to_look_at() -> None:
 def test_a_drive_that_was_here_before_needs_no_profile() -> None:
     with PtyPeer(silent) as peer:
         KnownLine(FakeLine({2: {}}, link=SerialLink(peer.path))).note(None, 2, "atv71")
-        told = json.loads(run(3, "why", peer.path, "-d", "2", "--json"))
-        assert (told["rung"], told["profile"]) == ("silence", "atv71")
-        told = json.loads(run(3, "why", peer.path, "-d", "3", "--json"))
-        assert told["profile"] is None
+        reported = json.loads(run(3, "why", peer.path, "-d", "2", "--json"))
+        assert (reported["rung"], reported["profile"]) == ("silence", "atv71")
+        reported = json.loads(run(3, "why", peer.path, "-d", "3", "--json"))
+        assert reported["profile"] is None
 
 
 def test_a_port_that_is_not_there(tmp_path: Path) -> None:
     path = tmp_path / "ttyUSB7"
-    told = json.loads(run(3, "why", f"serial:{path}", "--json"))
-    assert (told["rung"], told["text"]) == ("no-port", f"There is no port {path}.")
-    assert told["seen"]["asked"] == 0
+    reported = json.loads(run(3, "why", f"serial:{path}", "--json"))
+    assert (reported["rung"], reported["text"]) == ("no-port", f"There is no port {path}.")
+    assert reported["seen"]["asked"] == 0
 
 
 @posix
@@ -79,9 +79,9 @@ def test_an_adapter_with_another_number(adapters: Adapters) -> None:
         ended(0, "why", f"serial:{port}")
         adapters.unplug("ttyUSB0")
         adapters.plug("ttyUSB1", "1.1", serial="A5", leads_to=pty)
-        told = json.loads(run(3, "why", f"serial:{port}", "--json"))
-    assert told["rung"] == "renumbered"
-    assert "by-id" in told["next"][0]
+        reported = json.loads(run(3, "why", f"serial:{port}", "--json"))
+    assert reported["rung"] == "renumbered"
+    assert "by-id" in reported["next"][0]
 
 
 @posix
@@ -91,8 +91,8 @@ def test_a_gateway() -> None:
 
     with TcpPeer(script, length=tcp_request_length) as peer:
         link = TcpLink("127.0.0.1", peer.port)
-        told = json.loads(run(3, "why", f"tcp:{link.host}:{link.port}", "--json"))
-    assert (told["rung"], told["seen"]["exceptions"][0]) == ("gateway", 11)
+        reported = json.loads(run(3, "why", f"tcp:{link.host}:{link.port}", "--json"))
+    assert (reported["rung"], reported["seen"]["exceptions"][0]) == ("gateway", 11)
 
 
 def test_what_is_no_line_is_a_fault_of_usage() -> None:
@@ -115,7 +115,9 @@ def test_beside_a_program_that_owns_the_line(tmp_path: Path) -> None:
     with PtyPeer(script) as peer:
         owner = [*DRIVEPANEL, "watch", peer.path, "-p", "atv71", "--every", "0.2", "ETA"]
         with served(owner, ready="ETA"):
-            told = json.loads(run(0, "why", peer.path, "-p", "atv71", "--json"))
-            assert (told["rung"], told["seen"]["answered"] >= 3) == ("answers", True), told
-            told = json.loads(run(3, "why", peer.path, "-p", "atv71", "-d", "3", "--json"))
-            assert told["rung"] == "silence"
+            reported = json.loads(run(0, "why", peer.path, "-p", "atv71", "--json"))
+            assert (reported["rung"], reported["seen"]["answered"] >= 3) == ("answers", True), (
+                reported
+            )
+            reported = json.loads(run(3, "why", peer.path, "-p", "atv71", "-d", "3", "--json"))
+            assert reported["rung"] == "silence"

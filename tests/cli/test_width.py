@@ -106,7 +106,7 @@ def test_what_has_one_reason_is_told_once(capsys: pytest.CaptureFixture[str]) ->
     absent = {f"P{n}": why.format(n) for n in range(24)} | {"ACC": "no answer"}
     messages = Messages(as_json=False)
     complain_absent(messages, absent)
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 2
-    assert told[0].startswith("drivepanel: 24 could not be read: P0, P1, ")
-    assert "ACC could not be read: no answer" in told[1]
+    reported = capsys.readouterr().err.splitlines()
+    assert len(reported) == 2
+    assert reported[0].startswith("drivepanel: 24 could not be read: P0, P1, ")
+    assert "ACC could not be read: no answer" in reported[1]

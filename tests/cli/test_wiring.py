@@ -20,11 +20,11 @@ def test_the_page_of_a_family(family: str) -> None:
 
 
 def test_the_page_for_programs() -> None:
-    told = json.loads(run(0, "profiles", "atv71", "--wiring", "--json"))
-    assert (told["id"], told["name"]) == ("atv71", "Altivar 71")
-    titles = [section["title"] for section in told["sections"]]
+    reported = json.loads(run(0, "profiles", "atv71", "--wiring", "--json"))
+    assert (reported["id"], reported["name"]) == ("atv71", "Altivar 71")
+    titles = [section["title"] for section in reported["sections"]]
     assert titles[:2] == ["Warnings", "Before it is opened"]
-    rows = {row["head"]: row["text"] for s in told["sections"] for row in s["rows"]}
+    rows = {row["head"]: row["text"] for s in reported["sections"] for row in s["rows"]}
     assert rows["D0"].startswith("EIA/TIA-485: A or A'")
     assert rows["16#000F"] == "Enable operation, forward"
 
@@ -46,17 +46,17 @@ def run_usage(*arguments: str) -> str:
 )
 def test_the_model_is_what_the_drive_says_of_itself(code: int, text: str) -> None:
     with tcp_line("atv21@3", "--set", f"FB05={code}", "--set", "FB72=0") as line:
-        told = json.loads(run(0, "identify", line, "-d", "3", "--json"))
-        assert (told["model"]["code"], told["model"]["text"]) == (code, text)
-        assert told["reference"] == "ATV21H075M3X"
+        reported = json.loads(run(0, "identify", line, "-d", "3", "--json"))
+        assert (reported["model"]["code"], reported["model"]["text"]) == (code, text)
+        assert reported["reference"] == "ATV21H075M3X"
         assert f"Model      {text}" in run(0, "identify", line, "-d", "3")
 
 
 def test_a_drive_whose_model_cannot_be_read_is_identified_all_the_same() -> None:
     with tcp_line("atv21@3", "--protect", "FB05", "--protect", "FB72") as line:
-        told = json.loads(run(0, "identify", line, "-d", "3", "--json"))
-    assert told["profile"] == "atv21"
-    assert told["model"] is None
+        reported = json.loads(run(0, "identify", line, "-d", "3", "--json"))
+    assert reported["profile"] == "atv21"
+    assert reported["model"] is None
 
 
 def test_a_family_without_such_a_word_has_no_model() -> None:

@@ -199,8 +199,8 @@ DEFECTS = (
     Defect(
         "back-off-never-ends",
         "tui/bus/schedule",
-        "if asked_now or record.next_try is None or now >= record.next_try:",
-        "if asked_now or record.next_try is None:",
+        "if on_request or record.next_try is None or now >= record.next_try:",
+        "if on_request or record.next_try is None:",
         "A drive that was off for a moment is never watched again.",
         ("tests/bus/test_queue.py",),
     ),

@@ -132,9 +132,9 @@ DEFECTS = (
     Defect(
         "interlock-ignored",
         "tui/session/command",
-        "if held is not None:\n            raise OrderRefused(told_anywhere(held))",
+        "if held is not None:\n            raise OrderRefused(block_reason_text(held))",
         "if held is not None and not held.text:\n"
-        "            raise OrderRefused(told_anywhere(held))",
+        "            raise OrderRefused(block_reason_text(held))",
         "A motor is started although its enable or its channel forbids it.",
         ("tests/session/test_command.py::test_refusals",),
     ),
@@ -407,8 +407,8 @@ DEFECTS = (
     Defect(
         "timeout-of-one-port-alone",
         "tui/session/proof/prover.py",
-        "told = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)",
-        "told = (await self._reader.read([rules.timeout])).values()",
+        "reported = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)",
+        "reported = (await self._reader.read([rules.timeout])).values()",
         "A drive that watches its other port is said not to notice a dead line.",
         ("tests/cli/test_prove.py::test_the_time_out_of_each_port_counts",),
     ),

@@ -52,8 +52,8 @@ DEFECTS = (
     Defect(
         "unanswered-is-no-error",
         "tui/screens/frames/choice.py",
-        "return unanswered and asked is not None and asked.device != BROADCAST_DEVICE",
-        "return unanswered and asked is None",
+        "return unanswered and requested is not None and requested.device != BROADCAST_DEVICE",
+        "return unanswered and requested is None",
         "Requests without an answer are missing where only errors are shown.",
         ("tests/ui/test_frame_choice.py",),
     ),

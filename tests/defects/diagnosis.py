@@ -13,8 +13,8 @@ DEFECTS = (
     Defect(
         "silent-drive-said-to-be-well",
         "tui/session/diagnosis/rungs.py",
-        "return bool(heard.asked) and heard.nothing and not heard.echoed",
-        "return bool(heard.asked) and heard.nothing and bool(sight.neighbors)",
+        "return bool(heard.requested) and heard.nothing and not heard.echoed",
+        "return bool(heard.requested) and heard.nothing and bool(sight.neighbors)",
         "A script takes a line on which nobody answers for a good one.",
         (f"{LADDER}::test_a_drive_that_has_not_answered_is_never_said_to_be_well",),
     ),

@@ -58,8 +58,8 @@ DEFECTS = (
     Defect(
         "form-faults-hide-the-rest",
         "tui/drive/profile/check.py",
-        "told += [one for one in _broken_rules(data) if",
-        "told += [one for one in () if",
+        "reported += [one for one in _broken_rules(data) if",
+        "reported += [one for one in () if",
         "Faults of a profile are told one run after another.",
         ("tests/drive/test_profile_check.py",),
     ),
@@ -314,8 +314,8 @@ DEFECTS = (
     Defect(
         "parameters-not-counted",
         "tui/drive/settings/set_reading.py",
-        "if told != count:",
-        "if told is None:",
+        "if reported != count:",
+        "if reported is None:",
         "A backup from which lines were lost is restored as if it were whole.",
         ("tests/drive/test_parameter_set.py",),
     ),
@@ -386,8 +386,8 @@ DEFECTS = (
     Defect(
         "reset-bit-the-wrong-way-round",
         "tui/drive/hints.py",
-        "return (raw >> told.bit & 1) == told.value",
-        "return (raw >> told.bit & 1) != told.value",
+        "return (raw >> reported.bit & 1) == reported.value",
+        "return (raw >> reported.bit & 1) != reported.value",
         "Faults says that a reset works while the cause is there.",
         ("tests/drive/test_fault_help.py",),
     ),

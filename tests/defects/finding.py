@@ -95,8 +95,8 @@ DEFECTS = (
     Defect(
         "likely-drive-left-alone",
         "tui/bus/schedule/patience.py",
-        "asked_now = within is not None or priority < Priority.POLL",
-        "asked_now = priority < Priority.POLL",
+        "on_request = within is not None or priority < Priority.POLL",
+        "on_request = priority < Priority.POLL",
         "A drive without function 43 is not asked by 17, and not polled for a second once found.",
         ("tests/bus/test_api.py::test_who_looks_whether_a_silent_device_is_there_waits_for_no_back_off",),
     ),
@@ -183,8 +183,8 @@ DEFECTS = (
     Defect(
         "drive-being-proved-told-silent",
         "tui/session/connect/search.py",
-        "if hushed := line.facts.hushed.get(device):",
-        "if False and (hushed := ('', '')):",
+        "if paused := line.facts.paused.get(device):",
+        "if False and (paused := ('', '')):",
         "Who comes to a line looks for a broken wire, at a drive that is being proved.",
         (f"{SEARCH}::test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one",),
     ),

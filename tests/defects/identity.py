@@ -72,7 +72,7 @@ DEFECTS = (
     Defect(
         "cut-short-reference-contradicts",
         "tui/session/connect/contradiction.py",
-        "return told.startswith(stem) or stem.startswith(told)",
+        "return reported.startswith(stem) or stem.startswith(reported)",
         "return False",
         "A drive of a kind that looks like its profile's is refused.",
         (CONTRADICTION,),

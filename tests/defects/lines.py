@@ -29,7 +29,7 @@ DEFECTS = (
     Defect(
         "another-drive-not-noticed",
         "tui/session/connect/known_lines.py",
-        "return self.said == now.said",
+        "return self.stated == now.stated",
         "return self.vendor == now.vendor",
         "A drive that was put in another's place is run with what was meant for that.",
         (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),

@@ -52,7 +52,7 @@ DEFECTS = (
     Defect(
         "reply-of-whoever-was-asked",
         "tui/wire/heard/pairing.py",
-        "frame.device != asked.device or frame.function",
+        "frame.device != requested.device or frame.function",
         "frame.function",
         "A late reply of one drive is told as the values of another.",
         ("tests/wire/test_heard.py::test_what_becomes_of_requests",),
@@ -60,7 +60,7 @@ DEFECTS = (
     Defect(
         "write-again-taken-for-its-reply",
         "tui/wire/heard/pairing.py",
-        "and not _repeated(asked, frame)\n",
+        "and not _repeated(requested, frame)\n",
         "\n",
         "A drive that answers nothing is told to take its commands.",
         ("tests/wire/test_heard.py::test_a_write_that_is_sent_again_is_no_reply",),

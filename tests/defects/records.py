@@ -91,7 +91,7 @@ DEFECTS = (
     Defect(
         "lost-answer-completed-by-another-write",
         "tui/session/image.py",
-        "self._asked_of.pop(code, None)\n            self._doubted",
+        "self._waiting_for.pop(code, None)\n            self._doubted",
         "self._doubted",
         "The journal says that a lost write was taken, by the value of the next one.",
         (

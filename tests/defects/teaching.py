@@ -35,8 +35,8 @@ DEFECTS = (
     Defect(
         "taught-of-another-drive-used",
         "tui/session/teaching/kept.py",
-        "        if self.said:\n            others =",
-        "        if not self.said:\n            others =",
+        "        if self.stated:\n            others =",
+        "        if not self.stated:\n            others =",
         "A drive that was put in the place of another is shown in the other's scale.",
         KEPT,
     ),
@@ -59,8 +59,8 @@ DEFECTS = (
     Defect(
         "preset-takes-the-reference-unconfirmed",
         "tui/session/teaching/teacher.py",
-        "self._told(), self._known.reference)",
-        "self._told(), self._known.reference or self.proposal())",
+        "self._taught_scales(), self._known.reference)",
+        "self._taught_scales(), self._known.reference or self.proposal())",
         "A word of which no manual says what it does gives a motor its reference.",
         KEPT,
     ),

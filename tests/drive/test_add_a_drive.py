@@ -81,15 +81,15 @@ BROKEN = [
 ]
 
 
-@pytest.mark.parametrize(("right", "wrong", "told"), BROKEN)
-def test_a_fault_is_told_with_its_line(folder: Path, right: str, wrong: str, told: str) -> None:
+@pytest.mark.parametrize(("right", "wrong", "reported"), BROKEN)
+def test_a_fault_is_told_with_its_line(folder: Path, right: str, wrong: str, reported: str) -> None:
     text = example()
     assert text.count(right) == 1
     path = folder / "my-pump.toml"
     path.write_text(text.replace(right, wrong), encoding="utf-8")
     with pytest.raises(ProfileError) as caught:
         library.load_file(path)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
     assert re.search(r"my-pump\.toml:[1-9]\d*: ", str(caught.value))
 
 

@@ -30,6 +30,6 @@ def test_above_32767_it_is_marked(code: str, word: int, text: str) -> None:
     value = shown(profile, parameter, from_words(parameter, [word]), {})
     assert value.text == text
     assert value.unsure == text.endswith("?")
-    told = reading_json(Reading(parameter, word, value, Quality.GOOD, 0.0))
-    assert told["text"] == text
-    assert told.get("unsure", False) == value.unsure
+    reported = reading_json(Reading(parameter, word, value, Quality.GOOD, 0.0))
+    assert reported["text"] == text
+    assert reported.get("unsure", False) == value.unsure

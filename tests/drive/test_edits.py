@@ -86,8 +86,8 @@ def test_a_scale_under_which_a_staged_ramp_has_no_place_is_not_staged() -> None:
 
 def test_ramps_that_nobody_edits_change_with_their_scale_and_that_is_told() -> None:
     edits = Edits().stage(ATV71, "INR", "1 s", HELD).stage(ATV71, "ACC", "4", HELD)
-    told = consequences(ATV71, edits, HELD)
-    assert told == [
+    reported = consequences(ATV71, edits, HELD)
+    assert reported == [
         "DEC keeps its raw value 30: 3.0 s becomes 30 s.",
         "AC2 keeps its raw value 50: 5.0 s becomes 50 s.",
         "DE2 keeps its raw value 50: 5.0 s becomes 50 s.",
@@ -134,8 +134,8 @@ def test_the_order_of_different_things() -> None:
 
 def test_a_value_past_another_is_told_with_both() -> None:
     edits = Edits().stage(ATV71, "LSP", "55", HELD)
-    told = edit_problems(ATV71, edits, HELD)
-    assert told == {
+    reported = edit_problems(ATV71, edits, HELD)
+    assert reported == {
         "LSP": "LSP = 55.0 Hz would be above HSP = 50.0 Hz: change HSP too, or another value."
     }
     assert edit_problems(ATV71, edits.stage(ATV71, "HSP", "60", HELD), HELD) == {}

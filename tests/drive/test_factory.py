@@ -72,9 +72,9 @@ def test_a_factory_setting_of_a_sister_family_keeps_its_mark() -> None:
     assert not factory_is_sure(library.load("atv21")["FH"])
     drive = ParameterSet(SetHead("atv71"), {"BFR": 0, "HSP": 450, "TFR": 500})
     compared = compare_settings(ATV71, factory_side(ATV71, drive), side_of("now", drive))
-    told = {row.code: (row.a, row.note) for row in compared}
-    assert told["HSP"] == ("50.0 Hz ?", "factory setting unverified")
-    assert told["TFR"] == ("60.0 Hz", "")
+    reported = {row.code: (row.a, row.note) for row in compared}
+    assert reported["HSP"] == ("50.0 Hz ?", "factory setting unverified")
+    assert reported["TFR"] == ("60.0 Hz", "")
 
 
 def test_a_drive_at_60_hertz_is_compared_with_its_own_factory_settings() -> None:
@@ -84,7 +84,7 @@ def test_a_drive_at_60_hertz_is_compared_with_its_own_factory_settings() -> None
 
 
 @pytest.mark.parametrize(
-    ("code", "typed", "told"),
+    ("code", "typed", "reported"),
     [
         ("ItH", "0.8 A", "below 0.9 A (0.2 x INV)"),
         ("ItH", "7.3 A", "above 7.2 A (1.5 x INV)"),
@@ -94,11 +94,11 @@ def test_a_drive_at_60_hertz_is_compared_with_its_own_factory_settings() -> None
     ],
 )
 def test_a_value_past_a_limit_of_another_parameter_is_refused(
-    code: str, typed: str, told: str
+    code: str, typed: str, reported: str
 ) -> None:
     held = {"INV": 48, "ItH": 48, "tA1": 10, "tA2": 10, "HSP": 500, "LSP": 0, "tFr": 600}
     edits = Edits().stage(ATV31, code, typed, held)
-    assert told in edit_problems(ATV31, edits, held)[code]
+    assert reported in edit_problems(ATV31, edits, held)[code]
 
 
 @pytest.mark.parametrize("typed", ["0.9 A", "7.2 A"])

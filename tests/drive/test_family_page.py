@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.drive.family_page import PageSection, family_page, page_lines
-from tui.drive.model import model_codes, model_of, model_told
+from tui.drive.model import model_codes, model_of, model_read
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 
@@ -52,7 +52,7 @@ def test_every_family_has_its_sections(family: str) -> None:
 def test_every_pin_rule_command_and_erratum_stands_on_the_page(family: str) -> None:
     data = library.load(family).data
     page = text_of(family)
-    told = [
+    reported = [
         *(pin.signal for connector in data.connectors for pin in connector.pins),
         *(warning for connector in data.connectors for warning in connector.warnings),
         *(rule.rule for rule in data.line_rules),
@@ -62,7 +62,7 @@ def test_every_pin_rule_command_and_erratum_stands_on_the_page(family: str) -> N
         *(data.communication_fault.warnings if data.communication_fault else ()),
         *(server.name for server in data.addresses.servers),
     ]
-    assert [one for one in told if one not in page] == []
+    assert [one for one in reported if one not in page] == []
 
 
 WARNED = [
@@ -179,13 +179,13 @@ def test_models_that_share_a_code_need_the_class() -> None:
 
 def test_what_a_model_is_called() -> None:
     profile = library.load("atv21")
-    assert model_told(profile, {"FB05": 6, "FB72": 0}) == "ATV21HU15M3X, 200 V, 1.5 kW"
-    assert model_told(profile, {"FB05": 136, "FB72": 0x80}) == (
+    assert model_read(profile, {"FB05": 6, "FB72": 0}) == "ATV21HU15M3X, 200 V, 1.5 kW"
+    assert model_read(profile, {"FB05": 136, "FB72": 0x80}) == (
         "ATV21W075N4C, 400/460 V, 0.75 kW, IP54, class B filter"
     )
-    assert model_told(profile, {"FB05": 999, "FB72": 0}) == "code 999, in no list at hand"
-    assert model_told(profile, {}) == ""
-    assert model_told(library.load("atv312"), {"FB05": 6}) == ""
+    assert model_read(profile, {"FB05": 999, "FB72": 0}) == "code 999, in no list at hand"
+    assert model_read(profile, {}) == ""
+    assert model_read(library.load("atv312"), {"FB05": 6}) == ""
 
 
 def test_a_section_without_rows_is_left_out() -> None:

@@ -31,10 +31,10 @@ def test_every_fault_of_a_family_has_help(family: str) -> None:
     none = profile.data.faults.none
     lacking = [f.code for f in profile.data.faults.codes if profile.guide.fault(f.raw) is None]
     assert lacking == [f.code for f in profile.data.faults.codes if f.raw == none]
-    told = profile.guide.data
-    assert (len(told.faults), len(told.alarms)) == COUNTS.get(family, (1, 0))
+    reported = profile.guide.data
+    assert (len(reported.faults), len(reported.alarms)) == COUNTS.get(family, (1, 0))
     assert not profile.guide.trouble
-    for hint in (*told.faults, *told.alarms):
+    for hint in (*reported.faults, *reported.alarms):
         assert hint.source
         assert all(0 < len(text) <= LONGEST for text in (*hint.probable, *hint.check))
         assert " order" not in " ".join((*hint.probable, *hint.check))
@@ -99,11 +99,11 @@ BROKEN = {
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_a_wrong_help_file_is_told_with_its_line(case: str, tmp_path: Path) -> None:
-    text, said = BROKEN[case]
+    text, output = BROKEN[case]
     profile = library.load_file(own_drive(tmp_path, text))
     with pytest.raises(ProfileError, match=r"help/mine\.toml:\d+: ") as caught:
         _ = profile.guide.data
-    assert said in str(caught.value)
+    assert output in str(caught.value)
     # at work it hinders nobody: what is wrong is said in place of the help
     assert profile.guide.fault(9) is None
     assert "mine.toml" in profile.guide.trouble

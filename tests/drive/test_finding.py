@@ -88,6 +88,6 @@ def test_who_watches_the_line_from_the_first_request_on_is_named(families: list[
     found = watching_families(families)
     assert [one.id for one in found if one.sure] == ["atv21"]
     assert "atv71" not in {one.id for one in found}
-    told = watching_text(found)
-    assert "Altivar 21 (F803), and perhaps Altivar 31 (ttO)" in told
+    reported = watching_text(found)
+    assert "Altivar 21 (F803), and perhaps Altivar 31 (ttO)" in reported
     assert watching_text([]) == ""

@@ -74,8 +74,8 @@ def test_no_family_has_another_word_where_one_is_stopped() -> None:
 def states() -> Iterator[dict[int, int]]:
     """What may be read of drives that are stopped by CMD, some of it not."""
     for chcf, dotd, eta in itertools.product((None, 0, 1, 2, 3), (None, 0, 1), (None, ENABLED, 8)):
-        told = {CHCF: chcf, DOTD: dotd, ETA: eta}
-        yield {address: raw for address, raw in told.items() if raw is not None}
+        reported = {CHCF: chcf, DOTD: dotd, ETA: eta}
+        yield {address: raw for address, raw in reported.items() if raw is not None}
 
 
 @pytest.mark.parametrize("named", NAMED)
@@ -94,8 +94,8 @@ def test_whatever_is_there_it_stops_and_starts_nothing(
                 known = {c: raws[a] for c, a in family.places.items() if a in raws}
                 if not chart.orders or (chart.when and chart.when.holds(known) is False):
                     continue
-                meant = {o.id for o in chart.orders if o.words == [found.word]}
-                assert meant & set(GENTLE_FIRST), (raws, family.id, chart.id, hex(found.word))
+                intended = {o.id for o in chart.orders if o.words == [found.word]}
+                assert intended & set(GENTLE_FIRST), (raws, family.id, chart.id, hex(found.word))
     assert sent > 20
 
 

@@ -93,8 +93,8 @@ def test_a_fault_is_told_with_file_line_and_words(
     assert text.startswith(str(file))
     assert words in text
     if "TOML" not in words:
-        told = int(text.removeprefix(f"{file}:").split(":")[0])
-        assert told == line, text
+        reported = int(text.removeprefix(f"{file}:").split(":")[0])
+        assert reported == line, text
 
 
 def test_two_parameters_with_one_address(tmp_path: Path) -> None:
@@ -205,15 +205,15 @@ def test_broken_and_doubled_files_are_shown_as_such(
     (folder / "d.toml").write_text(SMALL.replace('"small"', '"range"').replace("100", "70000"))
     lines = CliRunner().invoke(main, ["profiles"]).output.splitlines()
 
-    def told(id: str) -> list[str]:
+    def reported(id: str) -> list[str]:
         return [line.split("  (")[-1] for line in lines if line.split()[0] == id]
 
-    assert told("small") == ["your own)", "not used, a.toml has the same id)"]
-    [broken] = told("c")
+    assert reported("small") == ["your own)", "not used, a.toml has the same id)"]
+    [broken] = reported("c")
     assert broken.startswith("your own, broken: ")
     assert "c.toml:3: not valid TOML" in broken
-    assert "must be <= 65535" in told("range")[0]
-    assert len(told("atv31")) == 1
+    assert "must be <= 65535" in reported("range")[0]
+    assert len(reported("atv31")) == 1
 
 
 def test_a_profile_is_begun_from_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -345,13 +345,13 @@ def test_the_profile_that_is_broken_below_is_right(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_told_where_it_stands(tmp_path: Path, name: str) -> None:
-    changes, told, at = FAULTS[name]
+    changes, reported, at = FAULTS[name]
     text = COMMANDED
     for right, wrong in changes:
         assert text.count(right) == 1, right
         text = text.replace(right, wrong)
     found = checked(tmp_path, text)
-    [fault] = [one for one in found if told in one] or [f"not told, but: {found}"]
+    [fault] = [one for one in found if reported in one] or [f"not told, but: {found}"]
     line = text[: text.index(at)].count("\n") + 1
     assert fault.startswith(f"{tmp_path / 'own.toml'}:{line}: "), fault
 
@@ -380,9 +380,9 @@ def test_several_files_are_checked(tmp_path: Path) -> None:
     assert "right.toml: Example pump drive, 8 parameters, no fault found" in done.output
     assert "outside its limits" in done.output
     assert "none.toml:2: not valid TOML" in done.output
-    told = CliRunner().invoke(main, ["profiles", "--json", "--check", str(right), str(wrong)])
-    assert told.exit_code == 2
-    assert [len(one["faults"]) for one in json.loads(told.output)] == [0, 1]
+    reported = CliRunner().invoke(main, ["profiles", "--json", "--check", str(right), str(wrong)])
+    assert reported.exit_code == 2
+    assert [len(one["faults"]) for one in json.loads(reported.output)] == [0, 1]
 
 
 def test_lines_of_every_kind_of_place() -> None:

@@ -35,9 +35,9 @@ def test_every_measurement_of_a_leroy_somer_drive_can_be_taught(family: Profile)
 @pytest.mark.parametrize("id", ["atv21", "atv31", "atv312", "atv71"])
 def test_what_a_family_knows_is_not_taught(id: str) -> None:
     family = library.load(id)
-    told = [p for p in family.parameters if p.unit or p.values or p.bits or p.scale != "1"]
-    assert told
-    assert not {p.code for p in told} & {*teachable_codes(family)}
+    reported = [p for p in family.parameters if p.unit or p.values or p.bits or p.scale != "1"]
+    assert reported
+    assert not {p.code for p in reported} & {*teachable_codes(family)}
     written = [p for p in family.parameters if p.access != "r" and is_verified(p)]
     assert not {p.code for p in written} & {*teachable_codes(family)}, "no measurements"
 

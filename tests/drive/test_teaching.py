@@ -146,9 +146,9 @@ def test_a_unit_may_be_told_later() -> None:
     two = taught(look(300, "30.0"), look(503, "50.3"))
     assert two.scale is not None
     assert two.scale.unit == ""
-    told = learn("5.01", two.looks, look(503, "50.3", "Hz"))
-    assert told.scale is not None
-    assert (told.scale.unit, len(told.looks)) == ("Hz", 2)
+    reported = learn("5.01", two.looks, look(503, "50.3", "Hz"))
+    assert reported.scale is not None
+    assert (reported.scale.unit, len(reported.looks)) == ("Hz", 2)
 
 
 def test_a_look_that_no_scale_gives_is_not_kept() -> None:

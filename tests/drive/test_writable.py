@@ -147,5 +147,5 @@ def test_switching_the_watch_off_is_warned_of(family: str) -> None:
         assert "watch" in warning(profile, timeout, watch.off)
     assert warning(profile, timeout, 10) == ""
     for reaction in watch.reactions:
-        told = warning(profile, profile[watch.reaction], reaction.raw) if watch.reaction else ""
-        assert bool(told) == (reaction.motor_keeps_running and bool(watch.reaction))
+        reported = warning(profile, profile[watch.reaction], reaction.raw) if watch.reaction else ""
+        assert bool(reported) == (reaction.motor_keeps_running and bool(watch.reaction))

@@ -216,10 +216,10 @@ class PtyPanel:
         except OSError:
             return 0
         try:
-            told = fcntl.ioctl(side, termios.FIONREAD, bytes(4))
+            reported = fcntl.ioctl(side, termios.FIONREAD, bytes(4))
         finally:
             os.close(side)
-        return int.from_bytes(told, sys.byteorder)
+        return int.from_bytes(reported, sys.byteorder)
 
     @property
     def armed(self) -> bool:

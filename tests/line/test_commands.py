@@ -64,10 +64,10 @@ def stands(simulation: Simulation, device: int = 1) -> bool:
     return simulation.drive(device).motor.frequency == 0
 
 
-def besides(said: str) -> str:
+def besides(output: str) -> str:
     """What standard error has beside the communication timeout that a command leaves running."""
-    told = ("communication timeout", "To keep polling it: drivepanel hold")
-    return "".join(line for line in said.splitlines(True) if not any(t in line for t in told))
+    reported = ("communication timeout", "To keep polling it: drivepanel hold")
+    return "".join(line for line in output.splitlines(True) if not any(t in line for t in reported))
 
 
 # run: its ends
@@ -78,10 +78,10 @@ def test_a_signal_stops_the_motor_on_its_ramp(ending: signal.Signals) -> None:
     with bench() as (simulation, line), running(line) as program:
         wait_until(lambda: turns(simulation), "the motor turns")
         program.process.send_signal(ending)
-        said, error = program.process.communicate(timeout=PATIENCE)
+        output, error = program.process.communicate(timeout=PATIENCE)
         assert (program.process.returncode, besides(error)) == (0, "")
-        assert f"ended by {ending.name}" in said
-        assert said.rstrip().endswith("Device 1: stopped.")
+        assert f"ended by {ending.name}" in output
+        assert output.rstrip().endswith("Device 1: stopped.")
         assert stands(simulation)
         assert simulation.drive(1).fault is None
 
@@ -96,9 +96,9 @@ def test_a_second_ctrl_c_does_not_leave_the_motor_running() -> None:
             program.process.send_signal(signal.SIGINT)
             time.sleep(0.1)
         assert program.process.poll() is None, "the ramp takes longer"
-        said, error = program.process.communicate(timeout=PATIENCE)
+        output, error = program.process.communicate(timeout=PATIENCE)
         assert (program.process.returncode, besides(error)) == (0, "")
-        assert "Device 1: stopped." in said
+        assert "Device 1: stopped." in output
         assert stands(simulation)
 
 
@@ -106,8 +106,8 @@ def test_a_ctrl_c_before_the_motor_runs_leaves_none_running() -> None:
     with bench() as (simulation, line):
         command = (*DRIVEPANEL, "run", line, "--reference", "20Hz", "--arm")
         with served(command, ready="Reference 20") as program:
-            status, said = program.end(signal.SIGINT)
-            assert (status, besides(said)) == (0, "")
+            status, output = program.end(signal.SIGINT)
+            assert (status, besides(output)) == (0, "")
         wait_until(lambda: stands(simulation), "the motor stands")
         assert simulation.drive(1).fault is None
 
@@ -162,11 +162,11 @@ def test_run_reverse_in_json() -> None:
         run = ("run", line, "--reference", "20Hz", "--reverse", "--arm", "--for", "3", "--json")
         done = drivepanel(*run)
         assert (done.returncode, besides(done.stderr)) == (0, "")
-        told: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
-        events = [one["event"] for one in told]
+        reported: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
+        events = [one["event"] for one in reported]
         assert events[:2] == ["reference", "order"]
         assert events[-2:] == ["stopping", "stopped"]
-        last = [one for one in told if one["event"] == "state"][-1]
+        last = [one for one in reported if one["event"] == "state"][-1]
         assert (last["state"], last["direction"]) == ("running", "reverse")
         assert last["values"]["output_frequency"]["value"] < -3
         assert last["values"]["frequency_reference"]["unit"] == "Hz"
@@ -232,10 +232,10 @@ def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None
         with running(line) as program:
             wait_until(lambda: turns(simulation), "the motor turns")
             assert drivepanel("stop", line, *order).returncode == 0
-            said, error = program.process.communicate(timeout=PATIENCE)
+            output, error = program.process.communicate(timeout=PATIENCE)
             assert program.process.returncode == 6, error
             assert "It was stopped by drivepanel stop, stop" in error
-            assert "It was stopped by drivepanel stop, stop" in said
+            assert "It was stopped by drivepanel stop, stop" in output
             assert stands(simulation)
 
 
@@ -278,8 +278,8 @@ def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(
             wait_until(lambda: turns(simulation), "the motor turns")
             lose(simulation)
             assert program.process.stderr is not None
-            said = [program.process.stderr.readline() for _ in range(2)]
-            assert "without communication it goes on: its reaction is Ignored" in said[1]
+            output = [program.process.stderr.readline() for _ in range(2)]
+            assert "without communication it goes on: its reaction is Ignored" in output[1]
             program.process.send_signal(signal.SIGINT)
             assert "NOT STOPPED yet" in program.process.stderr.readline()
             assert program.process.poll() is None
@@ -637,22 +637,22 @@ def test_status_of_a_running_drive() -> None:
         wait_until(lambda: simulation.drive(1).motor.frequency > 29, "the motor turns")
         done = drivepanel("status", line, "--json")
         assert (done.returncode, besides(done.stderr)) == (0, "")
-        told = json.loads(done.stdout)
-        assert (told["state"]["kind"], told["direction"]) == ("running", "forward")
-        assert told["fault"] is None
-        assert told["values"]["output_frequency"]["value"] == pytest.approx(30, abs=1.5)
-        assert told["watch"]["timeout_s"] == 10
-        assert "freewheel" in told["watch"]["does"]
+        reported = json.loads(done.stdout)
+        assert (reported["state"]["kind"], reported["direction"]) == ("running", "forward")
+        assert reported["fault"] is None
+        assert reported["values"]["output_frequency"]["value"] == pytest.approx(30, abs=1.5)
+        assert reported["watch"]["timeout_s"] == 10
+        assert "freewheel" in reported["watch"]["does"]
 
 
 def test_status_tells_a_fault_and_why_orders_have_no_effect() -> None:
     with bench(DriveSpec("atv71", 1, sets={"CD1": 0, "CHCF": 2})) as (simulation, line):
         simulation.drive(1).provoke("OCF")
         wait_until(lambda: simulation.drive(1).fault is not None, "it tripped")
-        told = json.loads(drivepanel("status", line, "--json").stdout)
-        assert told["fault"]["code"] == "OCF"
-        assert told["commandable"] is False
-        assert "not commanded by Modbus" in told["why_not"]
+        reported = json.loads(drivepanel("status", line, "--json").stdout)
+        assert reported["fault"]["code"] == "OCF"
+        assert reported["commandable"] is False
+        assert "not commanded by Modbus" in reported["why_not"]
         text = drivepanel("status", line).stdout
         assert "OCF" in text
         assert "not commanded by Modbus" in text

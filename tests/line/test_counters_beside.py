@@ -28,11 +28,11 @@ def test_counters_beside_a_panel_are_those_of_both_and_a_reset_is_seen_there(
         # the keeper of the line counts for both; nothing is lost, and that is said
         done = drivepanel("counters", line, "-d", "1", "--frames", "20", "--for", "1", "--json")
         assert done.returncode == 0, done.stdout + done.stderr
-        told = json.loads(done.stdout)
-        assert told["counted_by"].startswith("keeper")
-        assert told["test"] == {"frames": 20, "answered": 20}
-        assert told["ours"]["frames"] > 20, "what the panel sends meanwhile belongs to it"
-        assert told["differences"] == []
+        reported = json.loads(done.stdout)
+        assert reported["counted_by"].startswith("keeper")
+        assert reported["test"] == {"frames": 20, "answered": 20}
+        assert reported["ours"]["frames"] > 20, "what the panel sends meanwhile belongs to it"
+        assert reported["differences"] == []
         # who resets the drive's counters is told to whoever compares them
         again = drivepanel("counters", line, "-d", "1", "--reset-drive", "--arm", "--frames", "3")
         assert again.returncode == 0, again.stdout + again.stderr

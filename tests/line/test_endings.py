@@ -75,13 +75,13 @@ def test_ctrl_c_ends_watch_after_a_whole_line() -> None:
     with served([*DRIVEPANEL, *WATCH], ready="{") as watching:
         assert set(json.loads(watching.ready)["values"]) == {"ETA"}
         watching.process.send_signal(signal.SIGINT)
-        rest, said = watching.process.communicate(timeout=PATIENCE)
+        rest, output = watching.process.communicate(timeout=PATIENCE)
     assert watching.process.returncode == 130
-    assert said.startswith("drivepanel: Ended by Ctrl-C after ")
+    assert output.startswith("drivepanel: Ended by Ctrl-C after ")
     assert rest.endswith("\n")
-    told = [json.loads(line) for line in rest.splitlines()]
-    assert told[-1]["status"] == 130
-    assert all("values" in one for one in told[:-1])
+    reported = [json.loads(line) for line in rest.splitlines()]
+    assert reported[-1]["status"] == 130
+    assert all("values" in one for one in reported[:-1])
 
 
 @pytest.fixture
@@ -120,10 +120,10 @@ def test_130_ctrl_c_with_what_was_written(
         connection.settimeout(PATIENCE)
         assert connection.recv(1)  # it asks, so it is at work
         process.send_signal(signal.SIGINT)
-        out, said = process.communicate(timeout=PATIENCE)
+        out, output = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (130, "")
-    assert said.startswith("drivepanel: Ended by Ctrl-C")
-    assert text in said
+    assert output.startswith("drivepanel: Ended by Ctrl-C")
+    assert text in output
     if command in ("backup", "report"):
         assert not file.exists()
 
@@ -142,14 +142,14 @@ def test_a_reader_that_goes_away_is_no_error(command: tuple[str, ...]) -> None:
         assert process.stderr is not None
         assert process.stdout.readline() != ""
         process.stdout.close()
-        said = process.stderr.read()
+        output = process.stderr.read()
         status = process.wait(timeout=PATIENCE)
     finally:
         process.kill()
         process.wait(timeout=PATIENCE)
         assert process.stderr is not None
         process.stderr.close()
-    assert (status, said) == (0, "")
+    assert (status, output) == (0, "")
 
 
 def test_watch_writes_a_csv_file_beside(tmp_path: Path) -> None:
@@ -194,9 +194,9 @@ def test_a_narrow_terminal_cuts_names_and_never_a_number(width: int) -> None:
 
 def test_the_panel_is_not_drawn_into_a_file(tmp_path: Path) -> None:
     """`2>file` swallowed the whole panel, and its keys went on working unseen."""
-    said = tmp_path / "said"
+    output = tmp_path / "said"
     near, far = os.openpty()
-    with said.open("w") as file:
+    with output.open("w") as file:
         process = subprocess.Popen(
             [*DRIVEPANEL, "demo"], stdin=far, stdout=far, stderr=file, start_new_session=True
         )
@@ -206,5 +206,5 @@ def test_the_panel_is_not_drawn_into_a_file(tmp_path: Path) -> None:
             process.kill()
             os.close(near)
             os.close(far)
-    assert "drawn on standard error" in said.read_text("utf-8")
-    assert "\x1b" not in said.read_text("utf-8")
+    assert "drawn on standard error" in output.read_text("utf-8")
+    assert "\x1b" not in output.read_text("utf-8")

@@ -187,8 +187,8 @@ def test_the_motor_stops_when_its_program_dies_with_the_keeper(programs: ExitSta
         os.kill(keeper(), signal.SIGKILL)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
         wait_until(lambda: on_record() == [], "the record of the start goes")
-        _, said = recorder.end()
-        assert "is gone: its motor is stopped" in said
+        _, output = recorder.end()
+        assert "is gone: its motor is stopped" in output
 
 
 @pytest.mark.parametrize("others_live", [True, False])

@@ -158,6 +158,6 @@ def _calls(log: Path, path: str) -> set[str]:
             continue
         name, rest = match.groups()
         # strace may know two names of a number: SNDCTL_TMR_START or TCSETS
-        asked = re.match(r"[^,]*, (?:\w+ or )?(\w+)", rest) if name == "ioctl" else None
-        found.add(f"ioctl {asked[1]}" if asked else name)
+        requested = re.match(r"[^,]*, (?:\w+ or )?(\w+)", rest) if name == "ioctl" else None
+        found.add(f"ioctl {requested[1]}" if requested else name)
     return found

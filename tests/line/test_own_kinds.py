@@ -63,13 +63,13 @@ class Bench:
 
     def status(self) -> dict[str, object]:
         """What the drive does."""
-        told: dict[str, object] = json.loads(self.done("status", "--json"))
-        return told
+        reported: dict[str, object] = json.loads(self.done("status", "--json"))
+        return reported
 
     def values(self, *codes: str) -> dict[str, object]:
         """Values as they are read now."""
-        told = json.loads(self.done("read", *codes, "--json"))
-        return {code: one["value"] for code, one in told["values"].items()}
+        reported = json.loads(self.done("read", *codes, "--json"))
+        return {code: one["value"] for code, one in reported["values"].items()}
 
 
 @pytest.fixture(params=KINDS, ids=lambda kind: kind.profile)
@@ -107,8 +107,8 @@ def test_it_runs_trips_and_is_reset(bench: Bench) -> None:
     for more, way in (([], "forward"), (["--reverse"], "reverse")):
         wish = ["--arm", "--reference", "25Hz", "--for", "0.5", "--leave-running", *more]
         bench.done("run", *wish)
-        told = bench.status()
-        assert (kind_of(told), told["direction"]) == ("running", way)
+        reported = bench.status()
+        assert (kind_of(reported), reported["direction"]) == ("running", way)
         turned = bench.values(bench.kind.frequency)[bench.kind.frequency]
         assert turned in (25.0, -25.0)
         bench.done("stop")
@@ -143,8 +143,8 @@ def test_it_is_set_up_backed_up_and_restored(bench: Bench, tmp_path: Path) -> No
     past = bench.run("write", f"{ramp}=100000s", "--arm")
     assert past.returncode != 0
     save = ["--save"] if bench.kind.saves else []
-    told = bench.done("restore", str(kept), "--arm", *save)
-    assert ramp in told
+    reported = bench.done("restore", str(kept), "--arm", *save)
+    assert ramp in reported
     assert bench.values(ramp, "FANMODE", "DIMMING") == {**before, "FANMODE": 1, "DIMMING": 2}
 
 
@@ -152,8 +152,8 @@ def test_it_never_gets_a_request_that_it_does_not_take(bench: Bench) -> None:
     """All words at once: no read is longer than 8, none goes over a hole, none is refused."""
     profile = library.load_file(HERE / "profiles" / f"{bench.kind.profile}.toml")
     codes = [p.code for p in profile.parameters]
-    told = json.loads(bench.done("read", *codes, "--json"))
-    assert {one["quality"] for one in told["values"].values()} == {"good"}
-    assert len(told["values"]) == len(codes)
+    reported = json.loads(bench.done("read", *codes, "--json"))
+    assert {one["quality"] for one in reported["values"].values()} == {"good"}
+    assert len(reported["values"]) == len(codes)
     bench.done("watch", "--count", "3", "--every", "0.1")
     assert bench.server.end() == (0, "0")

@@ -59,7 +59,7 @@ class RealBroker:
         assert not self._ended(), (self.folder / "log").read_text("utf-8", "replace")
 
     def _runs(self) -> bool:
-        return self.said("running") > 0
+        return self.output("running") > 0
 
     def _ended(self) -> bool:
         return self.process is None or self.process.poll() is not None
@@ -70,7 +70,7 @@ class RealBroker:
         self.process.wait(PATIENCE)
         (self.folder / "log").unlink()
 
-    def said(self, text: str) -> int:
+    def output(self, text: str) -> int:
         """How often its log has a text."""
         return (self.folder / "log").read_text("utf-8", "replace").count(text)
 
@@ -79,9 +79,9 @@ class RealBroker:
 
     def retained(self, topic: str, *options: str) -> dict[str, str]:
         """All that is retained there, as scada is told."""
-        told = ["-v", "-t", topic, "--retained-only", "-W", "1", *options]
+        reported = ["-v", "-t", topic, "--retained-only", "-W", "1", *options]
         done = subprocess.run(
-            ["mosquitto_sub", *self.options("scada"), *told],
+            ["mosquitto_sub", *self.options("scada"), *reported],
             capture_output=True,
             text=True,
             timeout=PATIENCE,
@@ -151,9 +151,9 @@ def test_cycles_are_retained_and_no_message_writes(
 ) -> None:
     made = publishing(programs, broker, "--allow-writes", "all", "--allow-commands")
     assert broker.status == "online"
-    told = broker.drive()
-    assert told["profile"] == "atv71"
-    assert told["values"]["RFR"]["quality"] == "good"
+    reported = broker.drive()
+    assert reported["profile"] == "atv71"
+    assert reported["values"]["RFR"]["quality"] == "good"
     assert json.loads(broker.retained(f"{ROOT}/+/line").popitem()[1])["state"] == "connected"
 
     (topic,) = broker.retained(f"{ROOT}/+/1")
@@ -165,14 +165,14 @@ def test_cycles_are_retained_and_no_message_writes(
             check=True,
             timeout=PATIENCE,
         )
-    count = broker.said("Received PUBLISH from drivepanel-")
-    wait_until(lambda: broker.said("Received PUBLISH from drivepanel-") > count + 3, "it goes on")
+    count = broker.output("Received PUBLISH from drivepanel-")
+    wait_until(lambda: broker.output("Received PUBLISH from drivepanel-") > count + 3, "it goes on")
     assert {code: drive.raw(code) for code in before} == before
-    assert broker.said("Received SUBSCRIBE from drivepanel-") == 0
+    assert broker.output("Received SUBSCRIBE from drivepanel-") == 0
     wait_until(lambda: broker.status == "online", "it says again that it is there")
 
-    status, said = made.program.end()
-    assert (status, said) == (0, "")
+    status, output = made.program.end()
+    assert (status, output) == (0, "")
     assert broker.status == "offline"
 
 
@@ -183,7 +183,7 @@ def test_the_last_will_comes_within_one_and_a_half_keep_alives(
     made = publishing(programs, broker)
     assert broker.status == "online"
     # how long a broker waits is its own affair: 1.5 times what it was told here
-    assert broker.said(f"k{MQTT_KEEPALIVE}, u'drives'") == 1
+    assert broker.output(f"k{MQTT_KEEPALIVE}, u'drives'") == 1
     made.program.process.send_signal(number)
     wait_until(lambda: broker.status == "offline", "the will")
     made.program.process.kill()
@@ -202,10 +202,10 @@ def test_a_broker_that_comes_back_is_told_everything_anew(
     wait_until(lambda: broker.status == "online", "it is there again")
     assert broker.drive()["values"]["RFR"]["quality"] == "good"
     assert len(broker.retained(f"{ROOT}/#")) == 3
-    status, said = made.program.end()
+    status, output = made.program.end()
     assert status == 0
-    assert "It is tried on." in said
-    assert "is connected again." in said
+    assert "It is tried on." in output
+    assert "is connected again." in output
 
 
 def test_publish_beside_serve_takes_the_codes_that_are_named(
@@ -229,11 +229,11 @@ def test_a_wrong_password_is_told(
     _, line = programs.enter_context(bench())
     command = serving(f"{line}@1", *to_broker(broker))
     program = programs.enter_context(served(command, ready="Ready:"))
-    wait_until(lambda: broker.said("not authorised") > 0, "it was refused")
+    wait_until(lambda: broker.output("not authorised") > 0, "it was refused")
     time.sleep(0.2)
-    status, said = program.end()
+    status, output = program.end()
     assert status == 0
-    assert "ot authorized" in said or "ot authorised" in said
+    assert "ot authorized" in output or "ot authorised" in output
 
 
 # A motor whose client has died
@@ -305,14 +305,14 @@ def test_promtool_finds_nothing_wrong(peer: Peer, tmp_path: Path) -> None:
         with served(command, ready="Ready:") as program:
             wait_until(lambda: "value_hertz" in scraped(program), "values are read")
             text = scraped(program)
-    for arguments, told in (
+    for arguments, reported in (
         (["check", "config", str(config)], ""),
         (["check", "rules", str(rules)], ""),
         (["check", "metrics"], text),
     ):
         done = subprocess.run(
             [promtool, *arguments],
-            input=told,
+            input=reported,
             capture_output=True,
             text=True,
             timeout=PATIENCE,
@@ -347,15 +347,15 @@ def test_prometheus_collects_values_and_sees_a_fault(
     programs.callback(process.wait, PATIENCE)
     programs.callback(process.kill)
 
-    def asked(query: str) -> list[Any]:
+    def requested(query: str) -> list[Any]:
         try:
             with urllib.request.urlopen(f"http://{at}/api/v1/query?query={query}") as answer:
                 return list(json.load(answer)["data"]["result"])
         except (urllib.error.URLError, ConnectionError):
             return []
 
-    wait_until(lambda: bool(asked("drivepanel_value_hertz")), "Prometheus has a frequency")
-    values = asked('drivepanel_value_hertz{quantity="output_frequency"}')
+    wait_until(lambda: bool(requested("drivepanel_value_hertz")), "Prometheus has a frequency")
+    values = requested('drivepanel_value_hertz{quantity="output_frequency"}')
     assert float(values[0]["value"][1]) == pytest.approx(30, abs=31)
     simulation.drive(1).provoke("OHF")
-    wait_until(lambda: bool(asked("drivepanel_drive_fault_info")), "Prometheus has the fault")
+    wait_until(lambda: bool(requested("drivepanel_drive_fault_info")), "Prometheus has the fault")

@@ -121,9 +121,9 @@ def test_mbpoll_reads_and_stops_while_a_program_commands(programs: ExitStack, pe
         assert turns(made.simulation)
         assert poll(COMMAND, "7").returncode == 0
         wait_until(lambda: stands(made.simulation), "the motor stops")
-        said, _ = runner.process.communicate(timeout=PATIENCE)
+        output, _ = runner.process.communicate(timeout=PATIENCE)
         assert runner.process.returncode == 6
-        assert "was stopped by Modbus TCP client 127.0.0.1:" in said
+        assert "was stopped by Modbus TCP client 127.0.0.1:" in output
         assert made.simulation.drive(1).fault is None
 
 
@@ -194,9 +194,9 @@ def test_it_warns_where_other_computers_reach_it() -> None:
     with bench() as (_, line):
         command = serving(line, "--tcp", "0.0.0.0:0", "--allow-commands")
         with served(command, ready="reads and commands") as program:
-            status, said = program.end()
+            status, output = program.end()
         assert status == 0
-        assert "Modbus TCP has no password: anyone who can reach 0.0.0.0:" in said
+        assert "Modbus TCP has no password: anyone who can reach 0.0.0.0:" in output
 
 
 # Its end, and the end of others
@@ -213,8 +213,8 @@ def test_sigterm_ends_it_with_0_and_systemd_is_told(
         with gateway() as made, made.client():
             heard = {systemd.recv(500).split(b"\n")[0] for _ in range(2)}
             assert heard == {b"READY=1", b"WATCHDOG=1"}
-            status, said = made.program.end()
-            assert (status, said) == (0, "")
+            status, output = made.program.end()
+            assert (status, output) == (0, "")
             assert systemd.recv(500).startswith(b"STOPPING=1")
 
 
@@ -233,8 +233,8 @@ def test_whoever_is_attached_goes_on_where_it_is_killed(programs: ExitStack) -> 
             line = recorder.process.stdout.readline()
         assert json.loads(line)["values"]["RFR"]["quality"] == "good"
         with served(serving(made.line), ready="Ready:") as again:
-            _, said = again.end()
-        assert "Shared with watch" in said
+            _, output = again.end()
+        assert "Shared with watch" in output
 
 
 def test_it_becomes_the_owner_when_the_one_before_ends(programs: ExitStack) -> None:
@@ -252,9 +252,9 @@ def test_it_becomes_the_owner_when_the_one_before_ends(programs: ExitStack) -> N
                 return not read.isError()
 
             wait_until(answers, "the gateway answers again")
-        status, said = made.program.end()
+        status, output = made.program.end()
         assert status == 0
-        assert "Shared with watch" in said
+        assert "Shared with watch" in output
 
 
 def started_by_a_client(made: Gateway) -> None:
@@ -279,9 +279,9 @@ ENDS = {
 def test_its_end_stops_a_motor_that_a_client_started(number: signal.Signals) -> None:
     with gateway("--allow-commands", specs=(ENABLED,)) as made:
         started_by_a_client(made)
-        status, said = made.program.end(number)
+        status, output = made.program.end(number)
         assert status == ENDS[number]
-        assert "Stopped: 1: stopped" in said
+        assert "Stopped: 1: stopped" in output
         assert stands(made.simulation)
         assert made.simulation.drive(1).fault is None
 
@@ -301,5 +301,5 @@ def test_a_motor_that_a_program_left_is_stopped_by_it(programs: ExitStack) -> No
         runner.process.kill()
         wait_until(lambda: stands(made.simulation), "the motor stops")
         assert made.simulation.drive(1).fault is None
-        _, said = made.program.end()
-        assert "is gone: its motor is stopped" in said
+        _, output = made.program.end()
+        assert "is gone: its motor is stopped" in output

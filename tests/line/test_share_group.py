@@ -78,7 +78,7 @@ def program(line: str, user: int, groups: str, folder: Path, **more: str) -> sub
     )
 
 
-def said(one: subprocess.Popen[str]) -> str:
+def output(one: subprocess.Popen[str]) -> str:
     assert one.stdout is not None
     return one.stdout.readline().strip()
 
@@ -93,11 +93,11 @@ def test_a_member_attaches_without_being_told_and_a_stranger_does_not(
 ) -> None:
     number = str(grp.getgrnam(GROUP).gr_gid)
     owner = program(tcp_line, MEMBER, number, folder, DRIVEPANEL_SHARE_GROUP=GROUP)
-    assert said(owner) == "[]"
+    assert output(owner) == "[]"
     member = program(tcp_line, MEMBER - 1, number, folder)
-    assert said(member) == f"['p{MEMBER}']"
+    assert output(member) == f"['p{MEMBER}']"
     stranger = program(tcp_line, STRANGER, "", folder)
-    assert said(stranger) == "[]"
+    assert output(stranger) == "[]"
     end(member, stranger, owner)
     assert not list(folder.glob("*.sock"))
 
@@ -107,9 +107,9 @@ def test_nobody_of_another_user_attaches_unless_it_was_asked_for(
 ) -> None:
     number = str(grp.getgrnam(GROUP).gr_gid)
     owner = program(tcp_line, MEMBER, number, folder)
-    assert said(owner) == "[]"
+    assert output(owner) == "[]"
     other = program(tcp_line, MEMBER - 1, number, folder)
-    assert said(other) == "[]"
+    assert output(other) == "[]"
     end(other, owner)
 
 
@@ -117,13 +117,13 @@ def test_a_group_without_a_folder_is_told_what_to_do(tmp_path: Path, tcp_line: s
     if os.geteuid() != 0:
         pytest.skip(ROOT_NEEDED)
     one = program(tcp_line, 0, "", tmp_path / "none", DRIVEPANEL_SHARE_GROUP=GROUP)
-    told = said(one)
+    reported = output(one)
     end(one)
-    assert "sudo install -d -m 2770 -g dialout" in told
+    assert "sudo install -d -m 2770 -g dialout" in reported
     one = program(tcp_line, 0, "", tmp_path, DRIVEPANEL_SHARE_GROUP="no-such-group")
-    told = said(one)
+    reported = output(one)
     end(one)
-    assert "There is no group no-such-group" in told
+    assert "There is no group no-such-group" in reported
 
 
 def test_serve_opens_its_socket_for_the_group_that_it_is_told(
@@ -143,8 +143,8 @@ def test_serve_opens_its_socket_for_the_group_that_it_is_told(
         assert not list(folder.iterdir()), "closed to others unless told otherwise"
     with served([*command, "--share-group", grp.getgrgid(number).gr_name], ready="Ready:") as one:
         (socket,) = folder.glob("*.sock")
-        told = socket.stat()
-        assert (told.st_gid, stat.S_IMODE(told.st_mode)) == (number, 0o660)
+        reported = socket.stat()
+        assert (reported.st_gid, stat.S_IMODE(reported.st_mode)) == (number, 0o660)
         watch = [*DRIVEPANEL, "watch", tcp_line, "RFR", "--count", "1", "--json"]
         done = subprocess.run(watch, capture_output=True, text=True, timeout=PATIENCE, check=False)
         assert done.returncode == 0

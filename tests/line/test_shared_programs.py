@@ -89,8 +89,8 @@ def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
         starts = Path(os.environ["DRIVEPANEL_STATE"], "starts")
         wait_until(lambda: not list(starts.iterdir()), "the record of the start goes")
-        _, said = recorder.end()
-        assert "is gone: its motor is stopped" in said
+        _, output = recorder.end()
+        assert "is gone: its motor is stopped" in output
         assert left_over() == []
 
 
@@ -126,10 +126,10 @@ def test_a_stop_of_the_motor_of_a_frozen_program_lasts(
 def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
     """A frozen `run` goes on, hears that its motor was stopped, and sends it nothing but stops."""
     runner.process.send_signal(signal.SIGCONT)
-    said, _ = runner.process.communicate(timeout=PATIENCE)
+    output, _ = runner.process.communicate(timeout=PATIENCE)
     # it hears of the stop on its return, or how many there were if it was taken for gone
     by = ("drivepanel stop, stop", "a stop while this program stood still")
-    assert any(f"was stopped by {one}" in said for one in by)
+    assert any(f"was stopped by {one}" in output for one in by)
     assert runner.process.returncode == 6
     assert stopped_by_commands(simulation)
 
@@ -160,17 +160,17 @@ def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops on its ramp")
         before = simulation.drive(1).raw("CMD")
         runner.process.send_signal(signal.SIGCONT)
-        said, _ = runner.process.communicate(timeout=PATIENCE)
+        output, _ = runner.process.communicate(timeout=PATIENCE)
         assert runner.process.returncode == 6
         by = {"keeper": "keeper", "inside": "watch"}[holder]
-        assert f"It was stopped by a stop while this program stood still, {by} (pid" in said
+        assert f"It was stopped by a stop while this program stood still, {by} (pid" in output
         assert simulation.drive(1).raw("CMD") == before
         assert recorder.process.stdout is not None
         for _ in range(3):
             assert '"RFR"' in recorder.process.stdout.readline()
-        _, told = recorder.end()
+        _, reported = recorder.end()
         gone = f"run (pid {runner.process.pid}) is not on the line any more"
-        assert f"{gone}: its motor is stopped." in told
+        assert f"{gone}: its motor is stopped." in reported
         assert left_over() == []
 
 
@@ -275,17 +275,17 @@ def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None
     with motor_run(programs, "run") as (simulation, line, runner, recorder):
         assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
         assert stopped_by_commands(simulation)
-        said, _ = runner.process.communicate(timeout=PATIENCE)
+        output, _ = runner.process.communicate(timeout=PATIENCE)
         assert runner.process.returncode == 6
-        assert "was stopped by drivepanel stop, stop" in said
+        assert "was stopped by drivepanel stop, stop" in output
         # the owner went, the recorder records on
         assert recorder.process.stdout is not None
         for _ in range(3):
             assert '"RFR"' in recorder.process.stdout.readline()
-        status, said = recorder.end()
+        status, output = recorder.end()
         assert status == 128 + signal.SIGTERM
         # it may say, too, what the drive does now that the recorder asks it no more
-        assert said.startswith(f"drivepanel: Shared with run (pid {runner.process.pid}).\n")
+        assert output.startswith(f"drivepanel: Shared with run (pid {runner.process.pid}).\n")
         assert left_over() == []
 
 
@@ -293,8 +293,8 @@ def test_a_drive_that_run_commands_takes_nothing_from_another_command(
     programs: ExitStack,
 ) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, _):
-        asked = ("run", line, "--reference", "5Hz", "--arm", "-p", "atv71", "-d", "1")
-        done = drivepanel(*asked)
+        requested = ("run", line, "--reference", "5Hz", "--arm", "-p", "atv71", "-d", "1")
+        done = drivepanel(*requested)
         assert done.returncode == 5
         assert f"Drive 1 is commanded by run (pid {runner.process.pid})" in done.stderr
         assert turns(simulation)
@@ -340,9 +340,9 @@ def test_what_a_panel_was_told_of_a_hangup_holds_for_every_loss_of_it(
         assert made.speed > 2
         assert made.simulation.drive(1).raw("CMD") == before
         assert on_record() == [True]
-        status, said = recorder.end()
+        status, output = recorder.end()
         assert status == 128 + signal.SIGTERM
-        assert "its motor is stopped" not in said
+        assert "its motor is stopped" not in output
         assert left_over() == []
 
 
@@ -356,8 +356,8 @@ def test_unless_it_was_told_otherwise_the_motor_of_a_killed_panel_is_stopped(
         made.stopped()
         assert made.simulation.drive(1).fault is None
         wait_until(lambda: on_record() == [], "the record of the start goes")
-        _, said = recorder.end()
-        assert "is gone: its motor is stopped" in said
+        _, output = recorder.end()
+        assert "is gone: its motor is stopped" in output
         assert left_over() == []
 
 
@@ -414,9 +414,9 @@ def test_a_command_that_comes_late_to_the_line_knows_of_a_stop_before(
         assert done.returncode == 0, done.stderr
         before = simulation.drive(1).raw("CMD")
         slow.send_signal(signal.SIGCONT)
-        _, said = slow.communicate(timeout=PATIENCE)
+        _, output = slow.communicate(timeout=PATIENCE)
         assert slow.returncode == 5
-        assert "Device 1: it was stopped after this command was typed" in said
+        assert "Device 1: it was stopped after this command was typed" in output
         assert simulation.drive(1).raw("CMD") == before
         # the next one is typed after the stop
         assert drivepanel("reference", line, "20", "-p", "atv71", "--arm").returncode == 0

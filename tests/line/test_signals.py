@@ -191,13 +191,13 @@ def test_nothing_suspends_a_command_that_owns_a_line(name: str) -> None:
     words, ready, plus = OWNERS[name]
     command = [*DRIVEPANEL, name.split()[0], *words]
     with served(command, ready=ready) as program:
-        said: list[str] = []
+        output: list[str] = []
         assert program.process.stderr is not None
-        reading = threading.Thread(target=lambda: said.extend(program.process.stderr or ()))
+        reading = threading.Thread(target=lambda: output.extend(program.process.stderr or ()))
         reading.start()
         for one in SUSPENDING:
             program.process.send_signal(getattr(signal, one))
-        wait_until(lambda: sum(IGNORED in line for line in said) == 3, f"it says so: {said}")
+        wait_until(lambda: sum(IGNORED in line for line in output) == 3, f"it says so: {output}")
         assert not is_suspended(program.process.pid)
         program.process.send_signal(signal.SIGUSR1)
         assert program.process.wait(PATIENCE) == plus + signal.SIGUSR1

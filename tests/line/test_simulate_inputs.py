@@ -46,9 +46,9 @@ def test_a_line_on_standard_input_runs_the_motor_as_a_hand_at_the_terminals_woul
         simulation.process.stdin.write("2: LI9=1\n")
         simulation.process.stdin.close()
         simulation.process.stdin = None
-        status, said = simulation.end()
+        status, output = simulation.end()
         assert status == 0
-        assert "No input is called 'LI9'" in said
+        assert "No input is called 'LI9'" in output
 
 
 @pytest.mark.parametrize(("more", "status"), [((), 3), (("--any-settings",), 0)])

@@ -48,9 +48,9 @@ class FakeClock(Clock):
         while (left := end - self.monotonic()) > 0:  # noqa: ASYNC110 - any thread advances it
             await asyncio.sleep(min(left, TURN))
 
-    def of_line(self, told: float) -> float:
+    def of_line(self, reported: float) -> float:
         """A real moment on this clock: what was advanced since then is not in it."""
-        return told + self._ahead[bisect_right(self._since, told) - 1]
+        return reported + self._ahead[bisect_right(self._since, reported) - 1]
 
 
 async def let_go_until(

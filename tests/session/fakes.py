@@ -28,7 +28,7 @@ class BlockDrive(FakeDevice):
 
 
 class OneDrive(FakeLine):
-    """A line with one drive; `asked` lists the reads."""
+    """A line with one drive; `requested` lists the reads."""
 
     def __init__(self, registers: Mapping[int, int], *, device: int = 1) -> None:
         super().__init__({device: registers})
@@ -48,7 +48,7 @@ class OneDrive(FakeLine):
         return self.devices[self.device].words
 
     @property
-    def asked(self) -> list[tuple[int, int]]:
+    def requested(self) -> list[tuple[int, int]]:
         """Address and count of all reads so far."""
         return [(one.address, one.count) for one in self.requests if isinstance(one, Read)]
 

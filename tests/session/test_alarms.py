@@ -39,7 +39,7 @@ class Bench:
         self.kept.append((fault.device, fault.code, what))
 
     @property
-    def said(self) -> list[str]:
+    def output(self) -> list[str]:
         return [f"{event.device} {event.kind}: {event.text}" for event in self.log.events]
 
 
@@ -55,8 +55,8 @@ def test_the_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
     bench.now = 60.0
     assert bench.take({1: RUNS, 3: tripped(OBF), 17: tripped(OLF)})
     assert [fault.device for fault in bench.alarms.active] == [17, 3]
-    assert bench.said[0] == "17 fault: tripped: OLF Motor overload."
-    assert bench.said[1].startswith("3 fault: tripped: ObF Overbraking; drive 17 tripped first, ")
+    assert bench.output[0] == "17 fault: tripped: OLF Motor overload."
+    assert bench.output[1].startswith("3 fault: tripped: ObF Overbraking; drive 17 tripped first, ")
     assert bench.kept == [(17, "OLF", "tripped"), (3, "ObF", "tripped")]
 
 
@@ -74,7 +74,7 @@ def test_a_reset_ends_it_and_the_same_fault_again_is_new(bench: Bench) -> None:
     bench.alarms.acknowledge(3)
     assert not bench.take({3: RUNS})
     assert bench.alarms.active == ()
-    assert bench.said[-1] == "3 done: ObF Overbraking is reset."
+    assert bench.output[-1] == "3 done: ObF Overbraking is reset."
     assert bench.take({3: tripped(OBF)})
     assert bench.alarms.unseen
 
@@ -91,7 +91,7 @@ def test_a_code_that_comes_later_is_told_and_rings_no_second_time(bench: Bench) 
     assert bench.take({3: tripped(None)})
     assert not bench.take({3: tripped(OBF)})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]
-    assert bench.said[-1] == "3 fault: the fault is ObF Overbraking."
+    assert bench.output[-1] == "3 fault: the fault is ObF Overbraking."
 
 
 def test_another_fault_of_the_same_drive_is_new(bench: Bench) -> None:
@@ -103,7 +103,7 @@ def test_fault_present_at_the_first_look_is_seen_not_tripped(bench: Bench) -> No
     bench.now = 30.0
     assert bench.take({3: tripped(OBF)})
     assert bench.kept == [(3, "ObF", "seen")]
-    assert bench.said == ["3 fault: in fault when first seen: ObF Overbraking."]
+    assert bench.output == ["3 fault: in fault when first seen: ObF Overbraking."]
     (fault,) = bench.alarms.active
     assert not fault.tripped
     assert fault.when.startswith("seen since ")

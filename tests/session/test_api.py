@@ -114,8 +114,8 @@ def test_nothing_is_written_without_arming(drive: Drive) -> None:
 
 def test_what_is_written_is_read_back_and_on_record(drive: Drive) -> None:
     with drive.armed():
-        told = drive.write({"HSP": 40.5, "ACC": "3500ms"})
-    assert told["HSP"] == "HSP: 50.0 Hz -> 40.5 Hz"
+        reported = drive.write({"HSP": 40.5, "ACC": "3500ms"})
+    assert reported["HSP"] == "HSP: 50.0 Hz -> 40.5 Hz"
     found = drive.read("HSP", "ACC")
     assert (found["HSP"].number, found["ACC"].number) == (Decimal("40.5"), Decimal("3.5"))
 

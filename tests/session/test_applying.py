@@ -30,16 +30,16 @@ def text(applied: Applied, code: str) -> str:
 
 async def test_edits_are_written_read_back_and_recorded() -> None:
     with bench("atv71") as made:
-        told: list[tuple[int, int, str]] = []
+        reported: list[tuple[int, int, str]] = []
 
         def progress(done: int, of: int, result: Result) -> None:
-            told.append((done, of, result.text))
+            reported.append((done, of, result.text))
 
         edits = await made.stage(ACC="5 s", DEC="7,25")
         applied = await made.write(edits, progress=progress)
         assert outcomes(applied) == {"ACC": EditOutcome.DONE, "DEC": EditOutcome.DONE}
         assert (made.drive.raw("ACC"), made.drive.raw("DEC")) == (50, 73)
-        assert told == [(1, 2, "ACC: 3.0 s -> 5.0 s"), (2, 2, "DEC: 3.0 s -> 7.3 s")]
+        assert reported == [(1, 2, "ACC: 3.0 s -> 5.0 s"), (2, 2, "DEC: 3.0 s -> 7.3 s")]
         assert len(applied.left) == 0
         assert applied.unsaved == ("ACC", "DEC")
         entries = made.journal.recent
@@ -181,10 +181,10 @@ async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
             "ACC": EditOutcome.DRIVE_REFUSED,
             "DEC": EditOutcome.DRIVE_REFUSED,
         }
-        told = text(applied, "ACC")
-        assert "exception 4, Not completed" in told
-        assert "The drive is ready" in told or "The drive is not ready" in told
-        assert "Check whether the parameter can be written" in told
+        reported = text(applied, "ACC")
+        assert "exception 4, Not completed" in reported
+        assert "The drive is ready" in reported or "The drive is not ready" in reported
+        assert "Check whether the parameter can be written" in reported
         assert {edit.code for edit in applied.left} == {"ACC", "DEC"}
         assert [e.answer.startswith("Device 1 refused") for e in made.journal.recent] == [
             True,
@@ -379,8 +379,10 @@ async def test_families_without_a_known_order_are_refused_with_words(family: str
 @pytest.mark.parametrize(("family", "confirmed"), [("atv31", {"CMI"}), ("atv312", set())])
 async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> None:
     with bench(family, sets={"ACC": 99, "HSP": 400, "SP2": 333}) as made:
-        told = await factory_reset(made.session, made.journal, made.permit(), confirmed=confirmed)
-        assert "recalled in working memory" in told
+        reported = await factory_reset(
+            made.session, made.journal, made.permit(), confirmed=confirmed
+        )
+        assert "recalled in working memory" in reported
         factory = made.profile["SP2"].factory
         assert (made.drive.raw("ACC"), made.drive.raw("SP2")) == (30, factory)
         assert made.drive.raw("LAC") == 0

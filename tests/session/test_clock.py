@@ -106,7 +106,7 @@ def test_what_is_known_grows_old(session: DriveSession) -> None:
 
 
 def test_a_moment_has_one_time_of_day_unless_the_clock_is_set() -> None:
-    class Told(Clock):
+    class Notified(Clock):
         now, ahead = 100.0, 5000.0
 
         def monotonic(self) -> float:
@@ -115,7 +115,7 @@ def test_a_moment_has_one_time_of_day_unless_the_clock_is_set() -> None:
         def wall(self) -> float:
             return self.now + self.ahead
 
-    clock = Told()
+    clock = Notified()
     assert clock.wall_of(99.0) == 5099.0
     # the two are asked one after the other, and the time of day is steered
     clock.now, clock.ahead = 101.0, 5000.001

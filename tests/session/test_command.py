@@ -402,6 +402,6 @@ async def test_a_motor_that_starts_the_other_way_is_stopped() -> None:
     async with bench("atv71", sets={"CMI": 1 << 12}) as made:
         made.commander.refer("20Hz")
         await made.done()
-        said = await made.order("forward", OutcomeKind.REFUSED)
-        assert "turned reverse and was stopped" in said
+        output = await made.order("forward", OutcomeKind.REFUSED)
+        assert "turned reverse and was stopped" in output
         await made.until(lambda: made.drive.motor.frequency == 0)

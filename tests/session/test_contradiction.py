@@ -27,7 +27,7 @@ from .test_stop import Start, ended, journal, start, wait_for, writes
 __all__ = ["journal", "start"]
 
 
-def said(reference: str) -> DriveIdentity:
+def output(reference: str) -> DriveIdentity:
     fits = tuple(library.matching_profiles(reference)) if reference else ()
     return DriveIdentity(1, "", reference, "", "", fits[0] if fits else None, fits)
 
@@ -50,9 +50,9 @@ def of_kinds(*prefixes: str) -> Profile:
     ],
 )
 def test_another_kind_is_told_by_both_names(reference: str, profile: str) -> None:
-    told = contradiction(said(reference), library.load(profile))
-    assert told.startswith(f"Device 1 says it is {reference}")
-    assert library.load(profile).name in told
+    reported = contradiction(output(reference), library.load(profile))
+    assert reported.startswith(f"Device 1 says it is {reference}")
+    assert library.load(profile).name in reported
 
 
 @pytest.mark.parametrize(
@@ -69,24 +69,24 @@ def test_another_kind_is_told_by_both_names(reference: str, profile: str) -> Non
     ],
 )
 def test_what_may_be_is_no_contradiction(reference: str, profile: str) -> None:
-    assert contradiction(said(reference), library.load(profile)) == ""
+    assert contradiction(output(reference), library.load(profile)) == ""
     assert contradiction(None, library.load(profile)) == ""
 
 
 def test_a_profile_of_the_users_own_is_compared_by_what_it_claims() -> None:
-    assert contradiction(said("PUMP 7"), of_kinds("PUMP")) == ""
-    assert contradiction(said("FAN 7"), of_kinds("PUMP"))
-    assert contradiction(said("FAN 7"), of_kinds()) == ""
-    assert contradiction(said("ATV71HU15M3"), of_kinds()), "another profile claims it"
+    assert contradiction(output("PUMP 7"), of_kinds("PUMP")) == ""
+    assert contradiction(output("FAN 7"), of_kinds("PUMP"))
+    assert contradiction(output("FAN 7"), of_kinds()) == ""
+    assert contradiction(output("ATV71HU15M3"), of_kinds()), "another profile claims it"
 
 
 class Answering(OneDrive):
-    """A line whose drive answers function 43 so; `asked_by` lists the priorities."""
+    """A line whose drive answers function 43 so; `priorities` lists the priorities."""
 
     def __init__(self, answer: IdentificationObjects | Exception) -> None:
         super().__init__({})
         self.answer = answer
-        self.asked_by: list[Priority] = []
+        self.priorities: list[Priority] = []
 
     async def identify(
         self,
@@ -96,7 +96,7 @@ class Answering(OneDrive):
         within: float | None = None,
         function: int = 43,
     ) -> IdentificationObjects:
-        self.asked_by.append(priority)
+        self.priorities.append(priority)
         if isinstance(self.answer, Exception):
             raise self.answer
         return self.answer
@@ -106,7 +106,7 @@ class Answering(OneDrive):
 async def test_who_says_nothing_is_asked_once_and_believed(error: Exception) -> None:
     line = Answering(error)
     assert await own_words(line, 1, library.load("powerdrive")) is None
-    assert line.asked_by == [Priority.BACKGROUND], "a silent family is not waited for long"
+    assert line.priorities == [Priority.BACKGROUND], "a silent family is not waited for long"
 
 
 @pytest.mark.parametrize("family", ["atv71", "powerdrive"])
@@ -117,14 +117,14 @@ async def test_damaged_identification_is_requested_again_and_decides_nothing(
     line = Answering(error)
     with pytest.raises(type(error)):
         await own_words(line, 1, library.load(family))
-    assert len(line.asked_by) == 3
+    assert len(line.priorities) == 3
 
 
 async def test_silence_of_a_drive_that_answers_its_status_is_no_contradiction() -> None:
     line = Answering(NoAnswer(1, 43, 0))
     profile = library.load("atv71")
     assert await own_words(line, 1, profile) is None
-    assert len(line.asked_by) == 2
+    assert len(line.priorities) == 2
 
 
 async def test_a_lost_line_is_told() -> None:
@@ -134,7 +134,7 @@ async def test_a_lost_line_is_told() -> None:
 
 @pytest.mark.parametrize("family", ["atv71", "powerdrive"])
 def test_a_contradicted_drive_is_never_armed(family: str) -> None:
-    identity = said("ATV312HU09M3")
+    identity = output("ATV312HU09M3")
     session = DriveSession(OneDrive({}), 1, library.load(family), identity)
     with pytest.raises(OrderRefused, match="says it is ATV312HU09M3, Altivar 312"):
         session.arming.arm()
@@ -145,7 +145,7 @@ def test_a_contradicted_drive_is_never_armed(family: str) -> None:
 
 
 def test_a_drive_that_fits_is_armed() -> None:
-    identity = replace(said("ATV312HU09M3"), device=1)
+    identity = replace(output("ATV312HU09M3"), device=1)
     session = DriveSession(OneDrive({}), 1, library.load("atv312"), identity)
     assert session.contradiction == ""
     session.arming.arm()

@@ -48,7 +48,7 @@ def count(frames: int, damaged: int = 0, *, sent: int = 0, answered: int = 0) ->
     return DriveCount(frames, damaged, exactly(sent), exactly(answered))
 
 
-def told(before: DriveCount, now: DriveCount) -> dict[str, int]:
+def reported(before: DriveCount, now: DriveCount) -> dict[str, int]:
     found = Comparison(before, before).with_look(now)
     return {one.kind: one.count for one in differences(found)}
 
@@ -71,13 +71,13 @@ def told(before: DriveCount, now: DriveCount) -> dict[str, int]:
     ],
 )  # fmt: skip
 def test_what_differs_is_told(now: DriveCount, shown: dict[str, int]) -> None:
-    assert told(count(100, 3), now) == shown
+    assert reported(count(100, 3), now) == shown
 
 
 def test_frames_roll_over_and_errors_stay() -> None:
     before = count(65530, 65535)
     assert before.saturated
-    assert told(before, count(14, 65535, sent=20, answered=20)) == {}
+    assert reported(before, count(14, 65535, sent=20, answered=20)) == {}
 
 
 def test_what_is_not_certain_is_not_told() -> None:
@@ -86,7 +86,7 @@ def test_what_is_not_certain_is_not_told() -> None:
     now = DriveCount(120, 0, Bounds(70, 72), Bounds(69, 71))
     assert differences(Comparison(before, before).with_look(now)) == []
     late = replace(now, answered=Bounds(60, 62))
-    assert told(before, late) == {"not-answered": 6}
+    assert reported(before, late) == {"not-answered": 6}
 
 
 def test_a_program_that_takes_the_line_over_counts_anew_and_no_difference_is_told() -> None:

@@ -88,10 +88,10 @@ def line() -> Iterator[OpenedLine]:
 async def why(line: ModbusLine, device: int = 2, family: str | None = "atv71") -> Diagnosis:
     """The diagnosis of a drive on an open line."""
     profile = library.load(family) if family else None
-    return told(diagnosed(await sight_of_drive(line, device, profile)))
+    return reported(diagnosed(await sight_of_drive(line, device, profile)))
 
 
-def told(found: Diagnosis) -> Diagnosis:
+def reported(found: Diagnosis) -> Diagnosis:
     """The same, after a look at its form: one sentence, and steps that are sentences."""
     assert found.text.endswith(".")
     assert ". " not in found.text
@@ -100,12 +100,12 @@ def told(found: Diagnosis) -> Diagnosis:
 
 
 def of(sight: Sight) -> Diagnosis:
-    return told(diagnosed(sight))
+    return reported(diagnosed(sight))
 
 
 def heard(**seen: Any) -> Sight:
     """What a drive answered on a good port."""
-    return Sight(LINK, 2, PROFILE, heard=Heard(asked=3, **seen))
+    return Sight(LINK, 2, PROFILE, heard=Heard(requested=3, **seen))
 
 
 def test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed() -> None:
@@ -120,10 +120,10 @@ def test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed
 def test_who_answers_has_the_right_wires() -> None:
     damaged = of(heard(answered=2, damaged=1))
     assert damaged.rung == "checksum"
-    said = " ".join(damaged.steps)
-    assert "Termination" in said
-    assert "Polarity" not in said
-    assert "Pins" not in said
+    output = " ".join(damaged.steps)
+    assert "Termination" in output
+    assert "Polarity" not in output
+    assert "Pins" not in output
 
 
 def test_what_is_not_as_it_left_the_factory_is_looked_at_first() -> None:
@@ -211,9 +211,11 @@ def test_a_port_that_a_program_has() -> None:
 
 
 def test_a_program_that_listens_on_the_same_port() -> None:
-    seen = Sight(LINK, 2, PROFILE, port=PortSeen(PORT, others="cat (pid 3)"), heard=Heard(asked=2))
+    seen = Sight(
+        LINK, 2, PROFILE, port=PortSeen(PORT, others="cat (pid 3)"), heard=Heard(requested=2)
+    )
     assert of(seen).text == f"cat (pid 3) has {PORT} open too, and takes what the drive answers."
-    assert of(replace(seen, heard=Heard(asked=5, answered=5))).well
+    assert of(replace(seen, heard=Heard(requested=5, answered=5))).well
 
 
 @pytest.mark.parametrize(
@@ -271,7 +273,7 @@ def test_a_host_that_is_not_reached() -> None:
 def test_latency_is_told_where_it_is_set_and_measured(
     latency: int | None, turnaround: float, rung: str
 ) -> None:
-    heard = Heard(asked=5, answered=5)
+    heard = Heard(requested=5, answered=5)
     port = PortSeen(PORT, latency=latency)
     found = of(Sight(LINK, 2, PROFILE, port=port, heard=heard, turnaround=turnaround))
     assert found.rung == rung
@@ -321,7 +323,7 @@ async def test_bytes_that_came_at_another_baud_tell_which(baud: int, line: Opene
 
 def test_the_counts_of_a_real_port_tell_it() -> None:
     errors = PortErrors(framing=3, parity=1, breaks=2, overruns=0)
-    found = of(Sight(LINK, 2, PROFILE, heard=Heard(asked=2), errors=errors))
+    found = of(Sight(LINK, 2, PROFILE, heard=Heard(requested=2), errors=errors))
     assert found.rung == "wrong-settings"
     assert "3 without a stop bit and 1 with a wrong parity and 2 breaks" in found.text
 
@@ -344,7 +346,7 @@ async def test_the_counts_come_from_the_line() -> None:
 @pytest.mark.parametrize("family", ["proxidrive", "varmeca"])
 def test_a_speed_that_the_family_has_not(family: str) -> None:
     profile = library.load(family)
-    found = of(Sight(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(asked=2)))
+    found = of(Sight(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(requested=2)))
     assert found.rung == "silence"
     assert found.steps[0].startswith("38400 bit/s does not work on ")
     assert "300 to 19200" in found.steps[0]
@@ -440,7 +442,7 @@ async def test_an_answer_after_its_time(line: OpenedLine) -> None:
 async def test_a_drive_that_is_left_alone_on_purpose(line: OpenedLine) -> None:
     with PtyPeer(honest) as peer:
         opened = line(peer.path)
-        opened.facts.hush(2, "A proof is going on.")
+        opened.facts.pause_polling(2, "A proof is going on.")
         found = await why(opened)
         assert (found.rung, found.text) == ("withheld", "A proof is going on.")
         assert peer.requests == []
@@ -517,7 +519,7 @@ def test_the_ends_of_requests_tell_it_too(error: LineError | None, rung: str) ->
 
 def steps_in_silence(family: str, device: int = 2) -> str:
     link = SerialLink(PORT, 19200, "8E1")
-    found = of(Sight(link, device, library.load(family), heard=Heard(asked=2)))
+    found = of(Sight(link, device, library.load(family), heard=Heard(requested=2)))
     assert found.rung == "silence"
     return "\n".join(found.steps)
 
@@ -554,7 +556,7 @@ def test_an_address_that_no_drive_has() -> None:
 
 def test_a_format_that_the_family_has_not() -> None:
     link = SerialLink(PORT, 19200, "8O2")
-    found = of(Sight(link, 2, PROFILE, heard=Heard(asked=2)))
+    found = of(Sight(link, 2, PROFILE, heard=Heard(requested=2)))
     assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
 
 
@@ -565,14 +567,14 @@ EXAMPLES = {
     "other-master": replace(ASKED, overheard="Another master asks drives on this line. Address 2."),
     "wrong-protocol": replace(ASKED, works=Works("rtu-tcp:gateway:4001")),
     "other-unit": replace(ASKED, works=Works("tcp:gateway:502,unit=255", 255)),
-    "behind": replace(ASKED, measure=Measure(asked=9, behind=3)),
-    "two-drives": replace(ASKED, measure=Measure(asked=9, answered=9, second=3)),
-    "swapped": replace(ASKED, measure=Measure(asked=9, answered=9, swapped=3)),
-    "lost": replace(ASKED, measure=Measure(asked=9, answered=8, lost=1)),
-    "duplicated": replace(ASKED, measure=Measure(asked=9, answered=9, duplicated=1)),
-    "idle-close": replace(ASKED, measure=Measure(asked=9, answered=9), idle_closed=True),
+    "behind": replace(ASKED, measure=Measure(requested=9, behind=3)),
+    "two-drives": replace(ASKED, measure=Measure(requested=9, answered=9, second=3)),
+    "swapped": replace(ASKED, measure=Measure(requested=9, answered=9, swapped=3)),
+    "lost": replace(ASKED, measure=Measure(requested=9, answered=8, lost=1)),
+    "duplicated": replace(ASKED, measure=Measure(requested=9, answered=9, duplicated=1)),
+    "idle-close": replace(ASKED, measure=Measure(requested=9, answered=9), idle_closed=True),
     "renumbered": replace(ASKED, adapter=AdapterSeen("/dev/serial/by-id/a", "/dev/ttyUSB1")),
-    "changed": replace(ASKED, changed="It was a pump.", heard=Heard(asked=5, answered=5)),
+    "changed": replace(ASKED, changed="It was a pump.", heard=Heard(requested=5, answered=5)),
     "no-port": replace(ASKED, trouble=PortMissing(PORT)),
     "no-permission": replace(ASKED, port=PortSeen(PORT, permitted=False)),
     "busy": replace(ASKED, trouble=PortBusy(PORT)),
@@ -580,18 +582,21 @@ EXAMPLES = {
     "line-lost": replace(ASKED, trouble=LineLost("The port went away.")),
     "withheld": replace(ASKED, withheld="A proof is going on."),
     "slow-adapter": replace(
-        ASKED, port=PortSeen(PORT, latency=16), heard=Heard(asked=5, answered=5), turnaround=0.02
+        ASKED,
+        port=PortSeen(PORT, latency=16),
+        heard=Heard(requested=5, answered=5),
+        turnaround=0.02,
     ),
-    "wrong-settings": replace(ASKED, heard=Heard(asked=2, garbage=9)),
-    "silence": replace(ASKED, heard=Heard(asked=2)),
-    "late": replace(ASKED, heard=Heard(asked=2, late=1)),
-    "echo": replace(ASKED, heard=Heard(asked=2, echoed=2)),
-    "checksum": replace(ASKED, heard=Heard(asked=5, answered=3, damaged=2)),
-    "other-address": replace(ASKED, heard=Heard(asked=2, others=(7,))),
-    "wrong-function": replace(ASKED, heard=Heard(asked=2, functions=(4,))),
-    "gateway": replace(ASKED, heard=Heard(asked=2, exceptions=(11, 11))),
-    "exception": replace(ASKED, heard=Heard(asked=2, exceptions=(2, 2))),
-    "answers": replace(ASKED, heard=Heard(asked=5, answered=5)),
+    "wrong-settings": replace(ASKED, heard=Heard(requested=2, garbage=9)),
+    "silence": replace(ASKED, heard=Heard(requested=2)),
+    "late": replace(ASKED, heard=Heard(requested=2, late=1)),
+    "echo": replace(ASKED, heard=Heard(requested=2, echoed=2)),
+    "checksum": replace(ASKED, heard=Heard(requested=5, answered=3, damaged=2)),
+    "other-address": replace(ASKED, heard=Heard(requested=2, others=(7,))),
+    "wrong-function": replace(ASKED, heard=Heard(requested=2, functions=(4,))),
+    "gateway": replace(ASKED, heard=Heard(requested=2, exceptions=(11, 11))),
+    "exception": replace(ASKED, heard=Heard(requested=2, exceptions=(2, 2))),
+    "answers": replace(ASKED, heard=Heard(requested=5, answered=5)),
     "not-open": ASKED,
 }
 
@@ -607,7 +612,7 @@ def test_every_rung_has_an_example() -> None:
 
 @pytest.mark.parametrize(("lost", "certainty"), [(1, "possible"), (2, "likely"), (5, "certain")])
 def test_certainty_grows_with_what_was_seen(lost: int, certainty: str) -> None:
-    found = of(replace(ASKED, measure=Measure(asked=200, answered=200 - lost, lost=lost)))
+    found = of(replace(ASKED, measure=Measure(requested=200, answered=200 - lost, lost=lost)))
     assert found.certainty == certainty
     assert bool(found.others) is (certainty != "certain")
 
@@ -618,7 +623,7 @@ CODES = st.lists(st.sampled_from([1, 2, 10, 11]), max_size=2).map(tuple)
 
 @given(
     st.builds(
-        Heard, asked=st.integers(1, 5), late=FEW, echoed=FEW, exceptions=CODES,
+        Heard, requested=st.integers(1, 5), late=FEW, echoed=FEW, exceptions=CODES,
         functions=CODES, misshapen=FEW, others=CODES, damaged=FEW, garbage=FEW,
     ),
     st.sampled_from([*map(library.load, ("atv71", "powerdrive")), None]),

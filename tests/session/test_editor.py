@@ -38,9 +38,9 @@ async def read(made: Bench, editor: Editor, *codes: str) -> None:
 
 
 async def written(made: Bench, editor: Editor) -> str:
-    await made.until(lambda: not editor.busy and editor.said is not None)
-    assert editor.said is not None
-    return editor.said.text
+    await made.until(lambda: not editor.busy and editor.message is not None)
+    assert editor.message is not None
+    return editor.message.text
 
 
 # a number whose step may follow another word, on each family
@@ -88,8 +88,8 @@ async def test_a_refused_edit_stays_staged_and_says_why() -> None:
         await read(made, editor, "HSP", "LSP", "TFR")
         editor.staging.stage("HSP", "70")
         editor.apply()
-        said = await written(made, editor)
-        assert said == "nothing written; 1 still staged: HSP"
+        output = await written(made, editor)
+        assert output == "nothing written; 1 still staged: HSP"
         assert "TFR" in editor.staging.results["HSP"].text
         assert editor.staging.edits.get("HSP") is not None
         assert made.drive.raw("HSP") == 500

@@ -56,7 +56,7 @@ def counted(steps: Sequence[Step]) -> Measure:
 @pytest.mark.parametrize(
     ("steps", "worst", "counts"),
     [
-        ([ASKED, REPLY, ASKED, REPLY], "", {"asked": 2, "answered": 2}),
+        ([ASKED, REPLY, ASKED, REPLY], "", {"requested": 2, "answered": 2}),
         ([ASKED, ASKED, REPLY], "lost", {"lost": 1, "answered": 1}),
         ([ASKED, (REPLY[:4], "damaged"), ASKED, REPLY], "damaged", {"damaged": 1, "lost": 0}),
         ([ASKED, (b"\x00", "noise"), REPLY], "damaged", {"damaged": 1, "answered": 1}),
@@ -240,10 +240,10 @@ async def test_reads_end_early_once_clean_ones_exclude_a_poor_line() -> None:
         measure = (await found_on(line, reads=200)).sight.measure
         assert measure is not None
         # the few reads before, and the proof of the step, count too
-        assert CLEAN_READS - 10 <= measure.asked <= CLEAN_READS
+        assert CLEAN_READS - 10 <= measure.requested <= CLEAN_READS
         again = (await found_on(line, reads=200)).sight.measure
         assert again is not None
-        assert LEAST_READS <= again.asked < measure.asked
+        assert LEAST_READS <= again.requested < measure.requested
 
 
 def test_clean_reads_are_fewer_only_after_a_minute_without_trouble() -> None:
@@ -263,7 +263,7 @@ async def test_one_sick_reply_keeps_the_reads_going(trouble: str) -> None:
         measure = (await found_on(line, reads=200)).sight.measure
         assert measure is not None
         assert measure.worst
-        assert measure.asked > 149
+        assert measure.requested > 149
 
 
 async def test_well_gateway_names_the_idle_time_that_was_tried() -> None:
@@ -285,8 +285,8 @@ async def test_two_drives_are_not_named_as_one_behind() -> None:
 
 @pytest.mark.parametrize(("second", "rung"), [(0, "behind"), (1, "behind"), (5, "two-drives")])
 def test_surplus_replies_contradict_a_line_one_behind(second: int, rung: str) -> None:
-    measure = Measure(asked=8, answered=4, damaged=4, second=second)
-    heard = Heard(asked=3, answered=3)
+    measure = Measure(requested=8, answered=4, damaged=4, second=second)
+    heard = Heard(requested=3, answered=3)
     sight = Sight(RtuTcpLink("h", 1), 2, heard=heard, measure=measure, behind=True)
     assert diagnosed(sight).rung == rung
 

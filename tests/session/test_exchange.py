@@ -20,7 +20,7 @@ from tui.drive.errors import DriveError, ValueRefused
 from tui.session.blocks import exchange as module
 from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.exchange import Exchanged
-from tui.session.blocks.outputs import Meant, meant, refuse_pending
+from tui.session.blocks.outputs import ConfirmedWrite, intended, refuse_pending
 from tui.session.blocks.write import AssignmentRefused
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
@@ -155,8 +155,8 @@ async def test_only_what_was_named_is_written() -> None:
         (request,) = sent(here, 23)
         # two words from NC5 on: command word and references are not touched
         assert request.endswith("31dd000204002d0037")
-        told = {(entry.code, entry.new) for entry in here.journal.recent}
-        assert told == {("ACC", "4.5 s"), ("DEC", "5.5 s")}
+        reported = {(entry.code, entry.new) for entry in here.journal.recent}
+        assert reported == {("ACC", "4.5 s"), ("DEC", "5.5 s")}
 
 
 async def test_what_stands_between_two_named_ones_keeps_its_value() -> None:
@@ -176,19 +176,19 @@ async def test_a_start_is_on_record_before_its_frame_and_counts_from_it_on(
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         keeper = here.session.starts = StartKeeper("test")
-        told: list[tuple[str, int]] = []
+        reported: list[tuple[str, int]] = []
         for name in ("begin", "sent"):
             honest = getattr(keeper, name)
 
             def note(*what: object, name: str = name, honest: Any = honest) -> None:
-                told.append((name, len(sent(here, 16))))
+                reported.append((name, len(sent(here, 16))))
                 honest(*what)
 
             monkeypatch.setattr(keeper, name, note)
         await exchange(here, outputs, {"ACC": 45})
-        assert told == []
+        assert reported == []
         await exchange(here, outputs, {"CMD": 6})
-        assert told == [("begin", 1), ("sent", 2)]
+        assert reported == [("begin", 1), ("sent", 2)]
         keeper.close()
 
 
@@ -298,10 +298,10 @@ async def settled(block_editor: BlockEditor) -> str:
     for _ in range(400):
         if (
             not block_editor.busy
-            and block_editor.said is not None
-            and block_editor.said.kind != "working"
+            and block_editor.message is not None
+            and block_editor.message.kind != "working"
         ):
-            return block_editor.said.text
+            return block_editor.message.text
         await asyncio.sleep(0.02)
     raise AssertionError("it does not end")
 
@@ -319,7 +319,7 @@ async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
             await asyncio.sleep(0.02)
         stopper = Stopper(here.session.line, here.journal)
         here.permit()
-        block_editor.exchange(block_editor.meant("CMD=16#000F LFRD=900"))
+        block_editor.exchange(block_editor.intended("CMD=16#000F LFRD=900"))
         stopper.stop([here.session])
         assert "stop" in await settled(block_editor)
         await asyncio.sleep(0.5)
@@ -422,7 +422,7 @@ async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
         assert "no longer armed" in await settled(block_editor)
         assert (here.drive.raw("F870"), here.drive.raw("F871")) == (4, 3)
         with pytest.raises(MappingError, match="F870: in force after the drive's next reset"):
-            block_editor.meant("FA50=0x0000")
+            block_editor.intended("FA50=0x0000")
         block_editor.stop()
         monitor.stop()
 
@@ -430,18 +430,18 @@ async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
 # What a person agrees to
 
 
-def meant_of(
+def intended_of(
     here: Bench, outputs: Assignment, text: str, inputs: Assignment | None = None
-) -> Meant:
-    return meant(here.profile, 1, outputs, inputs, {"INR": 1, "LFRD": 900}, text)
+) -> ConfirmedWrite:
+    return intended(here.profile, 1, outputs, inputs, {"INR": 1, "LFRD": 900}, text)
 
 
 def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
     with bench("atv71") as here:
         inputs, outputs = plan_of(here, "read", EXAMPLE_IN), plan_of(here, "write", EXAMPLE_OUT)
-        told = meant_of(here, outputs, "cmd=16#000F hsp=45", inputs)
-        assert told.wanted == {"CMD": 15, "HSP": 450}
-        first, second, third, *rest = told.follows.splitlines()
+        reported = intended_of(here, outputs, "cmd=16#000F hsp=45", inputs)
+        assert reported.wanted == {"CMD": 15, "HSP": 450}
+        first, second, third, *rest = reported.follows.splitlines()
         assert (first, second) == ("NCA1: CMD 16#000F", "NCA3: HSP 45.0 Hz")
         assert "LFRD is written, with what it holds now" in third
         # three words from NC1 on: the command, the reference of now, the high speed
@@ -453,10 +453,10 @@ def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
 def test_a_value_whose_scale_is_not_known_is_told_raw() -> None:
     with bench("atv71") as here:
         outputs = plan_of(here, "write", EXAMPLE_OUT)
-        told = meant(here.profile, 1, outputs, None, {"LFRD": 900}, "acc=16#0032")
-        assert "ACC 50 raw" in told.follows
-        told = meant(here.profile, 1, outputs, None, {"LFRD": 900, "INR": 1}, "acc=16#0032")
-        assert "ACC 5.0 s" in told.follows
+        reported = intended(here.profile, 1, outputs, None, {"LFRD": 900}, "acc=16#0032")
+        assert "ACC 50 raw" in reported.follows
+        reported = intended(here.profile, 1, outputs, None, {"LFRD": 900, "INR": 1}, "acc=16#0032")
+        assert "ACC 5.0 s" in reported.follows
 
 
 @pytest.mark.parametrize(
@@ -472,7 +472,7 @@ def test_a_value_whose_scale_is_not_known_is_told_raw() -> None:
 )
 def test_what_cannot_be_meant_is_told(text: str, says: str) -> None:
     with bench("atv71") as here, pytest.raises(DriveError, match=says):
-        meant_of(here, plan_of(here, "write", EXAMPLE_OUT), text)
+        intended_of(here, plan_of(here, "write", EXAMPLE_OUT), text)
 
 
 def test_slots_that_wait_for_a_reset_are_not_written_through() -> None:
@@ -482,8 +482,8 @@ def test_slots_that_wait_for_a_reset_are_not_written_through() -> None:
             refuse_pending(outputs, {"F871": 3, "F875": 1})
         # slots of the other block, and what never came to be written, hinder nothing
         refuse_pending(outputs, {"F875": 1, "F870": 6})
-        told = meant_of(here, outputs, "FA01=60")
-        assert "F870 and F871 were set before" in told.follows
+        reported = intended_of(here, outputs, "FA01=60")
+        assert "F870 and F871 were set before" in reported.follows
         # this drive has no function 23: a write of two words, and nothing comes back
-        assert "Frame: 01 10 18 70 00 02 04" in told.follows
-        assert told.inputs is None
+        assert "Frame: 01 10 18 70 00 02 04" in reported.follows
+        assert reported.inputs is None

@@ -113,8 +113,8 @@ async def test_a_drive_that_is_not_there_does_not_take_the_line(bench: Make) -> 
     made = bench()
     for _ in range(20):
         assert await made.read(ACC, unit=9) == 11
-    asked = [f for f in made.line.trace if f.direction == "out" and f.data[0] == 9]
-    assert len(asked) < 4
+    requested = [f for f in made.line.trace if f.direction == "out" and f.data[0] == 9]
+    assert len(requested) < 4
 
 
 async def test_a_stop_while_the_drive_is_asked_who_it_is_voids_the_command(bench: Make) -> None:
@@ -315,8 +315,8 @@ async def test_a_motor_that_a_client_started_is_on_record_until_it_stands(bench:
 async def test_the_end_of_the_gateway_stops_what_its_clients_started(bench: Make) -> None:
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
     await start_motor(made)
-    (told,) = await made.gateway.close()
-    assert "1: stopped" in told.text
+    (reported,) = await made.gateway.close()
+    assert "1: stopped" in reported.text
     assert made.simulation.drive(1).motor.frequency == 0
     assert made.simulation.drive(1).fault is None
 
@@ -337,12 +337,12 @@ async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Ma
 
 async def test_a_client_that_is_gone_commands_nothing_and_all_are_told(bench: Make) -> None:
     made = bench(commands=True)
-    said: list[str] = []
-    made.line.facts.on_text(lambda _, text: said.append(text))
+    output: list[str] = []
+    made.line.facts.on_text(lambda _, text: output.append(text))
     assert await made.write(LFR, 300) == 0
     made.gateway.gone(made.client)
     assert 1 not in made.line.facts.commanders
-    assert "10.0.0.9:5000, which commanded this drive, has gone" in said[0]
+    assert "10.0.0.9:5000, which commanded this drive, has gone" in output[0]
 
 
 async def test_a_command_of_a_client_that_is_gone_is_not_sent_and_its_stop_is(
@@ -391,14 +391,14 @@ async def test_what_came_while_the_gateway_stood_still_only_stops(bench: Make) -
 
 async def test_a_second_client_that_commands_the_drive_is_told_of(bench: Make) -> None:
     made = bench(commands=True)
-    said: list[str] = []
-    made.line.facts.on_text(lambda _, text: said.append(text))
+    output: list[str] = []
+    made.line.facts.on_text(lambda _, text: output.append(text))
     assert await made.write(LFR, 300) == 0
     assert await made.write(LFR, 310) == 0
-    assert said == []
+    assert output == []
     made.client = TcpClient(2, "10.0.0.10:5000")
     assert await made.write(LFR, 320) == 0
-    (text,) = said
+    (text,) = output
     assert "10.0.0.10:5000 commands this drive now, as client 10.0.0.9:5000 did" in text
 
 

@@ -67,8 +67,8 @@ class Bench:
         self.starts = Starts(processes=MadeUp(), clock=self.clock)
         self.journal = Journal()
         self.events = EventLog()
-        self.told: list[tuple[int, str]] = []
-        self.line.facts.on_text(lambda device, text: self.told.append((device, text)))
+        self.reported: list[tuple[int, str]] = []
+        self.line.facts.on_text(lambda device, text: self.reported.append((device, text)))
 
     def guardian(self, *, person: bool = False) -> Guardian:
         """The guardian of this program, which is a panel if there is a `person`."""
@@ -137,7 +137,7 @@ class Bench:
         loop.call_soon_threadsafe(self.line.facts.hear_gone, program)
 
     def says(self, text: str) -> bool:
-        return any(text in one for _, one in self.told)
+        return any(text in one for _, one in self.reported)
 
     def close(self) -> None:
         self.line.close()
@@ -163,7 +163,7 @@ async def test_the_motors_of_a_killed_program_are_stopped_at_once_and_no_others(
     bench.guardian()
     bench.gone()
     await bench.stopped(1)
-    assert bench.told[0] == (1, "run on pts/3 (pid 900002) is gone: its motor is stopped.")
+    assert bench.reported[0] == (1, "run on pts/3 (pid 900002) is gone: its motor is stopped.")
     assert bench.turns(2)
     # the stop is one for all: what anybody meant for the drive before is void
     assert bench.line.facts.stops.stamp(1) >= 1
@@ -195,7 +195,7 @@ async def test_a_motor_that_is_meant_to_run_on_runs_on(bench: Bench) -> None:
     await asyncio.sleep(0.1)
     bench.clock.advance(20)
     await asyncio.sleep(0.3)
-    assert bench.told == []
+    assert bench.reported == []
     assert bench.line.facts.stops.stamp(1) == 0
 
 
@@ -203,7 +203,7 @@ async def test_a_program_that_ended_well_leaves_nothing_to_look_after(bench: Ben
     bench.guardian()
     bench.gone()
     await asyncio.sleep(0.3)
-    assert bench.told == []
+    assert bench.reported == []
 
 
 async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None:
@@ -216,7 +216,7 @@ async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None
     bench.guardian()
     bench.gone()
     await asyncio.sleep(0.2)
-    assert bench.told == []
+    assert bench.reported == []
     living.clear()
     await bench.stopped(1)
 
@@ -279,7 +279,7 @@ async def frozen(bench: Bench, *, person: bool = True, **started: bool) -> None:
     bench.guardian(person=person)
     bench.gone(FROZEN)
     await asyncio.sleep(0.2)
-    assert bench.told == []  # it may be just ending
+    assert bench.reported == []  # it may be just ending
     bench.clock.advance(ENDS_WITHIN + 0.1)
 
 
@@ -290,7 +290,10 @@ async def test_the_motor_of_a_frozen_program_is_stopped_where_nobody_can_take_it
     drive = bench.simulation.drive(1)
     await come(lambda: drive.motor.frequency == 0)
     assert drive.fault is None
-    assert bench.told[0][1] == "run (pid 900001) is not on the line any more: its motor is stopped."
+    assert (
+        bench.reported[0][1]
+        == "run (pid 900001) is not on the line any more: its motor is stopped."
+    )
 
 
 async def test_a_person_has_the_drives_own_time_out_to_take_over_from_a_frozen_program(
@@ -331,7 +334,7 @@ async def test_one_that_was_let_go_for_a_moment_only_is_not_told_of(bench: Bench
     bench.line.facts.set_programs((bench.line.facts.me, FROZEN))
     bench.clock.advance(20)
     await asyncio.sleep(0.3)
-    assert bench.told == []
+    assert bench.reported == []
     assert bench.line.facts.stops.stamp(1) == 0
 
 
@@ -353,7 +356,7 @@ async def test_a_motor_that_a_frozen_program_means_to_leave_running_runs_on(benc
     await frozen(bench, left_running=True)
     bench.clock.advance(20)
     await asyncio.sleep(0.3)
-    assert bench.told == []
+    assert bench.reported == []
     assert bench.line.facts.stops.stamp(1) == 0
 
 
@@ -375,7 +378,7 @@ async def test_after_the_line_was_closed_nothing_is_looked_after(bench: Bench) -
     guardian = bench.guardian()
     await asyncio.to_thread(bench.line.close)
     guardian.gone(GONE)
-    assert bench.told == []
+    assert bench.reported == []
 
 
 async def test_a_guardian_that_was_closed_hears_nothing(bench: Bench) -> None:
@@ -383,7 +386,7 @@ async def test_a_guardian_that_was_closed_hears_nothing(bench: Bench) -> None:
     bench.guardian().close()
     bench.gone()
     await asyncio.sleep(0.3)
-    assert bench.told == []
+    assert bench.reported == []
 
 
 async def test_a_line_that_comes_and_goes_is_given_up_like_one_that_stays_lost(

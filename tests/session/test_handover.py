@@ -35,21 +35,21 @@ class Heard(LineVoice):
 
     def __init__(self) -> None:
         super().__init__(self.hear)
-        self.said: list[tuple[object, ...]] = []
+        self.output: list[tuple[object, ...]] = []
 
     def hear(self, message: AnyMessage) -> None:
         match message:
             case Claim(device=device, take=take):
-                self.said.append(("claim", device, take))
+                self.output.append(("claim", device, take))
             case AskedFor(device=device):
-                self.said.append(("ask", device))
+                self.output.append(("ask", device))
             case Granting(device=device, program=program, yes=yes):
-                self.said.append(("reply", device, program, yes))
+                self.output.append(("reply", device, program, yes))
             case Armed(device=device, until=until):
-                self.said.append(("armed", device, until != 0))
+                self.output.append(("armed", device, until != 0))
 
     def stop_directly(self, devices: tuple[int, ...]) -> None:
-        self.said.append(("directly", devices))
+        self.output.append(("directly", devices))
 
 
 class Bench:
@@ -76,7 +76,7 @@ class Bench:
         self.session.image.confirm("ETA", status, self.clock.monotonic())
 
     @property
-    def told(self) -> list[str]:
+    def reported(self) -> list[str]:
         return [one.text for one in self.events.events]
 
     def starts_files(self) -> list[Path]:
@@ -85,7 +85,7 @@ class Bench:
 
     @property
     def answers(self) -> list[tuple[object, ...]]:
-        return [one for one in self.voice.said if one[0] == "reply"]
+        return [one for one in self.voice.output if one[0] == "reply"]
 
     def close(self) -> None:
         self.handover.close()
@@ -119,7 +119,7 @@ async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench)
     assert bench.facts.commanders == {1: bench.facts.me.id}
     bench.session.arming.disarm()
     assert bench.facts.commanders == {}
-    assert bench.voice.said == [
+    assert bench.voice.output == [
         ("claim", 1, True),
         ("armed", 1, True),
         ("claim", 1, False),
@@ -134,14 +134,14 @@ async def test_a_drive_commanded_elsewhere_is_not_armed_and_says_by_whom(
     with pytest.raises(CommandedElsewhere, match=r"commanded by panel on pts/9 \(pid 77\)"):
         bench.session.arming.arm()
     assert not bench.session.arming.armed
-    assert bench.voice.said == []
+    assert bench.voice.output == []
 
 
 async def test_an_arming_that_ends_by_itself_gives_the_drive_back(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.clock.advance(ARMED_FOR + 1)
     assert not bench.session.arming.armed
-    assert bench.voice.said[-2:] == [("claim", 1, False), ("armed", 1, False)]
+    assert bench.voice.output[-2:] == [("claim", 1, False), ("armed", 1, False)]
 
 
 async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Bench) -> None:
@@ -163,7 +163,7 @@ async def test_a_stop_of_another_program_ends_arming_and_work_and_is_told(bench:
     bench.facts.hear_stop((1,), "the stop key", REMOTE)
     assert not bench.session.arming.armed
     assert bench.session.work.stops == before + 1
-    assert any("Stop from panel on pts/9 (pid 77)" in one for one in bench.told)
+    assert any("Stop from panel on pts/9 (pid 77)" in one for one in bench.reported)
     bench.session.arming.arm()
     bench.facts.hear_stop((2,), "the stop key", REMOTE)
     assert bench.session.arming.armed
@@ -177,7 +177,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
     bench.facts.hear_question(1, REMOTE)
     request = bench.handover.requests[1]
     assert request.program == REMOTE
-    assert any("asks for this drive. G answers" in one for one in bench.told)
+    assert any("asks for this drive. G answers" in one for one in bench.reported)
     bench.handover.answer(bench.handover.requests[1], yes=True)
     assert bench.handover.requests == {}
     assert bench.answers == [("reply", 1, REMOTE.id, True)]
@@ -188,7 +188,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
     assert len(bench.answers) == 1
     bench.handover.answer(request, yes=True)
     assert len(bench.answers) == 1
-    assert bench.told[-1] == "Not given: the question of panel on pts/9 (pid 77) is over."
+    assert bench.reported[-1] == "Not given: the question of panel on pts/9 (pid 77) is over."
 
 
 async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
@@ -252,7 +252,7 @@ async def test_the_question_of_a_program_that_has_gone_is_over(bench: Bench) -> 
     bench.handover.answer(request, yes=True)
     assert bench.answers == []
     assert bench.session.arming.armed
-    assert bench.told[-1].startswith("Not given: ")
+    assert bench.reported[-1].startswith("Not given: ")
     # the answer to it is none to the next question
     bench.facts.set_programs((bench.facts.me, REMOTE))
     bench.facts.hear_question(1, REMOTE)
@@ -288,7 +288,9 @@ async def test_a_motor_that_nobody_took_stays_this_programs_to_stop(bench: Bench
     await given_while_it_runs(bench)
     await asyncio.sleep(0.05)
     bench.clock.advance(TAKEN_WITHIN + TAKEN_LOOK)
-    await asyncio.to_thread(eventually, lambda: "has not taken the motor over" in bench.told[-1])
+    await asyncio.to_thread(
+        eventually, lambda: "has not taken the motor over" in bench.reported[-1]
+    )
     assert len(bench.starts_files()) == 1
     assert bench.session.commanded
     assert bench.starts.stopped_by_others(1)
@@ -317,19 +319,19 @@ async def test_what_another_program_commands_does_not_run_by_a_command_from_here
 async def test_asking_is_told_there_and_the_answer_here(bench: Bench) -> None:
     commanded_there(bench)
     bench.handover.ask_for(1)
-    assert bench.voice.said == [("ask", 1)]
+    assert bench.voice.output == [("ask", 1)]
     bench.facts.hear_reply(1, "Drive 1 is commanded by panel.", yes=False)
-    assert bench.told[-1] == "Drive 1 is commanded by panel."
+    assert bench.reported[-1] == "Drive 1 is commanded by panel."
     assert bench.facts.commander(1) == REMOTE
     bench.facts.hear_reply(1, "", yes=True)
-    assert bench.told[-1] == "This drive is free: a arms it."
+    assert bench.reported[-1] == "This drive is free: a arms it."
     bench.session.arming.arm()
 
 
 async def test_asking_for_a_free_drive_says_so(bench: Bench) -> None:
     bench.handover.ask_for(1)
-    assert bench.voice.said == []
-    assert "Nobody else commands this drive" in bench.told[-1]
+    assert bench.voice.output == []
+    assert "Nobody else commands this drive" in bench.reported[-1]
 
 
 @pytest.mark.parametrize(("status", "adopted"), [(0x0637, 1), (0x0233, 0)])
@@ -349,7 +351,7 @@ async def test_who_comes_and_goes_and_who_commands_is_told_once(bench: Bench) ->
     bench.facts.set_programs((bench.facts.me, REMOTE, other))
     bench.facts.note_commander(1, REMOTE.id)
     bench.facts.set_programs((bench.facts.me, REMOTE))
-    assert bench.told == [
+    assert bench.reported == [
         "The line is shared with panel on pts/9 (pid 77).",
         "The line is shared with watch (pid 78).",
         "Panel on pts/9 (pid 77) commands this drive now.",

@@ -49,7 +49,7 @@ def stopped(line: FakeLine) -> Heard:
 async def direct_stop(voice: Heard) -> tuple[object, ...] | None:
     """The first stop that goes around the loop, if one does within some seconds."""
     for _ in range(500):
-        if found := [one for one in voice.said if one[0] == "directly"]:
+        if found := [one for one in voice.output if one[0] == "directly"]:
             return found[0]
         await asyncio.sleep(0.01)
     return None

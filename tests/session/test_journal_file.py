@@ -88,12 +88,12 @@ def program(text: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
 
 
-def told(journal: Journal) -> list[Entry | DamagedLine]:
+def reported(journal: Journal) -> list[Entry | DamagedLine]:
     return list(read_journal(journal.files))
 
 
 def numbers(journal: Journal) -> list[int]:
-    return [one.new_raw for one in told(journal) if isinstance(one, Entry)]
+    return [one.new_raw for one in reported(journal) if isinstance(one, Entry)]
 
 
 @pytest.mark.parametrize("half", [b'{"time": "2026-01-01T00:00:00.000+00:00", "li', b"\0" * 700])
@@ -110,7 +110,7 @@ def test_half_a_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
     assert json.loads(mark)["kind"] == "mended"
     assert "cut off" in json.loads(mark)["why"]
     assert [json.loads(one)["new_raw"] for one in (first, second)] == [1, 2]
-    damaged = [one for one in told(journal) if isinstance(one, DamagedLine)]
+    damaged = [one for one in reported(journal) if isinstance(one, DamagedLine)]
     assert [one.number for one in damaged] == [1, 2]
     assert half.startswith(damaged[1].text.encode()[:10])
 
@@ -132,15 +132,15 @@ def test_several_programs_lose_nothing_and_mix_no_lines(tmp_path: Path) -> None:
             assert one.stdout is not None
             assert one.stdout.readline() == "ready\n"
         # all begin at a time
-        said = [one.communicate("\n", timeout=PATIENCE)[1] for one in programs]
-        assert [one.returncode for one in programs] == [0] * 4, said
+        output = [one.communicate("\n", timeout=PATIENCE)[1] for one in programs]
+        assert [one.returncode for one in programs] == [0] * 4, output
     finally:
         for one in programs:
             one.kill()
             one.wait()
     journal = Journal(tmp_path / "state")
     assert len([file for file in journal.files if file.exists()]) > 3
-    assert not [one for one in told(journal) if isinstance(one, DamagedLine)]
+    assert not [one for one in reported(journal) if isinstance(one, DamagedLine)]
     wanted = [n for first in range(0, 400, 100) for n in range(first, first + 40)]
     assert sorted(numbers(journal)) == wanted
 
@@ -176,7 +176,7 @@ def test_what_a_full_disk_took_of_a_line_is_taken_back(tmp_path: Path) -> None:
     assert JOURNAL_NAME in done.stdout
     journal = Journal(tmp_path / "state")
     assert numbers(journal) == [1, 2]
-    assert len(told(journal)) == 2
+    assert len(reported(journal)) == 2
 
 
 def test_a_program_that_ends_puts_its_last_entries_down(tmp_path: Path) -> None:
@@ -226,14 +226,14 @@ def test_what_is_no_file_is_told_and_holds_nobody_up(tmp_path: Path) -> None:
 
 
 def test_trouble_is_told_at_once_and_once(tmp_path: Path) -> None:
-    said: list[str] = []
+    output: list[str] = []
     (tmp_path / "state").touch()
-    journal = Journal(tmp_path / "state", on_trouble=said.append)
+    journal = Journal(tmp_path / "state", on_trouble=output.append)
     journal.add(entry(1))
-    wait_until(lambda: bool(said), "it is told", patience=15)
+    wait_until(lambda: bool(output), "it is told", patience=15)
     journal.add(entry(2))
     assert not journal.close(PATIENCE)
-    assert said == [
+    assert output == [
         f"The journal cannot be written: Not a directory: {tmp_path / 'state' / JOURNAL_NAME}."
     ]
     assert journal.unkept == 2

@@ -23,7 +23,7 @@ def line_of(one: Entry) -> bytes:
     return json.dumps(asdict(one)).encode() + b"\n"
 
 
-def told(file: Path) -> list[Entry | DamagedLine]:
+def reported(file: Path) -> list[Entry | DamagedLine]:
     return list(read_journal([file]))
 
 
@@ -36,7 +36,7 @@ def test_whole_entries_are_found_among_anything(
     for number, data in enumerate(garbage, start=1):
         parts += [data.replace(b"\n", b" ") + b"\n", line_of(entry(number))]
     file.write_bytes(b"".join(parts))
-    numbers = [one.new_raw for one in told(file) if isinstance(one, Entry)]
+    numbers = [one.new_raw for one in reported(file) if isinstance(one, Entry)]
     assert numbers == list(range(len(garbage) + 1))
 
 
@@ -58,7 +58,7 @@ ODD = {
 def test_odd_lines_are_told_and_hide_nothing(name: str, tmp_path: Path) -> None:
     file = tmp_path / "journal.jsonl"
     file.write_bytes(line_of(entry(1)) + ODD[name] + b"\n" + line_of(entry(2)) + b"half")
-    one, odd, two, half = told(file)
+    one, odd, two, half = reported(file)
     assert (one, two) == (entry(1), entry(2))
     assert isinstance(odd, DamagedLine)
     assert isinstance(half, DamagedLine)
@@ -70,7 +70,7 @@ def test_half_a_character_in_a_name_is_no_damage(tmp_path: Path) -> None:
     file = tmp_path / "journal.jsonl"
     odd = replace(entry(1), line="\ud83d\x1b]0;x\x07")
     file.write_bytes(line_of(odd))
-    assert told(file) == [odd]
+    assert reported(file) == [odd]
 
 
 def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
     old = asdict(entry(1))
     del old["kind"], old["of"]
     file.write_text(json.dumps(old) + "\n" + json.dumps({**asdict(entry(2)), "new field": 1}))
-    assert told(file) == [entry(1), entry(2)]
+    assert reported(file) == [entry(1), entry(2)]
 
 
 def test_a_file_without_end_is_read_at_its_end(
@@ -87,7 +87,7 @@ def test_a_file_without_end_is_read_at_its_end(
     monkeypatch.setattr(journal_reading, "READ_MOST", 1000)
     file = tmp_path / "journal.jsonl"
     file.write_bytes(b"".join(line_of(entry(number)) for number in range(50)))
-    found = [one.new_raw for one in told(file) if isinstance(one, Entry)]
+    found = [one.new_raw for one in reported(file) if isinstance(one, Entry)]
     assert 0 < len(found) < 10
     assert found == list(range(50 - len(found), 50))
 
@@ -96,7 +96,7 @@ def test_a_file_without_end_is_read_at_its_end(
 def test_a_pipe_in_its_place_holds_nobody_up(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "journal.jsonl")
     with pytest.raises(OSError, match="no regular file"):
-        told(tmp_path / "journal.jsonl")
+        reported(tmp_path / "journal.jsonl")
 
 
 def test_what_was_read_back_completes_its_own_write_only() -> None:

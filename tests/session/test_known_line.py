@@ -72,14 +72,14 @@ def test_another_adapter_under_the_same_name_holds_the_line(adapters: Adapters) 
     adapters.unplug("ttyUSB0")
     line = on(adapters.plug("ttyUSB0", "1.1", serial="B7"))
     found = known(line)
-    (told,) = found.changed
-    assert "ttyUSB0 was" in told
-    assert "A5" in told
-    assert "B7" in told
-    assert told in line.held
+    (reported,) = found.changed
+    assert "ttyUSB0 was" in reported
+    assert "A5" in reported
+    assert "B7" in reported
+    assert reported in line.held
     assert "--accept-line" in line.held
     # it is not remembered before somebody has said that it is right
-    assert known(on(adapters.port("ttyUSB0"))).changed == (told,)
+    assert known(on(adapters.port("ttyUSB0"))).changed == (reported,)
     found.accept()
     assert line.held == ""
     assert known(on(adapters.port("ttyUSB0"))).changed == ()
@@ -100,9 +100,9 @@ def test_a_shared_by_id_name_that_leads_to_the_other_adapter_holds_the_line(
     by_id = str(adapters.links / "by-id" / "usb-FTDI_6001-if00-port0")
     known(on(by_id))
     adapters.plug("ttyUSB1", "1.2")
-    (told,) = known(on(by_id)).changed
-    assert "1.1" in told
-    assert "1.2" in told
+    (reported,) = known(on(by_id)).changed
+    assert "1.1" in reported
+    assert "1.2" in reported
 
 
 def test_another_adapter_in_the_same_socket_holds_the_line(adapters: Adapters) -> None:
@@ -110,9 +110,9 @@ def test_another_adapter_in_the_same_socket_holds_the_line(adapters: Adapters) -
     socket = str(adapters.links / "by-path" / "pci-usb-1.1-port0")
     known(on(socket))
     adapters.plug("ttyUSB0", "1.1", product="7523")
-    (told,) = known(on(socket)).changed
-    assert "0403:6001" in told
-    assert "0403:7523" in told
+    (reported,) = known(on(socket)).changed
+    assert "0403:6001" in reported
+    assert "0403:7523" in reported
     assert known(on(port)).changed != ()
 
 
@@ -155,8 +155,8 @@ def test_a_drive_that_says_nothing_is_known_by_its_profile(adapters: Adapters) -
     known(on(port), SILENT, profile="powerdrive")
     assert known(on(port), SILENT, profile="powerdrive").changed == ()
     assert known(on(port), SILENT).changed == ()
-    (told,) = known(on(port), SILENT, profile="varmeca").changed
-    assert told == "Device 5 was powerdrive, and is varmeca now."
+    (reported,) = known(on(port), SILENT, profile="varmeca").changed
+    assert reported == "Device 5 was powerdrive, and is varmeca now."
 
 
 def test_one_that_says_less_this_time_is_not_forgotten(adapters: Adapters) -> None:

@@ -64,7 +64,7 @@ async def test_fields_of_one_register_come_in_one_read() -> None:
     mid = readings["MID"].value
     assert mid is not None
     assert mid.text == "On"
-    assert line.asked == [(10, 2)]
+    assert line.requested == [(10, 2)]
 
 
 async def test_a_field_is_written_without_the_others(journal: Journal) -> None:
@@ -103,8 +103,8 @@ def test_a_field_is_never_a_word_by_itself() -> None:
 
 def test_functions_3_and_4_are_never_read_in_one() -> None:
     plan = plan_reads(FIELDS, ["LOW", "WHOLE", "SPEED", "AMPS"])
-    asked = sorted((one.function, one.address, one.count) for one in plan.requests)
-    assert asked == [(3, 10, 2), (4, 10, 2)]
+    requested = sorted((one.function, one.address, one.count) for one in plan.requests)
+    assert requested == [(3, 10, 2), (4, 10, 2)]
 
 
 async def test_an_input_register_is_read_by_function_4() -> None:
@@ -243,9 +243,9 @@ def test_a_row_of_ones_own_stands_behind_the_one_above_it(tmp_path: Path) -> Non
     codes = [p.code for p in library.load_file(path).parameters]
     assert codes == ["ACC", "OWN", "NEXT", "DEC", "HOURS", "ENERGY"]
     path.write_text(path.read_text("utf-8").replace("address = 78", "address = 77"), "utf-8")
-    [told] = library.faults_of(path)
+    [reported] = library.faults_of(path)
     line = path.read_text("utf-8").splitlines().index('code = "NEXT"') + 1
-    assert told.startswith(f"{path}:{line + 3}: "), "a place is known after rows were moved"
+    assert reported.startswith(f"{path}:{line + 3}: "), "a place is known after rows were moved"
 
 
 def test_a_shared_row_can_be_left_out(tmp_path: Path) -> None:
@@ -296,29 +296,29 @@ async def saved(
     )
     session = armed(line, profile)
     permit: Permit = session.work.permit()
-    told = await save_to_eeprom(session, journal, permit)
-    return told, [one for one in line.requests if isinstance(one, WriteOne)]
+    reported = await save_to_eeprom(session, journal, permit)
+    return reported, [one for one in line.requests if isinstance(one, WriteOne)]
 
 
 async def test_a_save_word_may_keep_its_value(journal: Journal) -> None:
-    told, written = await saved(OneDrive({1: 0, 2: 0, 3: 0}), journal, SAVING)
-    assert "saved" in told
+    reported, written = await saved(OneDrive({1: 0, 2: 0, 3: 0}), journal, SAVING)
+    assert "saved" in reported
     assert written == [WriteOne(1, 2, 1)]
 
 
 async def test_another_word_may_tell_that_it_is_saved(journal: Journal) -> None:
     line = OneDrive({1: 0, 2: 0, 3: 0})
-    asked: list[int] = []
+    requested: list[int] = []
     held = line.devices[1].held
 
     def answer(address: int, count: int) -> tuple[int, ...]:
         if address <= 3 < address + count:
-            asked.append(address)
-            line.registers[3] = 5 if len(asked) > 3 else 0
+            requested.append(address)
+            line.registers[3] = 5 if len(requested) > 3 else 0
         return held(address, count)
 
     line.devices[1].held = answer  # type: ignore[method-assign]
     done = {"parameter": "DONE", "values": [5]}
-    told, _ = await saved(line, journal, {"save": {**SAVING["save"], "done": done}})
-    assert "saved" in told
-    assert len(asked) == 4
+    reported, _ = await saved(line, journal, {"save": {**SAVING["save"], "done": done}})
+    assert "saved" in reported
+    assert len(requested) == 4

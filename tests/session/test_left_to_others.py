@@ -17,11 +17,11 @@ STOPPED = "the motor is stopped on its ramp within 10 s, unless"
 RUNS_ON = "the motor runs on."
 
 
-def on_a_line(*others: Program, asked: bool = True) -> DriveSession:
+def on_a_line(*others: Program, requested: bool = True) -> DriveSession:
     """A drive whose motor was started here."""
     line = FakeLine({1: {}})
     line.facts.set_programs((line.facts.me, *others))
-    line.pace.others = {1: 0.1} if asked else {2: 0.1}
+    line.pace.others = {1: 0.1} if requested else {2: 0.1}
     session = DriveSession(line, 1, library.load("atv71"))
     session.starts = StartKeeper("panel")
     session.starts.begin(session, "forward")
@@ -35,26 +35,28 @@ def test_alone_on_the_line_nothing_is_added(on_purpose: bool) -> None:
 
 
 def test_a_motor_that_is_not_left_on_purpose_is_stopped_by_the_others() -> None:
-    told = left_to_others(on_a_line(WATCH, asked=False), on_purpose=False)
-    assert told == f"Watch (pid 78) is on the line, too: {STOPPED} the line is opened here again."
-    told = left_to_others(on_a_line(PANEL), on_purpose=False)
-    assert f"{STOPPED} it is taken over there, or the line" in told
-    told = left_to_others(on_a_line(WATCH, PANEL), on_purpose=False)
-    assert told.startswith("Other programs are on the line, too: ")
+    reported = left_to_others(on_a_line(WATCH, requested=False), on_purpose=False)
+    assert (
+        reported == f"Watch (pid 78) is on the line, too: {STOPPED} the line is opened here again."
+    )
+    reported = left_to_others(on_a_line(PANEL), on_purpose=False)
+    assert f"{STOPPED} it is taken over there, or the line" in reported
+    reported = left_to_others(on_a_line(WATCH, PANEL), on_purpose=False)
+    assert reported.startswith("Other programs are on the line, too: ")
 
 
 def test_a_motor_that_is_left_on_purpose_runs_on_while_it_is_asked() -> None:
-    told = left_to_others(on_a_line(WATCH), on_purpose=True)
-    assert told == f"Watch (pid 78) asks it on: while it does, {RUNS_ON}"
-    assert left_to_others(on_a_line(WATCH, asked=False), on_purpose=True) == ""
+    reported = left_to_others(on_a_line(WATCH), on_purpose=True)
+    assert reported == f"Watch (pid 78) asks it on: while it does, {RUNS_ON}"
+    assert left_to_others(on_a_line(WATCH, requested=False), on_purpose=True) == ""
 
 
 def test_a_panel_whose_motors_go_on_leaves_them_running_by_closing_a_line_too() -> None:
     session = on_a_line(WATCH, PANEL)
     assert session.starts is not None
     session.starts.leave(session)
-    told = left_to_others(session, on_purpose=False)
-    assert told == f"Other programs on the line ask it on: while they do, {RUNS_ON}"
+    reported = left_to_others(session, on_purpose=False)
+    assert reported == f"Other programs on the line ask it on: while they do, {RUNS_ON}"
 
 
 def test_a_motor_that_was_not_started_here_is_not_stopped_by_the_others() -> None:

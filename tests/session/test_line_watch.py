@@ -121,15 +121,15 @@ async def test_drive_is_kept_alive_by_its_own_timeout(keep: Callable[[int], Kept
     assert kept_alive(kept.line) == []
 
 
-@pytest.mark.parametrize(("silent", "told"), [(40.0, False), (60.0, True), (150.0, True)])
+@pytest.mark.parametrize(("silent", "reported"), [(40.0, False), (60.0, True), (150.0, True)])
 async def test_a_drive_that_was_not_heard_for_half_its_time_is_told_of(
-    keep: Callable[[int], Kept], silent: float, told: bool
+    keep: Callable[[int], Kept], silent: float, reported: bool
 ) -> None:
     kept = keep(1000)
     await until(lambda: kept.watch.watch(1) is not None)
     kept.line.heard = time.monotonic() - silent
     warnings = kept.watch.warnings()
-    assert bool(warnings) is told
+    assert bool(warnings) is reported
     for warning in warnings:
         assert warning.device == 1
         assert warning.watch.timeout == 100.0

@@ -23,7 +23,7 @@ from tui.session.connect.strangers import known_profiles
 from tui.session.listening.families import Families, remembered_families
 from tui.session.listening.listener import LineListener, ToldExchange
 from tui.session.listening.summary import ListeningSummary, summary_lines, summary_of
-from tui.session.listening.telling import exchange_text, names_asked
+from tui.session.listening.telling import exchange_text, requested_names
 from tui.wire.frames import frame, read_frame, read_write_frame, write_frame
 
 CHARACTER = 11 / 19200
@@ -40,24 +40,24 @@ class Heard:
         character = CHARACTER if times else 0.0
         self.listener = LineListener(self.families, 0.0, character=character, silence=SILENCE)
         self.now = 0.0
-        self.told: list[ToldExchange] = []
+        self.reported: list[ToldExchange] = []
 
     def say(self, *readings: bytes, every: float = 0.02) -> Heard:
         """Readings at an even pace."""
         for data in readings:
             self.now += every
-            self.told += self.listener.take(data, self.now)
+            self.reported += self.listener.take(data, self.now)
         return self
 
     def rest(self, seconds: float = 5.0) -> Heard:
         """Nothing comes for so long."""
         self.now += seconds
-        self.told += self.listener.idle(self.now)
+        self.reported += self.listener.idle(self.now)
         return self
 
     @property
     def texts(self) -> list[str]:
-        return [exchange_text(one, self.families) for one in self.told]
+        return [exchange_text(one, self.families) for one in self.reported]
 
     @property
     def summary(self) -> ListeningSummary:
@@ -73,8 +73,8 @@ def named(*profile_ids: str) -> Families:
     return Families(PROFILES, {n: library.load(id) for n, id in enumerate(profile_ids, start=1)})
 
 
-def values(told: ToldExchange) -> dict[str, str]:
-    return {one.code: one.value.display for one in told.values}
+def values(reported: ToldExchange) -> dict[str, str]:
+    return {one.code: one.value.display for one in reported.values}
 
 
 BOTH = read_write_frame(2, 3201, 2, 8501, [6])
@@ -113,15 +113,15 @@ def test_what_a_drive_says_of_itself_commands_no_terminal() -> None:
 
 def test_values_that_were_refused_or_not_confirmed_are_none() -> None:
     heard = Heard(named("atv31", "atv71")).say(COMMAND, frame(2, b"\x86\x03"), COMMAND).rest()
-    assert [one.values for one in heard.told] == [(), ()]
-    assert [names_asked(one) for one in heard.told] == [["CMD"], ["CMD"]]
+    assert [one.values for one in heard.reported] == [(), ()]
+    assert [requested_names(one) for one in heard.reported] == [["CMD"], ["CMD"]]
 
 
 def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() -> None:
     identity = frame(2, bytes.fromhex("2b0e01010000010105") + b"ATV71")
-    asked = (IDENTIFY, identity, READ, WORDS)
+    requested = (IDENTIFY, identity, READ, WORDS)
     taken = {
-        how: Heard(families).say(*asked).told[-1].family
+        how: Heard(families).say(*requested).reported[-1].family
         for how, families in {
             "named": Families(PROFILES, {None: library.load("atv31")}, {2: "atv312"}),
             "identified": Families(PROFILES, {1: library.load("atv31")}, {2: "atv312"}),
@@ -129,7 +129,7 @@ def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() 
     }
     assert {how: one.how for how, one in taken.items() if one} == {k: k for k in taken}
     assert [one.profile.id for one in taken.values() if one] == ["atv31", "atv71"]
-    remembered = Heard(Families(PROFILES, None, {2: "atv312"})).say(READ, WORDS).told[-1].family
+    remembered = Heard(Families(PROFILES, None, {2: "atv312"})).say(READ, WORDS).reported[-1].family
     assert remembered is not None
     assert (remembered.how, remembered.profile.id) == ("remembered", "atv312")
 
@@ -166,7 +166,7 @@ def reads_of(profile_id: str, codes: Iterable[str]) -> list[bytes]:
 def test_a_family_is_likely_by_what_the_drive_answers(
     profile_id: str, codes: tuple[str, ...], others: tuple[str, ...] | None
 ) -> None:
-    family = Heard().say(*reads_of(profile_id, codes)).told[-1].family
+    family = Heard().say(*reads_of(profile_id, codes)).reported[-1].family
     assert family is not None
     assert family.how == "likely"
     if others is not None:
@@ -177,7 +177,7 @@ def test_a_family_is_likely_by_what_the_drive_answers(
 
 def test_families_that_fit_as_well_are_named() -> None:
     heard = Heard().say(READ, WORDS)
-    family = heard.told[-1].family
+    family = heard.reported[-1].family
     assert family is not None
     assert {family.profile.id, *family.others} == {"atv31", "atv312", "atv71"}
     assert f"(likely, or {', '.join(family.others)})" in heard.lines
@@ -186,13 +186,13 @@ def test_families_that_fit_as_well_are_named() -> None:
 def test_a_read_longer_than_a_family_answers_is_of_another() -> None:
     words = [0] * 40
     heard = Heard().say(read_frame(2, 3201, 40), reply_words(2, *words))
-    family = heard.told[-1].family
+    family = heard.reported[-1].family
     assert family is None or family.profile.id == "atv71"
 
 
 def test_nothing_is_likely_where_nothing_fits() -> None:
     heard = Heard().say(read_frame(2, 60000, 1), reply_words(2, 7))
-    assert heard.told[-1].family is None
+    assert heard.reported[-1].family is None
     assert "Device 2: family not known; -p names it" in heard.lines
 
 
@@ -228,15 +228,15 @@ def test_how_often_a_drive_is_asked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pause", "told"),
+    ("pause", "reported"),
     [(2.0, "TTO 3 s (as heard): fed, 0.9"), (4.0, "TTO 3 s (as heard): NOT FED")],
 )
-def test_whether_the_time_out_is_fed(pause: float, told: str) -> None:
+def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
     heard = Heard(named("atv71", "atv71")).say(COMMAND, COMMAND)
     place = library.load("atv71")["TTO"].address
     heard.say(read_frame(2, place, 1), reply_words(2, 30), READ, WORDS)
     heard.now += pause
-    assert told in heard.say(READ, WORDS).lines
+    assert reported in heard.say(READ, WORDS).lines
     (drive,) = heard.summary.drives
     assert drive.feeding is not None
     assert drive.feeding.fed is (pause < 3)
@@ -359,7 +359,7 @@ def test_a_scale_follows_what_was_heard_of_the_same_drive() -> None:
         heard.say(read_frame(2, address, 1), reply_words(2, word))
 
     read(one, 100)
-    assert heard.told[-1].values[0].value.unit == "raw"
+    assert heard.reported[-1].values[0].value.unit == "raw"
     read(source, int(next(iter(one.scale_by.scales))))
     read(one, 100)
-    assert heard.told[-1].values[0].value.unit != "raw"
+    assert heard.reported[-1].values[0].value.unit != "raw"

@@ -384,9 +384,9 @@ async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
         if taken:
             assert "Written and read back: NMA3, NMA4." in await write(here, plan)
         else:
-            with pytest.raises(AssignmentRefused, match=r"NMA3 was not taken.*Nothing") as told:
+            with pytest.raises(AssignmentRefused, match=r"NMA3 was not taken.*Nothing") as reported:
                 await write(here, plan)
-            assert told.value.__cause__ is error
+            assert reported.value.__cause__ is error
         assert sent == [3204]
 
 

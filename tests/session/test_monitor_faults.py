@@ -161,8 +161,8 @@ async def test_what_another_drive_may_answer_is_read_anew(
     faults = [fault] if fault else [silence() for _ in range(FORGOTTEN_AFTER)]
     cycles = await bench.fail(*faults, cycles=len(faults) + 12)
     assert [bool(s.error) for s, _ in cycles] == [True] * len(faults) + [False] * 12
-    asked = {address for _, addresses in cycles[len(faults) :] for address in addresses}
-    assert {REFUSED, *(FIRST_SLOW + 100 * i for i in range(SLOW))} <= asked
+    requested = {address for _, addresses in cycles[len(faults) :] for address in addresses}
+    assert {REFUSED, *(FIRST_SLOW + 100 * i for i in range(SLOW))} <= requested
 
 
 async def test_a_drive_in_fault_may_be_reset_by_the_failure(bench: Bench) -> None:
@@ -212,15 +212,15 @@ def one_each(codes: Iterable[str]) -> list[tuple[str, ...]]:
 def test_what_failed_comes_in_halves_and_then_in_doubles() -> None:
     due, codes = Rotation(10), tuple("abcdefgh")
     due.add(codes)
-    asked = []
+    requested = []
     for fails in (True, True, False, False, False, False):
-        asked.append(due.turn(codes, one_each))
+        requested.append(due.turn(codes, one_each))
         if fails:
             due.failed(one_each)
         else:
             due.came()
-    assert ["".join(turn) for turn in asked[:5]] == ["abcdefgh", "abcd", "ab", "cdef", "gh"]
-    assert len(asked[5]) <= 1  # the usual turns again
+    assert ["".join(turn) for turn in requested[:5]] == ["abcdefgh", "abcd", "ab", "cdef", "gh"]
+    assert len(requested[5]) <= 1  # the usual turns again
 
 
 def test_all_have_their_turn_though_some_fail() -> None:
@@ -250,9 +250,9 @@ def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
 async def test_a_drive_that_is_held_back_is_not_asked_and_says_why(bench: Bench) -> None:
     await bench.run(2)
     bench.monitor.held_back = lambda: "Left alone."
-    told = await bench.run(FORGOTTEN_AFTER + 2)
-    assert [asked for _, asked in told[1:]] == [[]] * (len(told) - 1)
-    assert told[-1][0].error == "Left alone."
+    reported = await bench.run(FORGOTTEN_AFTER + 2)
+    assert [requested for _, requested in reported[1:]] == [[]] * (len(reported) - 1)
+    assert reported[-1][0].error == "Left alone."
     bench.monitor.held_back = lambda: ""
     assert not (await bench.run(3))[-1][0].error
 

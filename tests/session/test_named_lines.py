@@ -103,8 +103,8 @@ def test_a_fault_is_told_with_file_line_and_key_and_hinders_no_other_name(
     row: str, fault: str
 ) -> None:
     path = settings(f'[lines]\npump = "tcp:gateway"\n{row}\n')
-    (told,) = line_settings().faults
-    assert told.startswith(f"{path}:{fault}")
+    (reported,) = line_settings().faults
+    assert reported.startswith(f"{path}:{fault}")
     assert named_lines() == {"pump": NamedLine("pump", "tcp:gateway")}
     with pytest.raises(SettingsError, match=r"settings\.toml:3"):
         line_named("bad")
@@ -123,8 +123,8 @@ def test_a_fault_is_told_with_file_line_and_key_and_hinders_no_other_name(
 )
 def test_a_file_that_is_no_settings_says_so_and_ends_nothing(text: str) -> None:
     path = settings(text)
-    (told,) = line_settings().faults
-    assert told.startswith(str(path))
+    (reported,) = line_settings().faults
+    assert reported.startswith(str(path))
     assert named_lines() == {}
     assert line_named("/dev/ttyUSB0") is None
 
@@ -228,5 +228,5 @@ def test_a_file_of_any_content_ends_in_a_sentence(changes: list[tuple[int, str]]
     assert all("\n" not in fault for fault in found.faults)
     for name in ("pump", "fan", "mixer"):
         with suppress(SettingsError):
-            told = line_to_stop(name)
-            assert told is None or (told.line and told.device in (None, *range(1, 248)))
+            reported = line_to_stop(name)
+            assert reported is None or (reported.line and reported.device in (None, *range(1, 248)))

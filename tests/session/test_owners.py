@@ -170,8 +170,8 @@ async def test_arming_asks_for_a_state_of_now() -> None:
         here.console.commander.arm()
         assert not here.session.arming.armed
         await until(lambda: here.session.arming.armed)
-        asked = [f for f in list(here.line.trace)[before:] if f.direction == "out"]
-        assert asked
+        requested = [f for f in list(here.line.trace)[before:] if f.direction == "out"]
+        assert requested
 
 
 async def test_a_drive_that_does_not_tell_its_state_is_not_armed(

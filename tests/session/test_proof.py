@@ -211,5 +211,5 @@ def test_nothing_is_proved_that_is_not_so(
 
 
 def test_nothing_is_sure_before_anything_was_compared() -> None:
-    told: Callable[[str, int], bool] = SlotEvidence(PROFILE, BLOCK).holds
-    assert not any(told(slot, raw) for slot in BLOCK.slots for raw in (0, *RAWS.values(), 99))
+    reported: Callable[[str, int], bool] = SlotEvidence(PROFILE, BLOCK).holds
+    assert not any(reported(slot, raw) for slot in BLOCK.slots for raw in (0, *RAWS.values(), 99))

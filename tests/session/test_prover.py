@@ -45,7 +45,7 @@ class OwnTime(Clock):
         await asyncio.sleep(0)
         self.now += seconds
 
-    def of_line(self, told: float) -> float:
+    def of_line(self, reported: float) -> float:
         """The line has no other time."""
         return self.now
 
@@ -63,21 +63,21 @@ class WatchingDrive(OneDrive):
         self.fault = SLF
         self.at_twelfth: Callable[[], None] = lambda: None
         """Called with the twelfth read."""
-        self.asked_by: list[Priority] = []
+        self.priorities: list[Priority] = []
         self._heard = math.inf
 
     async def before_read(self, device: int, registers: range, priority: Priority) -> None:
-        hushed = self.facts.hushed.get(device)
-        if hushed and priority is not Priority.STOP:
-            raise RequestRefused(hushed[1])
+        paused = self.facts.paused.get(device)
+        if paused and priority is not Priority.STOP:
+            raise RequestRefused(paused[1])
         now = self.clock.monotonic()
         if now - self._heard > self.timeout:
             self.registers[STATUS] = TRIPPED
             self.registers[LAST_FAULT] = self.fault
             self.registers[HERTZ] = 0
         self._heard = now
-        self.asked_by.append(priority)
-        if len(self.asked_by) == 12:
+        self.priorities.append(priority)
+        if len(self.priorities) == 12:
             self.at_twelfth()
         self.clock.now += EXCHANGE
 
@@ -158,7 +158,7 @@ async def test_line_that_stays_lost_ends_the_proof() -> None:
 
     with pytest.raises(LineLost):
         await bench(clock, drive).prove()
-    assert not drive.facts.hushed
+    assert not drive.facts.paused
 
 
 async def test_a_drive_that_never_reacts_is_told_in_capitals() -> None:
@@ -187,13 +187,13 @@ async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards
     refused = 0
     while not task.done():
         await asyncio.sleep(0)
-        if drive.facts.hushed:
+        if drive.facts.paused:
             with pytest.raises(RequestRefused, match="being proved"):
                 await drive.read(1, STATUS)
             refused += 1
     assert refused
     # what is set is read before it is left alone, where everybody else asks, too
-    alone = drive.asked_by[drive.asked_by.index(Priority.STOP) :]
+    alone = drive.priorities[drive.priorities.index(Priority.STOP) :]
     assert set(alone) == {Priority.STOP}
     await drive.read(1, STATUS)
 
@@ -205,8 +205,8 @@ async def test_a_stop_ends_the_proof_and_lets_the_drive_be_asked() -> None:
     drive.at_twelfth = lambda: prover.session.work.stop("the stop key")
     with pytest.raises(Stopped):
         await prover.prove()
-    assert len(drive.asked_by) >= 12
-    assert not drive.facts.hushed
+    assert len(drive.priorities) >= 12
+    assert not drive.facts.paused
 
 
 async def test_a_motor_that_turns_is_proved_only_where_that_was_said() -> None:
@@ -232,8 +232,8 @@ async def test_a_motor_that_begins_to_turn_meanwhile_is_asked_on() -> None:
     drive.at_twelfth = terminals_run_it
     with pytest.raises(OrderRefused, match="began to turn"):
         await bench(clock, drive).prove()
-    assert len(drive.asked_by) < 25
-    assert not drive.facts.hushed
+    assert len(drive.priorities) < 25
+    assert not drive.facts.paused
 
 
 async def test_what_is_set_otherwise_meanwhile_proves_nothing() -> None:
@@ -274,7 +274,7 @@ async def test_a_watch_that_is_off_is_nothing_to_prove() -> None:
     drive.registers[TIMEOUT] = 0
     with pytest.raises(NothingToProve, match="does not notice"):
         await bench(clock, drive).prove()
-    assert not drive.facts.hushed
+    assert not drive.facts.paused
 
 
 async def test_a_reaction_that_was_changed_behind_the_panels_back_is_told() -> None:
@@ -308,22 +308,22 @@ class WithoutModule(OneDrive):
 
 
 @pytest.mark.parametrize(
-    ("codes", "told"),
+    ("codes", "reported"),
     [
         (("15.07",), "11.63 is Off: the drive does not notice .* 15.07 cannot be read: perhaps"),
         (("15.07", "11.63"), "15.07 and 11.63 cannot be read: .* is not known; nothing was proved"),
     ],
 )
 async def test_ports_that_the_drive_does_not_have_are_named(
-    codes: tuple[str, ...], told: str
+    codes: tuple[str, ...], reported: str
 ) -> None:
     clock = OwnTime()
     drive = WithoutModule(clock, *codes)
     session = DriveSession(drive, 1, drive.profile, clock=clock)
     session.arming.arm(seconds=math.inf)
-    with pytest.raises(NothingToProve, match=told):
+    with pytest.raises(NothingToProve, match=reported):
         await Prover(session, Journal(), session.work.permit()).prove()
-    assert not drive.facts.hushed
+    assert not drive.facts.paused
 
 
 async def test_a_drive_that_answers_nothing_is_told_as_such() -> None:

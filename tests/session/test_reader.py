@@ -25,7 +25,7 @@ async def test_neighbors_come_in_one_request_with_their_units() -> None:
     )
     line = OneDrive({3204: 53, 3205: 0x10000 - 725})
     readings = await Reader(DriveSession(line, 1, profile)).read(["OTR", "LCR"])
-    assert line.asked == [(3204, 2)]
+    assert line.requested == [(3204, 2)]
     assert list(readings) == ["OTR", "LCR"]
     assert [r.value.display for r in readings.values() if r.value] == ["-72.5 %", "5.3 A"]
     assert all(r.quality is Quality.GOOD for r in readings.values())
@@ -49,11 +49,11 @@ async def test_a_poll_does_not_ask_again_for_what_was_refused() -> None:
     await reader.read(["P10", "P11", "P12"], priority=Priority.POLL)
     line.requests.clear()
     readings = await reader.read(["P10", "P11", "P12"], priority=Priority.POLL)
-    assert line.asked == [(10, 1), (12, 1)]
+    assert line.requested == [(10, 1), (12, 1)]
     assert readings["P11"].quality is Quality.BAD
     line.requests.clear()
     await reader.read(["P11"])
-    assert line.asked == [(11, 1)]
+    assert line.requested == [(11, 1)]
 
 
 async def test_the_word_for_no_value_is_asked_for_alone() -> None:

@@ -67,7 +67,7 @@ async def test_what_was_changed_with_what_was_before() -> None:
 
 
 @pytest.mark.parametrize(
-    ("family", "code", "raw", "told"),
+    ("family", "code", "raw", "reported"),
     [
         ("atv21", "F803", 0, "Off"),
         ("atv21", "F803", 3, "3 s"),
@@ -75,12 +75,14 @@ async def test_what_was_changed_with_what_was_before() -> None:
         ("powerdrive", "15.07", 30, "3.0 s"),
     ],
 )
-async def test_a_watch_that_is_off_is_told_so(family: str, code: str, raw: int, told: str) -> None:
+async def test_a_watch_that_is_off_is_told_so(
+    family: str, code: str, raw: int, reported: str
+) -> None:
     with bench(family, sets={code: raw}) as made:
         upload = Upload(made.session)
         await upload.run()
         text = report_text(made.profile, upload.parameter_set(), [])
-    assert f"- Timeout ({code}): {told}" in text.splitlines()
+    assert f"- Timeout ({code}): {reported}" in text.splitlines()
 
 
 async def test_what_the_drive_stored_with_a_fault() -> None:

@@ -49,10 +49,10 @@ def access(line: TrippedDrive) -> CommandAccess:
 
 
 def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:
-    told = reset_follows(ATV21, {"FD01": 0, "CMOD": 0}, {"FD06": 1})
-    assert "starts the motor until Drive Panel sends 16#C000" in told
-    assert "clears FA00 and the reference" in told
-    assert told.endswith("Closed at the terminals now: F.")
+    reported = reset_follows(ATV21, {"FD01": 0, "CMOD": 0}, {"FD06": 1})
+    assert "starts the motor until Drive Panel sends 16#C000" in reported
+    assert "clears FA00 and the reference" in reported
+    assert reported.endswith("Closed at the terminals now: F.")
 
 
 async def test_the_reference_is_told_and_not_brought_back() -> None:
@@ -62,8 +62,8 @@ async def test_the_reference_is_told_and_not_brought_back() -> None:
     await give_reference(made, "30Hz")
     assert line.registers[REFERENCE] == 3000
     line.trip()
-    said = await give_order(made, "reset")
-    assert said == "Fault reset: Standby; the reference is 0.00 Hz now"
+    output = await give_order(made, "reset")
+    assert output == "Fault reset: Standby; the reference is 0.00 Hz now"
     assert line.registers[COMMAND] == 0xC000, "the line keeps command and reference"
     assert made.given.wanted is None
     await run_at_reference(made, "forward", None)

@@ -259,8 +259,8 @@ def test_what_is_left_out_and_why() -> None:
         "ADD": "line", "TBR": "line", "FRY": "forbidden", "CMD": "no setting",
         "RFR": "no setting", "DEC": "absent", "AC2": "absent", "XYZ": "unknown",
     }  # fmt: skip
-    asked = plan("atv71", NOW, values, Options(line_settings=True))
-    assert {edit.code for edit in asked.edits} == {"ACC", "ADD", "TBR"}
+    requested = plan("atv71", NOW, values, Options(line_settings=True))
+    assert {edit.code for edit in requested.edits} == {"ACC", "ADD", "TBR"}
     assert found.count("equal") == 7
     assert found.count("skip") == 6
 
@@ -327,11 +327,11 @@ def test_between_families_common_quantities_come_over_in_their_units() -> None:
     assert {e.code: e.text for e in found.edits} == {
         "ACC": "3.1 s", "HSP": "45.0 Hz", "SP2": "12.3 Hz",
     }  # fmt: skip
-    told = {item.code: item for item in found.items}
-    assert told["ACC"].text == "ACC: 3.14 s is held as 3.1 s."
-    assert told["dEC"].kind == "equal"
-    assert told["UnS"].reason == "rating"
-    assert told["atv71 CTT"].reason == told["atv71 ADD"].reason == "no counterpart"
+    reported = {item.code: item for item in found.items}
+    assert reported["ACC"].text == "ACC: 3.14 s is held as 3.1 s."
+    assert reported["dEC"].kind == "equal"
+    assert reported["UnS"].reason == "rating"
+    assert reported["atv71 CTT"].reason == reported["atv71 ADD"].reason == "no counterpart"
     taken = plan("atv312", now, values, Options(rating=True))
     assert "UnS" in taken.edits
 

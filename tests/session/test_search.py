@@ -45,7 +45,7 @@ class Replies:
     present: set[int]
     late: set[int] = field(default_factory=set)
     errors: dict[int, LineError] = field(default_factory=dict)
-    asked: list[tuple[int, Priority]] = field(default_factory=list)
+    requested: list[tuple[int, Priority]] = field(default_factory=list)
     pace: Pace = field(default_factory=Pace)
     timing: Timing = field(default_factory=Timing)
     link: Link = field(default_factory=lambda: SerialLink("/dev/null", 19200, "8E1"))
@@ -72,7 +72,7 @@ class Replies:
         priority: Priority,
         within: float | None = None,
     ) -> None:
-        self.asked.append((device, priority))
+        self.requested.append((device, priority))
         if device in self.errors:
             raise self.errors[device]
         if device in self.present or (device in self.late and priority is Priority.PATIENT):
@@ -85,11 +85,11 @@ class Replies:
 
     def background(self) -> list[int]:
         """Who was asked in the first round."""
-        return [device for device, priority in self.asked if priority is Priority.BACKGROUND]
+        return [device for device, priority in self.requested if priority is Priority.BACKGROUND]
 
     def patiently(self) -> list[int]:
         """Who was asked once more."""
-        return [device for device, priority in self.asked if priority is Priority.PATIENT]
+        return [device for device, priority in self.requested if priority is Priority.PATIENT]
 
 
 async def searched(
@@ -122,7 +122,7 @@ async def test_a_single_drive_says_who_it_is_before_any_profile_is_read(
     assert result.identity.reference == "ATV71HU15M3"
     assert (search.ended, texts) == ("done", ["1 of 1, 1 found"])
     # nothing else was asked
-    assert line.asked == []
+    assert line.requested == []
 
 
 async def test_a_single_drive_that_does_not_say_it_is_asked_as_any_other() -> None:
@@ -130,7 +130,7 @@ async def test_a_single_drive_that_does_not_say_it_is_asked_as_any_other() -> No
     search = Search([7], line.no_time)
     (result,) = await searched(search, line)
     assert (search.ended, search.answered) == ("done", frozenset({7}))
-    assert line.asked
+    assert line.requested
     assert result.identity is None or not result.identity.reference
 
 
@@ -150,7 +150,7 @@ async def test_a_drive_missed_once_is_asked_again_with_more_patience() -> None:
 async def test_an_empty_address_costs_one_request_and_the_longest_turnaround() -> None:
     line = Replies({1})
     await searched(Search(range(1, 4), line.no_time, once=True), line)
-    assert line.asked == [
+    assert line.requested == [
         (1, Priority.BACKGROUND),
         (2, Priority.BACKGROUND),
         (3, Priority.BACKGROUND),
@@ -192,11 +192,11 @@ async def test_what_is_left_counts_the_silent_ones_once_more_and_what_they_reall
 
 async def test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one() -> None:
     line = Replies({1})
-    line.facts.hush(2, "It is being proved.")
+    line.facts.pause_polling(2, "It is being proved.")
     search = Search(range(1, 4), line.no_time, once=True)
-    (_, told) = await searched(search, line)
-    assert (told.device, told.identity, told.error) == (2, None, "It is being proved.")
-    assert [device for device, _ in line.asked] == [1, 3]
+    (_, reported) = await searched(search, line)
+    assert (reported.device, reported.identity, reported.error) == (2, None, "It is being proved.")
+    assert [device for device, _ in line.requested] == [1, 3]
     assert 2 in search.answered
 
 
@@ -240,11 +240,11 @@ async def test_a_drive_with_a_long_response_delay_is_found() -> None:
 
 
 async def test_what_is_called_between_two_addresses_may_end_the_search() -> None:
-    line, asked = Replies({1, 2}), list[int]()
+    line, requested = Replies({1, 2}), list[int]()
 
     def look() -> None:
-        asked.append(len(line.asked))
-        if len(asked) > 1:
+        requested.append(len(line.requested))
+        if len(requested) > 1:
             raise LineBusy("another master")
 
     search = Search([1, 2], line.no_time, between=look)

@@ -251,18 +251,18 @@ def test_a_motor_that_was_taken_over_is_no_longer_offered(starts: Starts) -> Non
 
 
 @pytest.mark.parametrize("before", [True, False])
-@pytest.mark.parametrize("meant", [True, False])
+@pytest.mark.parametrize("intended", [True, False])
 def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
-    starts: Starts, before: bool, meant: bool
+    starts: Starts, before: bool, intended: bool
 ) -> None:
     starts.begin(replace(start(), left_running=before))
     keeper = StartKeeper("panel", starts)
-    keeper.left_running = meant
+    keeper.left_running = intended
     session: Any = SimpleNamespace(line_text=LINE, line=FakeLine({}), device=2)
     keeper.look(session)
     keeper.take_over(session)
     (mine,) = [one for one in starts._files.records() if one.pid == os.getpid()]
-    assert mine.left_running is meant
+    assert mine.left_running is intended
 
 
 def test_of_two_motors_that_were_left_one_is_taken_over_and_the_other_still_offered(

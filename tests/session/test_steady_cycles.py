@@ -151,7 +151,7 @@ async def test_a_steady_cycle_asks_nothing_and_brings_the_values_in_turn(steady:
         snapshot = await steady.cycle()
         assert snapshot.readings["SPEED"].raw == 600 + number
         assert snapshot.readings["SPEED"].quality is Quality.GOOD
-        assert steady.line.asked == []
+        assert steady.line.requested == []
         assert not snapshot.error
     found = steady.snapshots[-1].readings
     assert [found[f"SLOW{i}"].raw for i in range(SLOW)] == [50 + i for i in range(SLOW)]
@@ -180,7 +180,7 @@ async def test_what_was_written_meanwhile_is_read_again(steady: Steady) -> None:
     steady.line.devices[1].words[SPEED] = 900
     snapshot = await steady.cycle()
     assert snapshot.readings["SPEED"].raw == 900
-    assert (SPEED, 1) in steady.line.asked
+    assert (SPEED, 1) in steady.line.requested
     assert snapshot.readings["SPEED"].time > snapshot.readings["OTHER"].time
 
 
@@ -189,7 +189,7 @@ async def test_what_a_cycle_lacks_is_read_from_here(steady: Steady) -> None:
     steady.holder.without = {OTHER}
     snapshot = await steady.cycle()
     assert not snapshot.error
-    assert steady.line.asked == [(OTHER, 1)]
+    assert steady.line.requested == [(OTHER, 1)]
     # the plan is the same: nothing is to be changed about it
     assert len(steady.holder.plans) == 1
 
@@ -208,7 +208,7 @@ async def test_after_an_error_the_drive_is_read_from_here_until_nothing_is_owed(
     assert not steady.holder.polls
     await steady.until(lambda: steady.holder.polls)
     assert not steady.snapshots[-1].error
-    assert (SPEED, 1) in steady.line.asked
+    assert (SPEED, 1) in steady.line.requested
     # the slow values go on where they were
     before, after = steady.holder.plans
     assert after.turns == (*before.turns[2:], *before.turns[:2])
@@ -217,13 +217,13 @@ async def test_after_an_error_the_drive_is_read_from_here_until_nothing_is_owed(
 async def test_a_look_at_everything_is_read_from_here_at_once(steady: Steady) -> None:
     await steady.start()
     await steady.cycle()
-    steady.session.stir()
+    steady.session.request_full_read()
     await steady.cycle()
     brought = {one.address for one in steady.holder.plans[0].turns[1]}
-    direct = {address for address, _ in steady.line.asked}
+    direct = {address for address, _ in steady.line.requested}
     assert direct == {FIRST_SLOW + 100 * i for i in range(SLOW)} - brought
     await steady.cycle()
-    assert steady.line.asked == []
+    assert steady.line.requested == []
     assert len(steady.holder.plans) == 1
 
 
@@ -239,7 +239,7 @@ async def test_another_period_or_another_value_is_another_plan(steady: Steady) -
     assert len(steady.holder.plans) == 2  # it is among them already
     refused = steady.line.devices[1].words
     del refused[FIRST_SLOW]
-    steady.session.stir()
+    steady.session.request_full_read()
     await steady.cycle()
     await steady.until(lambda: len(steady.holder.plans) == 3)
     planned = {one.address for turn in steady.holder.plans[-1].turns for one in turn}
@@ -255,7 +255,7 @@ async def test_a_holder_that_is_gone_is_replaced_by_reading_from_here(steady: St
     steady.holder.lose()
     count = len(steady.snapshots)
     await steady.until(lambda: len(steady.snapshots) > count + 2)
-    assert (SPEED, 1) in steady.line.asked
+    assert (SPEED, 1) in steady.line.requested
     assert not steady.snapshots[-1].error
     steady.holder.answers = True
     await steady.until(lambda: steady.holder.polls)

@@ -52,7 +52,7 @@ async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
         await until(lambda: not here.session.work.busy)
         here.fleet.stop([here.session])
         await until(lambda: here.fleet.stopper.reports[1].phase == "stopped")
-        here.session.stir()
+        here.session.request_full_read()
         await until(lambda: here.session.image.raws.get("CMD") == 7)
         assert commander.given.lost_orders() == ""
 
@@ -65,7 +65,7 @@ async def test_another_programs_stop_is_told_with_the_word() -> None:
         await until(lambda: here.drive.motor.frequency > 5)
         await until(lambda: not here.session.work.busy)
         here.drive.set("CMD", 7)
-        here.session.stir()
+        here.session.request_full_read()
         await until(lambda: here.session.image.raws.get("CMD") == 7)
         assert "CMD 16#000F is now 16#0007" in commander.given.lost_orders()
 

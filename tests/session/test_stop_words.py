@@ -61,7 +61,7 @@ async def test_what_somebody_changed_at_rest_is_read_anew(start: Start, journal:
     simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}))
     drive = simulation.drive(1)
     session = DriveSession(line, 1, ATV71)
-    assert not session.told_by_line
+    assert not session.reported_by_line
     await Reader(session).read(["CHCF", "DOTD", "ETA"])
     drive.set("CHCF", 3)
     session.image._trusted_from = -math.inf
@@ -70,7 +70,7 @@ async def test_what_somebody_changed_at_rest_is_read_anew(start: Start, journal:
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
     assert writes(line) == [(8501, 0x0000)]
-    assert session.told_by_line, "a drive that watches from its first write on watches now"
+    assert session.reported_by_line, "a drive that watches from its first write on watches now"
 
 
 async def test_while_the_motor_runs_what_needs_it_at_rest_is_not_read_again(
@@ -88,10 +88,10 @@ async def test_while_the_motor_runs_what_needs_it_at_rest_is_not_read_again(
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
     monitor.stop()
-    asked = [f.data for f in list(line.trace)[before:] if f.direction == "out"]
-    at = next(i for i, data in enumerate(asked) if data[1] == 6)
-    assert asked[at][2:6].hex() == "21350007"
-    assert not any(data[2:4] == (8401).to_bytes(2, "big") for data in asked[:at])
+    requested = [f.data for f in list(line.trace)[before:] if f.direction == "out"]
+    at = next(i for i, data in enumerate(requested) if data[1] == 6)
+    assert requested[at][2:6].hex() == "21350007"
+    assert not any(data[2:4] == (8401).to_bytes(2, "big") for data in requested[:at])
 
 
 async def test_a_profile_that_cannot_be_read_is_stopped_by_the_word_of_all(

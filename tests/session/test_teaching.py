@@ -133,14 +133,14 @@ async def test_what_has_a_scale_is_not_taught() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="nothing is to be taught"):
         await teacher.look("KNOWN", "12")
-    assert line.asked == []
+    assert line.requested == []
 
 
 async def test_a_text_that_is_no_number_is_refused_before_the_drive_is_asked() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="no number of a display"):
         await teacher.look("HZ", "fast")
-    assert line.asked == []
+    assert line.requested == []
 
 
 async def test_forgetting() -> None:
@@ -281,9 +281,9 @@ async def test_a_reference_whose_word_could_mean_a_negative_one_is_refused() -> 
 )
 async def test_where_no_reference_goes_yet_the_way_is_told(taught: bool, says: str) -> None:
     teacher = await preset() if taught else drive()[1]
-    with pytest.raises(ValueRefused, match="no manual at hand") as told:
+    with pytest.raises(ValueRefused, match="no manual at hand") as reported:
         await parsed(teacher, "20")
-    assert says in str(told.value)
+    assert says in str(reported.value)
 
 
 # Files
@@ -329,9 +329,9 @@ async def test_looks_that_contradict_each_other_teach_nothing(folder: Path) -> N
     line, teacher = drive()
     await two_looks(line, teacher)
     path = kept(folder)
-    told = json.loads(path.read_text("utf-8"))
-    told["looks"]["HZ"][1]["shown"] = "70.0 Hz"
-    path.write_text(json.dumps(told), "utf-8")
+    reported = json.loads(path.read_text("utf-8"))
+    reported["looks"]["HZ"][1]["shown"] = "70.0 Hz"
+    path.write_text(json.dumps(reported), "utf-8")
     assert await shown(drive(HZ=250)[1]) == "250"
 
 
@@ -339,10 +339,10 @@ async def test_a_code_that_the_profile_does_not_have_is_kept_and_not_used(folder
     line, teacher = drive()
     await two_looks(line, teacher)
     path = kept(folder)
-    told = json.loads(path.read_text("utf-8"))
-    told["looks"]["GONE"] = told["looks"]["HZ"]
-    told["looks"]["KNOWN"] = told["looks"]["HZ"]
-    path.write_text(json.dumps(told), "utf-8")
+    reported = json.loads(path.read_text("utf-8"))
+    reported["looks"]["GONE"] = reported["looks"]["HZ"]
+    reported["looks"]["KNOWN"] = reported["looks"]["HZ"]
+    path.write_text(json.dumps(reported), "utf-8")
     line, later = drive(HZ=250, KNOWN=230)
     assert later.trouble == ""
     assert await shown(later, "KNOWN") == "230 V"

@@ -74,12 +74,12 @@ def session_of(line: OneDrive, clock: Clock = REAL_CLOCK, **rules: Any) -> Drive
     return DriveSession(line, 1, profile, clock=clock)
 
 
-async def told(session: DriveSession) -> Timeout:
+async def reported(session: DriveSession) -> Timeout:
     return await read_timeout(Reader(session), Priority.OPERATOR_READ)
 
 
 async def test_seconds_reaction_and_fault() -> None:
-    watch = (await told(session_of(Ports({TTO: 30})))).watch
+    watch = (await reported(session_of(Ports({TTO: 30})))).watch
     assert watch is not None
     assert (watch.timeout, watch.code, watch.fault, watch.active) == (3.0, "TTO", "SLF", True)
     assert watch.reaction is not None
@@ -87,14 +87,14 @@ async def test_seconds_reaction_and_fault() -> None:
 
 
 async def test_a_reaction_without_a_trip_names_no_fault() -> None:
-    watch = (await told(session_of(Ports({TTO: 30, SLL: 2})))).watch
+    watch = (await reported(session_of(Ports({TTO: 30, SLL: 2})))).watch
     assert watch is not None
     assert watch.fault == ""
 
 
 async def test_a_watch_whose_reaction_is_off_has_not_begun() -> None:
     session = session_of(Ports({TTO: 30, SLL: 0}))
-    session.timeout = await told(session)
+    session.timeout = await reported(session)
     for found in (session.timeout, timeout_now(session)):
         assert found.watch is not None
         assert (found.watch.active, found.watch.acts) == (False, False)
@@ -104,14 +104,14 @@ async def test_a_watch_whose_reaction_is_off_has_not_begun() -> None:
 
 
 async def test_off_and_refused_are_two_things() -> None:
-    assert await told(session_of(Ports({TTO: 0}))) == Timeout(known=True)
-    assert await told(session_of(Ports({TTO: 30}, refused=TTO))) == Timeout(known=False)
+    assert await reported(session_of(Ports({TTO: 0}))) == Timeout(known=True)
+    assert await reported(session_of(Ports({TTO: 30}, refused=TTO))) == Timeout(known=False)
 
 
 async def test_the_shortest_of_several_ports_counts() -> None:
     for mine, other, shortest in ((0, 20, 2.0), (30, 0, 3.0), (30, 20, 2.0), (10, 20, 1.0)):
         line = Ports({TTO: mine, PORT: other})
-        watch = (await told(session_of(line, other_timeouts=["PORT"]))).watch
+        watch = (await reported(session_of(line, other_timeouts=["PORT"]))).watch
         assert watch is not None
         assert watch.timeout == shortest
 
@@ -155,9 +155,9 @@ async def test_a_family_that_refuses_by_silence_may_tell_nothing() -> None:
     profile = library.load("powerdrive")
     line = Ports({one.address: 0 for one in profile.parameters}, silent=profile["15.07"].address)
     session = DriveSession(line, 1, profile)
-    assert await told(session) == Timeout(known=True)  # of its other port
+    assert await reported(session) == Timeout(known=True)  # of its other port
     line.refused = profile["11.63"].address
-    assert await told(session) == Timeout(known=False)
+    assert await reported(session) == Timeout(known=False)
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
@@ -169,11 +169,11 @@ def test_what_shows_that_a_drive_is_there_is_no_late_reply_to_a_single_word(fami
 
 async def test_a_drive_that_answers_nothing_is_told() -> None:
     with pytest.raises(NoAnswer):
-        await told(session_of(Ports({TTO: 30}, silent=TTO)))
+        await reported(session_of(Ports({TTO: 30}, silent=TTO)))
 
 
 @pytest.mark.parametrize(
-    ("needs_write", "held", "told_by_line", "begun"),
+    ("needs_write", "held", "reported_by_line", "begun"),
     [
         (False, 0, False, True),
         (True, 0, False, False),
@@ -182,11 +182,11 @@ async def test_a_drive_that_answers_nothing_is_told() -> None:
     ],
 )
 async def test_a_watch_that_begins_with_a_command(
-    needs_write: bool, held: int, told_by_line: bool, begun: bool
+    needs_write: bool, held: int, reported_by_line: bool, begun: bool
 ) -> None:
     session = session_of(Ports({TTO: 30, CMD: held}), needs_write=needs_write)
-    session.told_by_line = told_by_line
-    watch = (await told(session)).watch
+    session.reported_by_line = reported_by_line
+    watch = (await reported(session)).watch
     assert watch is not None
     assert watch.active is begun
     assert has_begun(session) is begun
@@ -197,5 +197,5 @@ async def test_few_words_are_read(family: str) -> None:
     """A command that ends asks for the words of the profile's table, no more."""
     profile = library.load(family)
     line = OneDrive({one.address: 1 for one in profile.parameters})
-    await told(DriveSession(line, 1, profile))
-    assert sum(count for _, count in line.asked) <= 3
+    await reported(DriveSession(line, 1, profile))
+    assert sum(count for _, count in line.requested) <= 3

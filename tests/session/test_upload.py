@@ -16,13 +16,13 @@ from tui.simulator import FaultRates
 @pytest.mark.parametrize("family", FAMILIES)
 async def test_every_readable_parameter_is_read_and_right(family: str) -> None:
     with bench(family) as made:
-        told: list[tuple[int, int]] = []
-        upload = Upload(made.session, progress=lambda done, of: told.append((done, of)))
+        reported: list[tuple[int, int]] = []
+        upload = Upload(made.session, progress=lambda done, of: reported.append((done, of)))
         await upload.run()
         codes = readable_codes(made.profile)
         assert upload.done
-        assert told[-1] == (len(codes), len(codes))
-        assert told == sorted(told)
+        assert reported[-1] == (len(codes), len(codes))
+        assert reported == sorted(reported)
         values = upload.parameter_set()
         assert set(values.raws) == set(codes)
         assert values.absent == {}

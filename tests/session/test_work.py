@@ -53,7 +53,7 @@ class _Late:
         self._canceller = asyncio.get_running_loop().create_task(later())
 
 
-class Told:
+class Notified:
     """A queue of an armed drive, and tasks that tell what became of them."""
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class Told:
         self.arming = Arming(self.line)
         self.arming.arm()
         self.queue = WorkQueue(self.line, 1, self.arming)
-        self.said: list[str] = []
+        self.output: list[str] = []
         self.before: dict[str, Outcome | None] = {}
         """What the work had come to when a task began."""
 
@@ -76,20 +76,20 @@ class Told:
         **more: Any,
     ) -> None:
         async def carry_out(_: Permit) -> str:
-            self.said.append(f"{name} begun")
+            self.output.append(f"{name} begun")
             self.before[name] = self.queue.outcome
             if error is not None:
                 raise error
             try:
                 await asyncio.sleep(seconds)
             except asyncio.CancelledError:
-                self.said.append(f"{name} cancelled")
+                self.output.append(f"{name} cancelled")
                 raise
-            self.said.append(f"{name} done")
+            self.output.append(f"{name} done")
             return f"{name} is done"
 
         def given_up() -> str | None:
-            self.said.append(f"{name} given up")
+            self.output.append(f"{name} given up")
             return left
 
         self.queue.put(Task(carry_out, given_up=given_up, **more), stamp)
@@ -99,7 +99,7 @@ class Told:
         for _ in range(1000):
             await asyncio.sleep(0.01)
             if not self.queue.busy:
-                return self.said
+                return self.output
         raise AssertionError("the work does not end")
 
     def outcome(self) -> tuple[OutcomeKind, str]:
@@ -108,100 +108,100 @@ class Told:
 
 
 @pytest.fixture
-async def told() -> AsyncIterator[Told]:
-    made = Told()
+async def reported() -> AsyncIterator[Notified]:
+    made = Notified()
     yield made
     made.queue.stop()
     await asyncio.sleep(0)
 
 
-async def test_one_after_another(told: Told) -> None:
-    told.put("a", 0.02)
-    told.put("b")
-    assert told.queue.busy
-    assert await told.idle() == ["a begun", "a done", "b begun", "b done"]
-    assert told.outcome() == (OutcomeKind.DONE, "b is done")
+async def test_one_after_another(reported: Notified) -> None:
+    reported.put("a", 0.02)
+    reported.put("b")
+    assert reported.queue.busy
+    assert await reported.idle() == ["a begun", "a done", "b begun", "b done"]
+    assert reported.outcome() == (OutcomeKind.DONE, "b is done")
 
 
-async def test_whose_work_it_is(told: Told) -> None:
+async def test_whose_work_it_is(reported: Notified) -> None:
     one, other = object(), object()
-    told.put("a", owner=one)
-    told.put("b", owner=other)
-    assert told.queue.busy_for(one)
-    assert told.queue.busy_for(other)
-    assert not told.queue.busy_for(object())
-    await told.idle()
-    assert not told.queue.busy_for(one)
-    assert not told.queue.busy_for(other)
+    reported.put("a", owner=one)
+    reported.put("b", owner=other)
+    assert reported.queue.busy_for(one)
+    assert reported.queue.busy_for(other)
+    assert not reported.queue.busy_for(object())
+    await reported.idle()
+    assert not reported.queue.busy_for(one)
+    assert not reported.queue.busy_for(other)
 
 
-async def test_what_is_being_done_is_told(told: Told) -> None:
-    told.put("a", 0.02, working="Writing")
-    assert told.outcome() == (OutcomeKind.WORKING, "Writing")
-    await told.idle()
-    assert told.outcome() == (OutcomeKind.DONE, "a is done")
+async def test_what_is_being_done_is_told(reported: Notified) -> None:
+    reported.put("a", 0.02, working="Writing")
+    assert reported.outcome() == (OutcomeKind.WORKING, "Writing")
+    await reported.idle()
+    assert reported.outcome() == (OutcomeKind.DONE, "a is done")
 
 
-async def test_too_many_are_refused(told: Told) -> None:
-    told.put("a", 1.0)
+async def test_too_many_are_refused(reported: Notified) -> None:
+    reported.put("a", 1.0)
     await asyncio.sleep(0)
     for number in range(MOST_WAITING):
-        told.put(str(number))
+        reported.put(str(number))
     with pytest.raises(OrderRefused, match="Earlier commands"):
-        told.put("one more")
+        reported.put("one more")
 
 
-async def test_nothing_is_taken_for_a_lost_line(told: Told) -> None:
-    told.line.become(LineStatus.LOST)
+async def test_nothing_is_taken_for_a_lost_line(reported: Notified) -> None:
+    reported.line.become(LineStatus.LOST)
     with pytest.raises(OrderRefused, match="line was lost"):
-        told.put("a")
+        reported.put("a")
     with pytest.raises(OrderRefused, match="The line is lost"):
-        told.put("b", armed=False)
-    assert told.said == []
+        reported.put("b", armed=False)
+    assert reported.output == []
 
 
 # A stop
 
 
-async def test_a_stop_ends_the_one_under_way_and_those_behind_it(told: Told) -> None:
-    told.put("a", 5.0)
-    told.put("b")
+async def test_a_stop_ends_the_one_under_way_and_those_behind_it(reported: Notified) -> None:
+    reported.put("a", 5.0)
+    reported.put("b")
     await asyncio.sleep(0.01)
-    told.queue.stop("F12")
-    assert sorted(await told.idle()) == ["a begun", "a cancelled", "a given up", "b given up"]
-    assert told.queue.outcome is not None
-    assert told.queue.outcome.kind is OutcomeKind.REFUSED
-    assert BY_STOP in told.queue.outcome.text.lower()
-    assert isinstance(told.queue.outcome.error, Stopped)
-    assert (told.queue.stops, told.queue.stopped_by) == (1, "F12")
+    reported.queue.stop("F12")
+    assert sorted(await reported.idle()) == ["a begun", "a cancelled", "a given up", "b given up"]
+    assert reported.queue.outcome is not None
+    assert reported.queue.outcome.kind is OutcomeKind.REFUSED
+    assert BY_STOP in reported.queue.outcome.text.lower()
+    assert isinstance(reported.queue.outcome.error, Stopped)
+    assert (reported.queue.stops, reported.queue.stopped_by) == (1, "F12")
 
 
-async def test_a_stop_disarms_and_says_so(told: Told) -> None:
-    told.queue.stop()
-    assert not told.arming.armed
+async def test_a_stop_disarms_and_says_so(reported: Notified) -> None:
+    reported.queue.stop()
+    assert not reported.arming.armed
     with pytest.raises(NotArmed, match="Stopped: no longer armed"):
-        told.put("a")
-    told.arming.arm()
-    told.put("b")
-    assert await told.idle() == ["b begun", "b done"]
+        reported.put("a")
+    reported.arming.arm()
+    reported.put("b")
+    assert await reported.idle() == ["b begun", "b done"]
 
 
 async def test_a_task_behind_a_stop_neither_waits_for_ever_nor_brings_old_ones_along(
-    told: Told,
+    reported: Notified,
 ) -> None:
-    told.put("a")
+    reported.put("a")
     # the stop comes before the loop had time to begin
-    told.queue.stop()
-    told.arming.arm()
-    told.put("b")
-    assert await told.idle() == ["a given up", "b begun", "b done"]
+    reported.queue.stop()
+    reported.arming.arm()
+    reported.put("b")
+    assert await reported.idle() == ["a given up", "b begun", "b done"]
 
 
 @pytest.mark.parametrize("sees_it", [False, True])
 async def test_a_worker_that_hears_late_of_a_stop_touches_no_task_behind_it(
-    told: Told, sees_it: bool
+    reported: Notified, sees_it: bool
 ) -> None:
-    told.line.cancels_late = True
+    reported.line.cancels_late = True
     going = asyncio.Event()
 
     async def carry_out(permit: Permit) -> str:
@@ -210,99 +210,101 @@ async def test_a_worker_that_hears_late_of_a_stop_touches_no_task_behind_it(
             permit.check()
         return ""
 
-    told.queue.put(Task(carry_out))
+    reported.queue.put(Task(carry_out))
     await asyncio.sleep(0)
     going.set()
-    told.queue.stop()
-    told.arming.arm()
-    told.put("b", 0.05)
-    assert await told.idle() == ["b begun", "b done"]
-    assert told.outcome() == (OutcomeKind.DONE, "b is done")
+    reported.queue.stop()
+    reported.arming.arm()
+    reported.put("b", 0.05)
+    assert await reported.idle() == ["b begun", "b done"]
+    assert reported.outcome() == (OutcomeKind.DONE, "b is done")
 
 
 # The count of stops under which a task was typed
 
 
-async def test_a_task_typed_before_a_stop_is_refused_at_entry(told: Told) -> None:
-    stamp = told.queue.stops
-    told.queue.stop("F12")
-    told.arming.arm()
+async def test_a_task_typed_before_a_stop_is_refused_at_entry(reported: Notified) -> None:
+    stamp = reported.queue.stops
+    reported.queue.stop("F12")
+    reported.arming.arm()
     with pytest.raises(Stopped, match=r"a stop came after it \(F12\)"):
-        told.put("typed before", stamp=stamp)
+        reported.put("typed before", stamp=stamp)
     # one that needs no arming is refused as well
     with pytest.raises(Stopped):
-        told.put("typed before", stamp=stamp, armed=False)
-    told.put("typed behind", stamp=told.queue.stops)
-    assert await told.idle() == ["typed behind begun", "typed behind done"]
+        reported.put("typed before", stamp=stamp, armed=False)
+    reported.put("typed behind", stamp=reported.queue.stops)
+    assert await reported.idle() == ["typed behind begun", "typed behind done"]
 
 
 @pytest.mark.parametrize("armed", [True, False])
 async def test_a_task_is_refused_when_its_turn_comes_behind_a_stop(
-    told: Told, monkeypatch: pytest.MonkeyPatch, armed: bool
+    reported: Notified, monkeypatch: pytest.MonkeyPatch, armed: bool
 ) -> None:
-    taken = told.queue._next
+    taken = reported.queue._next
 
     def overtaken(*turn: Any) -> object:
         found = taken(*turn)
         # in the key's thread, between the taking of a task and its beginning
         if found is not None:
-            told.queue.stop("F12")
-            told.arming.arm()
+            reported.queue.stop("F12")
+            reported.arming.arm()
         return found
 
-    monkeypatch.setattr(told.queue, "_next", overtaken)
-    told.put("a", armed=armed)
-    assert await told.idle() == ["a given up"]
-    assert told.outcome() == (OutcomeKind.REFUSED, "Not sent: a stop came after it (F12).")
+    monkeypatch.setattr(reported.queue, "_next", overtaken)
+    reported.put("a", armed=armed)
+    assert await reported.idle() == ["a given up"]
+    assert reported.outcome() == (OutcomeKind.REFUSED, "Not sent: a stop came after it (F12).")
 
 
-async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(told: Told) -> None:
-    told.put("a", 0.02)
-    told.put("b")
+async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(
+    reported: Notified,
+) -> None:
+    reported.put("a", 0.02)
+    reported.put("b")
     await asyncio.sleep(0)
-    told.arming.disarm("No key for a minute: no longer armed.")
-    assert await told.idle() == ["a begun", "a done", "b given up"]
-    assert told.outcome() == (OutcomeKind.REFUSED, "No key for a minute: no longer armed.")
+    reported.arming.disarm("No key for a minute: no longer armed.")
+    assert await reported.idle() == ["a begun", "a done", "b given up"]
+    assert reported.outcome() == (OutcomeKind.REFUSED, "No key for a minute: no longer armed.")
 
 
-async def test_a_task_that_needs_no_arming_is_done_without(told: Told) -> None:
-    told.arming.disarm()
+async def test_a_task_that_needs_no_arming_is_done_without(reported: Notified) -> None:
+    reported.arming.disarm()
     with pytest.raises(NotArmed):
-        told.put("a")
-    told.put("b", armed=False)
-    assert await told.idle() == ["b begun", "b done"]
+        reported.put("a")
+    reported.put("b", armed=False)
+    assert await reported.idle() == ["b begun", "b done"]
 
 
-async def test_a_permit_ends_with_a_stop_and_stays_ended(told: Told) -> None:
-    permit = told.queue.permit()
+async def test_a_permit_ends_with_a_stop_and_stays_ended(reported: Notified) -> None:
+    permit = reported.queue.permit()
     permit.check()
     assert permit.refusal() == ""
-    told.queue.stop("F12")
+    reported.queue.stop("F12")
     for _ in range(2):
         assert permit.refusal() == "Not sent: a stop came after it (F12)."
         with pytest.raises(Stopped):
             permit.check()
         # arming anew lets nothing typed before through
-        told.arming.arm()
+        reported.arming.arm()
     with pytest.raises(Stopped):
-        told.queue.permit(permit.stamp)
-    assert told.queue.permit().refusal() == ""
+        reported.queue.permit(permit.stamp)
+    assert reported.queue.permit().refusal() == ""
 
 
-async def test_a_permit_pauses_while_nothing_is_armed(told: Told) -> None:
-    permit = told.queue.permit()
-    told.arming.disarm("The line was lost: no longer armed.")
+async def test_a_permit_pauses_while_nothing_is_armed(reported: Notified) -> None:
+    permit = reported.queue.permit()
+    reported.arming.disarm("The line was lost: no longer armed.")
     assert permit.refusal() == "The line was lost: no longer armed."
     with pytest.raises(NotArmed, match="The line was lost"):
         permit.check()
     with pytest.raises(NotArmed):
-        told.queue.permit()
+        reported.queue.permit()
 
 
 @pytest.mark.parametrize("end", ["stop", "disarm"])
-async def test_a_task_asks_before_each_frame(told: Told, end: str) -> None:
+async def test_a_task_asks_before_each_frame(reported: Notified, end: str) -> None:
     # it sees the end itself, before the worker hears of being cancelled
-    told.line.cancels_late = True
+    reported.line.cancels_late = True
     frames: list[int] = []
 
     async def carry_out(permit: Permit) -> str:
@@ -310,80 +312,83 @@ async def test_a_task_asks_before_each_frame(told: Told, end: str) -> None:
             permit.check()
             frames.append(number)
             if number == 1:
-                getattr(told.queue if end == "stop" else told.arming, end)()
+                getattr(reported.queue if end == "stop" else reported.arming, end)()
                 if end == "stop":
-                    told.arming.arm()
+                    reported.arming.arm()
             await asyncio.sleep(0)
         return "all went out"
 
-    told.queue.put(Task(carry_out))
-    await told.idle()
+    reported.queue.put(Task(carry_out))
+    await reported.idle()
     assert frames == [0, 1]
-    assert told.outcome()[0] is OutcomeKind.REFUSED
+    assert reported.outcome()[0] is OutcomeKind.REFUSED
 
 
 # Tasks that fail
 
 
-async def test_what_waits_behind_a_failed_task_is_dropped(told: Told) -> None:
+async def test_what_waits_behind_a_failed_task_is_dropped(reported: Notified) -> None:
     refused = OrderRefused("The drive is in fault.")
-    told.put("a", error=refused)
-    told.put("b")
-    told.put("c")
-    assert await told.idle() == ["a begun", "b given up", "c given up", "a given up"]
+    reported.put("a", error=refused)
+    reported.put("b")
+    reported.put("c")
+    assert await reported.idle() == ["a begun", "b given up", "c given up", "a given up"]
     text = "The drive is in fault. The commands behind it were dropped."
-    assert told.outcome() == (OutcomeKind.REFUSED, text)
-    assert told.queue.outcome is not None
-    assert told.queue.outcome.error is refused
-    told.put("d")
-    await told.idle()
-    assert told.outcome() == (OutcomeKind.DONE, "d is done")
+    assert reported.outcome() == (OutcomeKind.REFUSED, text)
+    assert reported.queue.outcome is not None
+    assert reported.queue.outcome.error is refused
+    reported.put("d")
+    await reported.idle()
+    assert reported.outcome() == (OutcomeKind.DONE, "d is done")
 
 
-async def test_a_failed_task_with_nothing_behind_it_drops_nothing(told: Told) -> None:
-    told.put("a", error=OrderRefused("The drive is in fault."))
-    assert await told.idle() == ["a begun", "a given up"]
-    assert told.outcome() == (OutcomeKind.REFUSED, "The drive is in fault.")
+async def test_a_failed_task_with_nothing_behind_it_drops_nothing(reported: Notified) -> None:
+    reported.put("a", error=OrderRefused("The drive is in fault."))
+    assert await reported.idle() == ["a begun", "a given up"]
+    assert reported.outcome() == (OutcomeKind.REFUSED, "The drive is in fault.")
 
 
-async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(told: Told) -> None:
-    told.put("a", error=ZeroDivisionError("none"))
-    told.put("b")
-    assert await told.idle() == ["a begun", "b given up", "a given up"]
-    kind, text = told.outcome()
+async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(reported: Notified) -> None:
+    reported.put("a", error=ZeroDivisionError("none"))
+    reported.put("b")
+    assert await reported.idle() == ["a begun", "b given up", "a given up"]
+    kind, text = reported.outcome()
     assert kind is OutcomeKind.REFUSED
     assert "ZeroDivisionError: none" in text
-    told.put("c")
-    assert (await told.idle())[3:] == ["c begun", "c done"]
+    reported.put("c")
+    assert (await reported.idle())[3:] == ["c begun", "c done"]
 
 
-async def test_a_task_given_up_says_what_was_done_of_it(told: Told) -> None:
-    told.put("a", error=OrderRefused("No."), left="2 written, 6 still staged.")
-    await told.idle()
-    assert told.outcome() == (OutcomeKind.REFUSED, "No. 2 written, 6 still staged.")
-    told.put("b", 5.0, left="3 written, 5 still staged.")
+async def test_a_task_given_up_says_what_was_done_of_it(reported: Notified) -> None:
+    reported.put("a", error=OrderRefused("No."), left="2 written, 6 still staged.")
+    await reported.idle()
+    assert reported.outcome() == (OutcomeKind.REFUSED, "No. 2 written, 6 still staged.")
+    reported.put("b", 5.0, left="3 written, 5 still staged.")
     await asyncio.sleep(0.01)
-    told.queue.stop()
-    await told.idle()
-    assert told.outcome() == (OutcomeKind.REFUSED, "Ended by a stop. 3 written, 5 still staged.")
+    reported.queue.stop()
+    await reported.idle()
+    assert reported.outcome() == (
+        OutcomeKind.REFUSED,
+        "Ended by a stop. 3 written, 5 still staged.",
+    )
 
 
-async def test_one_that_gave_way_to_a_newer_value_says_nothing(told: Told) -> None:
-    told.put("a")
-    told.put("b", error=Superseded(1, 8502))
-    told.put("c")
+async def test_one_that_gave_way_to_a_newer_value_says_nothing(reported: Notified) -> None:
+    reported.put("a")
+    reported.put("b", error=Superseded(1, 8502))
+    reported.put("c")
     # nothing behind it was dropped
-    assert await told.idle() == ["a begun", "a done", "b begun", "c begun", "c done"]
-    assert told.before["c"] == told.before["b"]
-    assert told.before["b"] is not None
-    assert told.before["b"].text == "a is done"
+    assert await reported.idle() == ["a begun", "a done", "b begun", "c begun", "c done"]
+    assert reported.before["c"] == reported.before["b"]
+    assert reported.before["b"] is not None
+    assert reported.before["b"].text == "a is done"
 
 
-async def test_the_drive_is_looked_at_again_behind_every_task(told: Told) -> None:
+async def test_the_drive_is_looked_at_again_behind_every_task(reported: Notified) -> None:
     seen: list[str] = []
-    told.queue.on_change = lambda: seen.append(told.said[-1])
-    told.put("a")
-    told.put("b", error=Superseded(1, 8502))
-    told.put("c", error=OrderRefused("No."))
-    await told.idle()
+    reported.queue.on_change = lambda: seen.append(reported.output[-1])
+    reported.put("a")
+    reported.put("b", error=Superseded(1, 8502))
+    reported.put("c", error=OrderRefused("No."))
+    await reported.idle()
     assert seen == ["a done", "b begun", "c given up"]

@@ -175,7 +175,7 @@ async def test_what_cannot_be_read_back_is_not_known(
 ) -> None:
     await writer(session, journal).write_parameter(PROFILE["CMD"], 7, why="command")
     assert "CMD" not in session.image.raws
-    assert line.asked == []
+    assert line.requested == []
 
 
 async def test_the_journal_tells_units_though_the_scale_was_never_read(
@@ -242,7 +242,7 @@ async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
     assert order == ["read", "write", "read"]
 
 
-def told_of(journal: Journal) -> list[Entry]:
+def abilities_in(journal: Journal) -> list[Entry]:
     """What the journal's files tell, completions apart from what they complete."""
     assert journal.flush(60)
     return [one for one in read_journal(journal.files) if isinstance(one, Entry)]
@@ -259,7 +259,7 @@ async def test_a_lost_answer_is_completed_once_the_drive_is_read(
     # whoever reads it, and for whatever reason
     await Reader(session).read(["ACC"])
     await Reader(session).read(["ACC"])
-    lost, later = told_of(journal)
+    lost, later = abilities_in(journal)
     assert (lost.kind, lost.read_back) == ("write", None)
     assert (later.kind, later.of, later.read_back) == ("read-back", lost.time, 50 if taken else 30)
     (entry,) = completed([lost, later])
@@ -287,7 +287,7 @@ async def test_a_write_that_a_stop_cuts_short_is_not_kept_as_done(
     task.cancel()
     await asyncio.wait([task])
     await Reader(session).read(["ACC"])
-    cut, later = told_of(journal)
+    cut, later = abilities_in(journal)
     assert (cut.answer, later.answer) == (CUT_SHORT, "Not taken: it holds 3.0 s, read back later.")
 
 
@@ -301,7 +301,7 @@ async def test_a_word_that_the_drive_may_change_is_told_and_not_judged(
         )
     line.registers[11] = 1
     await Reader(session).read(["INR"])
-    assert told_of(journal)[-1].answer == "It holds 1, read back later."
+    assert abilities_in(journal)[-1].answer == "It holds 1, read back later."
 
 
 async def test_a_lost_answer_is_not_completed_by_what_a_later_write_left(
@@ -311,7 +311,7 @@ async def test_a_lost_answer_is_not_completed_by_what_a_later_write_left(
     with pytest.raises(NoAnswer):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     await writer(session, journal).write_parameter(PROFILE["ACC"], 40, why="setting")
-    assert [one.kind for one in told_of(journal)] == ["write", "write"]
+    assert [one.kind for one in abilities_in(journal)] == ["write", "write"]
 
 
 async def test_a_refused_write_has_its_answer(
@@ -321,4 +321,4 @@ async def test_a_refused_write_has_its_answer(
     with pytest.raises(DeviceException):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     await Reader(session).read(["ACC"])
-    assert [one.kind for one in told_of(journal)] == ["write"]
+    assert [one.kind for one in abilities_in(journal)] == ["write"]

@@ -20,7 +20,7 @@ def line(*specs: DriveSpec, timing: LineTiming | None = None) -> SimulatedLine:
     return SimulatedLine(drives, timing)
 
 
-def asked(on: SimulatedLine, address: int, pdu: bytes) -> bytes | None:
+def requested(on: SimulatedLine, address: int, pdu: bytes) -> bytes | None:
     reply = on.receive(seal(bytes([address]) + pdu))
     return reply.data[:-2] if reply else None
 
@@ -38,30 +38,30 @@ TWO = (DriveSpec("atv71", 2), DriveSpec("atv21", 3))
 
 def test_each_drive_answers_at_its_own_address_only() -> None:
     on = line(*TWO)
-    assert asked(on, 2, read(9001)) == bytes.fromhex("020302001E")
-    assert asked(on, 3, read(9)) == bytes.fromhex("0303020064")
-    assert asked(on, 4, read(9)) is None
+    assert requested(on, 2, read(9001)) == bytes.fromhex("020302001E")
+    assert requested(on, 3, read(9)) == bytes.fromhex("0303020064")
+    assert requested(on, 4, read(9)) is None
 
 
 def test_a_broadcast_is_obeyed_by_all_and_answered_by_none() -> None:
     on = line(DriveSpec("atv71", 2), DriveSpec("atv312", 3))
-    assert asked(on, 0, write(9001, 55)) is None
+    assert requested(on, 0, write(9001, 55)) is None
     assert [on.drive(a).raw("ACC") for a in (2, 3)] == [55, 55]
 
 
 def test_only_the_functions_that_may_be_broadcast_are_obeyed() -> None:
     on = line(DriveSpec("powerdrive", 2), DriveSpec("atv71", 3))
     many = struct.pack(">BHHBH", 16, 104, 1, 2, 7)
-    assert asked(on, 0, many) is None
+    assert requested(on, 0, many) is None
     assert on.drive(2).raw("1.05") == 0, "Leroy-Somer: function 6 only"
-    asked(on, 0, write(104, 7))
+    requested(on, 0, write(104, 7))
     assert on.drive(2).raw("1.05") == 7
-    asked(on, 0, struct.pack(">BHHHHBH", 23, 9001, 1, 9001, 1, 2, 9))
+    requested(on, 0, struct.pack(">BHHHHBH", 23, 9001, 1, 9001, 1, 2, 9))
     assert on.drive(3).raw("ACC") == 30
 
 
 @pytest.mark.parametrize(
-    ("own", "called", "meant"),
+    ("own", "called", "intended"),
     [
         (11, 10, True),
         (19, 10, True),
@@ -75,24 +75,24 @@ def test_only_the_functions_that_may_be_broadcast_are_obeyed() -> None:
         (5, 0, False),
     ],
 )
-def test_group_addresses(own: int, called: int, meant: bool) -> None:
-    assert in_group(own, called) is meant
+def test_group_addresses(own: int, called: int, intended: bool) -> None:
+    assert in_group(own, called) is intended
 
 
 def test_a_group_is_obeyed_in_silence_by_leroy_somer_drives() -> None:
     on = line(DriveSpec("powerdrive", 12), DriveSpec("powerdrive", 15), DriveSpec("atv71", 21))
-    assert asked(on, 10, write(104, 9)) is None
+    assert requested(on, 10, write(104, 9)) is None
     assert [on.drive(a).raw("1.05") for a in (12, 15)] == [9, 9]
-    assert asked(on, 10, read(104)) is None
+    assert requested(on, 10, read(104)) is None
 
 
 def test_an_altivar_answers_at_an_address_with_a_zero() -> None:
     on = line(DriveSpec("powerdrive", 12), DriveSpec("atv71", 10))
-    assert asked(on, 10, read(9001)) == bytes.fromhex("0A0302001E")
+    assert requested(on, 10, read(9001)) == bytes.fromhex("0A0302001E")
 
 
 def test_a_leroy_somer_drive_never_answers_at_a_group_address() -> None:
-    assert asked(line(DriveSpec("powerdrive", 10)), 10, read(104)) is None
+    assert requested(line(DriveSpec("powerdrive", 10)), 10, read(104)) is None
 
 
 # Servers
@@ -101,29 +101,29 @@ def test_a_leroy_somer_drive_never_answers_at_a_group_address() -> None:
 def test_an_atv71_has_three_servers_each_at_its_address() -> None:
     sets = {"AMOA": 54, "AMOC": 104, "%MW20": 0x54, "IPC1": 139}
     on = line(DriveSpec("atv71", 2, sets=sets))
-    assert asked(on, 2, read(9001)) is not None
-    assert asked(on, 54, read(20, 2)) == bytes.fromhex("36030400540000")
-    assert asked(on, 104, read(60006)) == bytes.fromhex("680302008B")
-    assert asked(on, 54, read(9001)) == bytes.fromhex("368302")
-    assert asked(on, 104, write(60006, 1)) == bytes.fromhex("688604")
-    assert asked(on, 54, write(20, 7)) == bytes.fromhex("360600140007")
-    assert asked(on, 54, read(20)) == bytes.fromhex("3603020007")
+    assert requested(on, 2, read(9001)) is not None
+    assert requested(on, 54, read(20, 2)) == bytes.fromhex("36030400540000")
+    assert requested(on, 104, read(60006)) == bytes.fromhex("680302008B")
+    assert requested(on, 54, read(9001)) == bytes.fromhex("368302")
+    assert requested(on, 104, write(60006, 1)) == bytes.fromhex("688604")
+    assert requested(on, 54, write(20, 7)) == bytes.fromhex("360600140007")
+    assert requested(on, 54, read(20)) == bytes.fromhex("3603020007")
 
 
 def test_a_server_whose_address_is_0_is_off() -> None:
     on = line(DriveSpec("atv71", 2))
-    assert asked(on, 54, read(20)) is None
+    assert requested(on, 54, read(20)) is None
 
 
 def test_a_cards_requests_do_not_feed_the_drives_watch_nor_its_counters() -> None:
     on = line(DriveSpec("atv71", 2, sets={"AMOA": 54, "TTO": 10}))
     drive = on.drive(2)
-    asked(on, 2, write(8501, 0))
+    requested(on, 2, write(8501, 0))
     for _ in range(4):
         drive.step(0.3)
-        asked(on, 54, read(20))
+        requested(on, 54, read(20))
     assert drive.fault is not None
-    assert asked(on, 2, bytes.fromhex("08000E0000")) == bytes.fromhex("0208000E0002")
+    assert requested(on, 2, bytes.fromhex("08000E0000")) == bytes.fromhex("0208000E0002")
 
 
 # What a drive does not understand
@@ -134,7 +134,7 @@ def test_a_frame_with_a_wrong_checksum_is_counted_by_the_drive_it_is_for() -> No
     frame = bytearray(seal(b"\x02" + read(9001)))
     frame[-1] ^= 1
     assert on.receive(bytes(frame)) is None
-    assert asked(on, 2, bytes.fromhex("08000C0000")) == bytes.fromhex("0208000C0001")
+    assert requested(on, 2, bytes.fromhex("08000C0000")) == bytes.fromhex("0208000C0001")
 
 
 def test_two_frames_in_one_are_not_understood() -> None:
@@ -150,24 +150,24 @@ def test_fragments_are_ignored(garbage: str) -> None:
 def test_a_drive_without_supply_is_silent() -> None:
     on = line(*TWO)
     on.drive(2).power_off()
-    assert asked(on, 2, read(9001)) is None
+    assert requested(on, 2, read(9001)) is None
     on.drive(2).power_on()
-    assert asked(on, 2, read(9001)) is not None
+    assert requested(on, 2, read(9001)) is not None
 
 
 def test_a_drive_takes_the_lines_settings_and_is_deaf_once_it_has_others() -> None:
     on = line(DriveSpec("atv71", 2), timing=LineTiming(9600, "8N2"))
     drive = on.drive(2)
     assert (drive.raw("TBR"), drive.raw("TFO")) == (28, 5)
-    asked(on, 2, write(6003, 32))
-    assert asked(on, 2, read(9001)) is not None, "not before the next power-up"
-    asked(on, 2, write(8504, 2))
+    requested(on, 2, write(6003, 32))
+    assert requested(on, 2, read(9001)) is not None, "not before the next power-up"
+    requested(on, 2, write(8504, 2))
     drive.power_cycle()
-    assert asked(on, 2, read(9001)) is None
+    assert requested(on, 2, read(9001)) is None
 
 
 def test_a_set_baud_of_another_line_makes_a_drive_deaf() -> None:
-    assert asked(line(DriveSpec("atv71", 2, sets={"TBR": 28})), 2, read(9001)) is None
+    assert requested(line(DriveSpec("atv71", 2, sets={"TBR": 28})), 2, read(9001)) is None
 
 
 def test_an_address_nobody_has_is_told() -> None:
@@ -195,13 +195,13 @@ def test_the_turnaround_is_that_of_the_profile_or_of_the_drives_delay() -> None:
     on = line(DriveSpec("atv71", 2), DriveSpec("powerdrive", 3))
     assert on.drive(2).station.turnaround == pytest.approx(0.005)
     assert on.drive(3).station.turnaround == pytest.approx(0.010)
-    asked(on, 3, write(1505, 40))
+    requested(on, 3, write(1505, 40))
     assert on.drive(3).station.turnaround == pytest.approx(0.040)
 
 
 def test_another_protocol_makes_an_altivar_21_deaf_after_the_next_power_up() -> None:
     on = line(*TWO)
-    assert asked(on, 3, write(0x829, 2)) is not None
-    assert asked(on, 3, read(9)) is not None
+    assert requested(on, 3, write(0x829, 2)) is not None
+    assert requested(on, 3, read(9)) is not None
     on.drive(3).power_cycle()
-    assert asked(on, 3, read(9)) is None
+    assert requested(on, 3, read(9)) is None

@@ -265,7 +265,7 @@ def test_a_closed_run_input_starts_a_leroy_somer_drive_after_a_reset() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "reported"),
     [
         ("li1", "1", "LI1 = 1"),
         ("LI6", " on ", "LI6 = 1"),
@@ -275,8 +275,8 @@ def test_a_closed_run_input_starts_a_leroy_somer_drive_after_a_reset() -> None:
         ("AI2", "33%", "AI2 = 33 %"),
     ],
 )
-def test_inputs_as_a_person_types_them(name: str, text: str, told: str) -> None:
-    assert Terminals(COMPACT).set(name, text) == told
+def test_inputs_as_a_person_types_them(name: str, text: str, reported: str) -> None:
+    assert Terminals(COMPACT).set(name, text) == reported
 
 
 @pytest.mark.parametrize(
@@ -298,4 +298,4 @@ def test_inputs_that_are_refused(name: str, text: str, why: str) -> None:
 def test_all_inputs_in_a_line() -> None:
     terminals = Terminals(BY_KIND["altivar21"])
     terminals.set("F", "1")
-    assert terminals.told() == "closed of F, R, RES: F; VIA 0 %, VIB 0 %"
+    assert terminals.reported() == "closed of F, R, RES: F; VIA 0 %, VIB 0 %"

@@ -73,22 +73,22 @@ COLORS = [
 
 @pytest.mark.parametrize(("environment", "colors"), COLORS)
 def test_terminfo_tells_the_colors(environment: dict[str, str], colors: ColorSystem | None) -> None:
-    assert told_of(environment).colors == colors
+    assert abilities_in(environment).colors == colors
 
 
 @pytest.mark.parametrize("term", ["vt100", "nobody-knows", "dumb", "screen"])
 def test_only_a_terminal_that_erases_in_color_is_let_erase(term: str) -> None:
-    assert not told_of({"TERM": term}).erases
+    assert not abilities_in({"TERM": term}).erases
 
 
-def told_of(environment: dict[str, str]) -> Abilities:
+def abilities_in(environment: dict[str, str]) -> Abilities:
     """What is found in a process of its own: terminfo is looked at once in each."""
     code = (
         "import sys, pickle; from tui.terminal.abilities import abilities_of;"
         f"sys.stdout.buffer.write(pickle.dumps(abilities_of({environment!r})))"
     )
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
-    found = pickle.loads(told)
+    reported = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+    found = pickle.loads(reported)
     assert isinstance(found, Abilities)
     return found
 

@@ -47,7 +47,7 @@ class OtherDriver(Driver):
 
     def __init__(self, app: Any, **settings: Any) -> None:
         super().__init__(app, **settings)
-        self.mouse_asked = self._mouse
+        self.mouse_enabled = self._mouse
         self.written: list[str] = []
         self.passed: list[Message] = []
 
@@ -79,7 +79,7 @@ def test_without_mouse_less_is_asked_of_the_terminal() -> None:
     for data in ASKED:
         driver.write(data)
     assert driver.written == ["\x1b[?25l", NO_REPORTS, "\x1b[1;1Htext"]
-    assert not driver.mouse_asked
+    assert not driver.mouse_enabled
 
 
 def test_with_mouse_all_is_asked_as_textual_does() -> None:
@@ -87,8 +87,8 @@ def test_with_mouse_all_is_asked_as_textual_does() -> None:
     for data in ASKED:
         driver.write(data)
     assert driver.written == ASKED
-    assert driver.mouse_asked
-    assert not made(Stops(mouse=True), mouse=False).mouse_asked
+    assert driver.mouse_enabled
+    assert not made(Stops(mouse=True), mouse=False).mouse_enabled
 
 
 def test_where_textual_reads_the_keys_stop_keys_are_taken_early_all_the_same() -> None:

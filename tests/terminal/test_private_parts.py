@@ -200,9 +200,9 @@ def _updates_go_through_display() -> bool:
     from textual.screen import Screen
 
     sends = inspect.getsource(App._display)
-    asked = inspect.signature(App._display).parameters
+    requested = inspect.signature(App._display).parameters
     return (
-        list(asked) == ["self", "screen", "renderable"]
+        list(requested) == ["self", "screen", "renderable"]
         and "isinstance(renderable, CompositorUpdate)" in sends
         and "app._display(self, " in inspect.getsource(Screen)
     )
@@ -227,8 +227,8 @@ def _updates_have_a_beginning_and_an_end() -> bool:
 
     sends = inspect.getsource(App._display)
     both = inspect.getsource(App._begin_update) + inspect.getsource(App._end_update)
-    asked = both.count("if self._sync_available and self._driver is not None:") == 2
-    return asked and "self._begin_update()" in sends and "self._end_update()" in sends
+    requested = both.count("if self._sync_available and self._driver is not None:") == 2
+    return requested and "self._begin_update()" in sends and "self._end_update()" in sends
 
 
 def _loop_is_there_while_the_app_runs() -> bool:
@@ -493,22 +493,24 @@ def test_the_versions_are_those_that_were_looked_at(package: str) -> None:
     import tomli
 
     needed = tomli.loads(PROJECT.read_text(encoding="utf-8"))["project"]["dependencies"]
-    asked = next(one for one in map(Requirement, needed) if one.name == package)
-    assert str(asked.specifier) == VERSIONS[package], "look at what follows, then change VERSIONS"
-    assert asked.specifier.contains(version(package))
+    requested = next(one for one in map(Requirement, needed) if one.name == package)
+    assert str(requested.specifier) == VERSIONS[package], (
+        "look at what follows, then change VERSIONS"
+    )
+    assert requested.specifier.contains(version(package))
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 def test_a_private_part_of_textual_is_what_it_was(part: Part) -> None:
-    told = (
+    reported = (
         f"Textual {version('textual')}: {part.name} is not what tui/terminal/{part.used_in}"
         f" needs. Look at {part.look_at}."
     )
     try:
         still = part.still()
     except (ImportError, AttributeError, KeyError, TypeError, ValueError) as gone:
-        pytest.fail(f"{told} {gone!r}")
-    assert still, told
+        pytest.fail(f"{reported} {gone!r}")
+    assert still, reported
 
 
 def test_every_private_part_that_is_used_has_a_check_in_the_right_module() -> None:

@@ -98,10 +98,10 @@ def test_keys_of_a_piece_know_how_many_they_are() -> None:
     assert [(key.stroke.piece, key.stroke.acts) for key in keys] == [(3, False)] * 3
 
 
-@pytest.mark.parametrize("said", [*REPORTS.values(), *REPLIES.values()])
-def test_what_a_terminal_says_of_itself_is_no_part_of_a_piece(said: str) -> None:
-    for cut in range(len(said) + 1):
-        first, second = said[:cut].encode(), said[cut:].encode()
+@pytest.mark.parametrize("output", [*REPORTS.values(), *REPLIES.values()])
+def test_what_a_terminal_says_of_itself_is_no_part_of_a_piece(output: str) -> None:
+    for cut in range(len(output) + 1):
+        first, second = output[:cut].encode(), output[cut:].encode()
         taken, keys, found = read((1.0, b"r" + first), (1.02, second))
         assert taken == []
         assert [(key.name, key.stroke.alone) for key in keys] == [("r", True)], (first, second)

@@ -293,8 +293,8 @@ def look_of(raws: Mapping[str, int], *, age: float = 0.0) -> Look:
     """What a look at an Altivar 71 that holds this has brought, so many seconds ago."""
     profile = library.load("atv71")
     readings = readings_of(profile, raws, NOW - age)
-    told = {code: readings[code] for code in ("RFR", "FRH", "LCR")}
-    return Look(drive_state(profile, readings), "", NOW - age, None, told)
+    reported = {code: readings[code] for code in ("RFR", "FRH", "LCR")}
+    return Look(drive_state(profile, readings), "", NOW - age, None, reported)
 
 
 class StillFleet(Fleet):

@@ -41,10 +41,10 @@ async def to_blocks(made: Bench, sees: str = "ETA") -> None:
 
 
 async def message(made: Bench, *parts: str) -> None:
-    def said() -> str:
+    def output() -> str:
         return " ".join(f"{shown(made.app, 'said')} {shown(made.app, 'detail')}".split())
 
-    await until(made.pilot, lambda: all(part in said() for part in parts))
+    await until(made.pilot, lambda: all(part in output() for part in parts))
 
 
 def block_editor(made: Bench) -> BlockEditor:

@@ -60,7 +60,7 @@ class Bench(NamedTuple):
 
     async def message(self, *parts: str) -> None:
         """Wait until Monitor says all of this: its lowest lines and the newest message."""
-        await until(self.pilot, lambda: all(p in said(self.app) for p in parts))
+        await until(self.pilot, lambda: all(p in output(self.app) for p in parts))
 
     async def armed(self) -> None:
         await self.pilot.press("a")
@@ -122,7 +122,7 @@ class Bench(NamedTuple):
         await until(self.pilot, lambda: self.speed(device) == 0)
 
 
-def said(app: DrivePanelApp) -> str:
+def output(app: DrivePanelApp) -> str:
     """What Monitor says below its values, and the newest message, on one line."""
     return " ".join(f"{shown(app, 'message')} {shown(app, 'said')}".split())
 
@@ -258,7 +258,7 @@ async def test_nothing_is_commanded_before_arming() -> None:
     async with bench("atv71") as made:
         for key in ("r", "v", "f", "up", "pagedown", "o", "t", "g"):
             made.app.events.add("told", f"{key} is next")
-            await until(made.pilot, lambda: "is next" in said(made.app))
+            await until(made.pilot, lambda: "is next" in output(made.app))
             await made.pilot.press(key)
             await made.message("a arms this drive")
         assert made.drive().raw("CMD") == 0
@@ -327,7 +327,7 @@ def follows(app: DrivePanelApp) -> str:
 
 
 @pytest.mark.parametrize(
-    ("family", "closed", "said"),
+    ("family", "closed", "output"),
     [
         ("atv71", "LI3", ("on a new run command", "Closed at the terminals now: LI3.")),
         ("atv21", "F", ("a run input that is closed", "Closed at the terminals now: F.")),
@@ -335,7 +335,7 @@ def follows(app: DrivePanelApp) -> str:
     ],
 )
 async def test_reset_question_names_channel_and_closed_inputs(
-    family: str, closed: str, said: tuple[str, str]
+    family: str, closed: str, output: tuple[str, str]
 ) -> None:
     async with bench(family) as made:
         made.drive().terminals.close(closed)
@@ -344,7 +344,7 @@ async def test_reset_question_names_channel_and_closed_inputs(
         await made.armed()
         await made.pilot.press("x")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
-        await until(made.pilot, lambda: all(part in follows(made.app) for part in said))
+        await until(made.pilot, lambda: all(part in follows(made.app) for part in output))
         assert "Nothing runs" not in follows(made.app)
         await made.pilot.press("escape")
 
@@ -420,10 +420,10 @@ async def test_stop_works_on_every_screen() -> None:
                 await made.pilot.press("escape")
 
 
-def told(app: DrivePanelApp) -> str:
+def reported(app: DrivePanelApp) -> str:
     """What was said, the toasts for a motor that does not stop included."""
-    said = [event.text for event in app.events.events]
-    return " ".join([*said, *(one.message for one in app._notifications)])
+    output = [event.text for event in app.events.events]
+    return " ".join([*output, *(one.message for one in app._notifications)])
 
 
 async def test_space_stops_outside_texts_only() -> None:

@@ -9,7 +9,7 @@ from tui.screens.monitor.screen import MonitorScreen
 from tui.simulator import DriveSpec
 
 from .test_flows import shown, until
-from .test_search_flows import panel, said
+from .test_search_flows import output, panel
 
 
 @pytest.fixture(autouse=True)
@@ -23,15 +23,15 @@ async def test_a_drive_is_not_armed_by_a_profile_that_it_contradicts() -> None:
         field = app.connection.query_one("#profile", Input)
         field.value = "atv312"
         await pilot.press("s")
-        told = "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312."
-        await until(pilot, lambda: any(one.startswith(told) for one in said(app)))
+        reported = "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312."
+        await until(pilot, lambda: any(one.startswith(reported) for one in output(app)))
         way = "Not armed: the profile is not its own. Type atv71 beside Profile, then s."
         await until(pilot, lambda: way in shown(app, "about"))
         app.connection.drives.focus()
         await pilot.press("enter")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         await pilot.press("a")
-        await until(pilot, lambda: said(app)[-1].startswith(f"Not armed: {told}"))
+        await until(pilot, lambda: output(app)[-1].startswith(f"Not armed: {reported}"))
         console = app.connection.found[1].console
         assert console is not None
         assert console.commander.armed_for is None

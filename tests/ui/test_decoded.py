@@ -25,7 +25,7 @@ def no_raws(device: int) -> Mapping[str, int]:
     return {"INR": 1}
 
 
-def told(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
+def reported(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
     """What frames say; each its direction and its bytes without the checksum."""
     made = []
     for direction, text in frames:
@@ -36,7 +36,7 @@ def told(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("frames", "said"),
+    ("frames", "output"),
     [
         ([(">", "02 03 0C81 0001"), ("<", "02 03 02 0637")], ["2 read ETA", "2 ETA 16#0637"]),
         ([(">", "02 06 2329 0032")], ["2 write ACC ← 5.0 s"]),
@@ -49,16 +49,16 @@ def told(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
         ([(">", "02 2B 0E 01 00")], ["2 identify"]),
     ],
 )
-def test_what_frames_say(frames: list[tuple[str, str]], said: list[str]) -> None:
-    assert told(*frames) == said
+def test_what_frames_say(frames: list[tuple[str, str]], output: list[str]) -> None:
+    assert reported(*frames) == output
 
 
 def test_a_reply_of_another_drive_is_not_told_by_the_last_request() -> None:
-    assert told((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 words"
+    assert reported((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 words"
 
 
 def test_modbus_tcp_has_its_head_before_the_device() -> None:
-    assert told((">", "0001 0000 0006 02 03 0C81 0001"), tcp=True) == ["2 read ETA"]
+    assert reported((">", "0001 0000 0006 02 03 0C81 0001"), tcp=True) == ["2 read ETA"]
 
 
 @given(

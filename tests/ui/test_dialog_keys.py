@@ -155,8 +155,8 @@ async def test_the_stop_key_at_the_bottom_is_the_one_that_stops(
             app.push_screen(make(app, console))
             await until(pilot, lambda: app.screen is not below and app.focused is not None)  # noqa: B023
             stops = app.take_stop_key("space")
-            said = " Space STOP 2  F9 STOP ALL" if stops else " F12 STOP 2  F9 STOP ALL"
-            await until(pilot, lambda: bottom(app).rstrip() == said)  # noqa: B023
+            output = " Space STOP 2  F9 STOP ALL" if stops else " F12 STOP 2  F9 STOP ALL"
+            await until(pilot, lambda: bottom(app).rstrip() == output)  # noqa: B023
             assert stopped == [False] * stops, name
             assert app.take_stop_key("f12")
             assert app.take_stop_key("f9")
@@ -316,8 +316,8 @@ CHECKS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
 def test_what_is_typed_or_pasted_is_refused_and_ends_nothing(name: str) -> None:
     check, texts = CHECKS[name]
     for text in texts:
-        told = check(text)
-        assert told or text == "f", text[:20]
+        reported = check(text)
+        assert reported or text == "f", text[:20]
 
 
 async def test_a_key_that_means_nothing_to_a_dialog_reports_where_it_works(

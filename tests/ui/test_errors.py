@@ -157,9 +157,9 @@ async def test_an_error_of_the_panel_itself_leaves_one_line_and_no_traceback(
 
     with pytest.raises(RuntimeError, match="a screw is loose"):
         await run()
-    said = capsys.readouterr()
-    assert "Traceback" not in said.out + said.err
-    assert "The panel had to stop" in said.err
+    output = capsys.readouterr()
+    assert "Traceback" not in output.out + output.err
+    assert "The panel had to stop" in output.err
     assert app.return_code == 1
 
 

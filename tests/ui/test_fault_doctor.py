@@ -23,7 +23,7 @@ def view(raw: int | None, **more: object) -> DoctorView:
     return replace(made, **more)  # type: ignore[arg-type]
 
 
-def told(shown: DoctorView, width: int = 80, height: int = 20) -> str:
+def reported(shown: DoctorView, width: int = 80, height: int = 20) -> str:
     return "\n".join(line.plain.rstrip() for line in doctor_lines(shown, width, height))
 
 
@@ -35,7 +35,7 @@ def test_every_fault_is_told_without_a_cut_at_80_columns(family: str) -> None:
         if help_ is None:
             continue
         shown = view(None, profile=profile, fault=fault)
-        text = told(shown, 80, 40)
+        text = reported(shown, 80, 40)
         for part in (*help_.probable, *help_.check, *(look.why for look in help_.look_at)):
             assert part in text, (fault.code, part)
         assert "…" not in text.partition("Probably")[2], fault.code
@@ -43,24 +43,24 @@ def test_every_fault_is_told_without_a_cut_at_80_columns(family: str) -> None:
 
 
 def test_general_practice_is_said_to_be_so() -> None:
-    practice = told(view(1))
+    practice = reported(view(1))
     assert "practice" in practice.partition("Probably")[2].splitlines()[0]
-    guide = told(view(18))
+    guide = reported(view(18))
     assert guide.partition("Probably")[2].splitlines()[0].endswith("guide")
     assert guide.partition("Check")[2].splitlines()[0].endswith("practice")
     assert guide.partition("Reset")[2].splitlines()[0].endswith("practice")
 
 
 def test_the_drive_says_whether_a_reset_works() -> None:
-    for raw, said in ((0x0004, "x works now"), (0, "Not yet, says the drive")):
-        text = told(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW)))
-        assert said in text
+    for raw, output in ((0x0004, "x works now"), (0, "Not yet, says the drive")):
+        text = reported(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW)))
+        assert output in text
         assert "practice" not in text.partition("Reset")[2].splitlines()[0]
     old = {
         code: reading.aged(NOW + 60, 6.0)
         for code, reading in readings_of(ATV71, {"ETI": 4}, NOW).items()
     }
-    text = told(view(9, readings=old)).replace(" practice", "")
+    text = reported(view(9, readings=old)).replace(" practice", "")
     assert "x does nothing" in " ".join(text.split())
 
 
@@ -70,7 +70,7 @@ def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None
     for eti in (None, 0, 4):
         readings = {} if eti is None else readings_of(ATV71, {"ETI": eti}, NOW)
         shown = view(raw, readings=readings)
-        text = told(shown, width, height)
+        text = reported(shown, width, height)
         whole = reset_text(shown.help, shown.ready, "x", shown.follows).text
         ends = " ".join(text.partition("Reset")[2].partition("History")[0].split())
         assert whole in ends.replace(" practice", ""), text
@@ -81,28 +81,28 @@ def test_which_input_tripped_it_is_told_at_80_columns() -> None:
     """'Logic input ...' and 16#000C told nobody where to look."""
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
-    text = told(view(external.raw, readings=read))
+    text = reported(view(external.raw, readings=read))
     assert "ETF    Logic input LI4 input or bit that trips it     Enter opens" in text
     assert "IL1R   LI3, LI4        state of the inputs now" in text
-    still = told(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))
+    still = reported(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))
     assert "IL1R   none " in still
 
 
 def test_an_alarm_points_at_something_too() -> None:
-    text = told(view(None, present=False, alarms=[("LRS6", 8, "Undervoltage alarm")]))
+    text = reported(view(None, present=False, alarms=[("LRS6", 8, "Undervoltage alarm")]))
     for part in ("UNDERVOLTAGE ALARM", "alarm, no fault", "Mains low or a dip", "ULN", "practice"):
         assert part in text
     assert "Reset" not in text
     both = view(18, alarms=[("LRS6", 8, "Undervoltage alarm")])
-    assert "OVERBRAKING" in told(both)
-    assert "UNDERVOLTAGE" not in told(both)
+    assert "OVERBRAKING" in reported(both)
+    assert "UNDERVOLTAGE" not in reported(both)
 
 
 def test_a_help_file_that_cannot_be_read_is_told() -> None:
     profile = library.load_file(library.packaged_folder() / "atv71.toml")
     profile.guide.__dict__["_found"] = ({}, {})
     profile.guide.trouble = "mine.toml:3: there is no such fault."
-    assert "mine.toml:3" in told(view(18, profile=profile))
+    assert "mine.toml:3" in reported(view(18, profile=profile))
 
 
 async def test_a_live_value_follows_the_drive() -> None:
@@ -124,14 +124,14 @@ async def test_the_line_of_keys_stays_at_the_foot() -> None:
 
 
 def test_nothing_is_told_of_no_fault() -> None:
-    text = told(view(None, present=False))
+    text = reported(view(None, present=False))
     assert "No fault now" in text
     assert "Probably" not in text
 
 
 def test_no_history_is_read_where_a_family_has_none() -> None:
     profile = library.load("powerdrive")
-    text = told(view(None, profile=profile, present=False, unread=True))
+    text = reported(view(None, profile=profile, present=False, unread=True))
     assert "not known on this drive" in text
     assert "reading the history" not in text
 
@@ -141,7 +141,7 @@ def test_the_fault_before_the_last_is_not_shown_as_the_last(family: str) -> None
     profile = library.load(family)
     raws = {"LFt": 18, "DP1": 9, "DP2": 5}
     shown = view(None, profile=profile, present=False, readings=readings_of(profile, raws, NOW))
-    rows = told(shown).partition("History")[2].splitlines()
+    rows = reported(shown).partition("History")[2].splitlines()
     last, second, third = (profile.fault(raw) for raw in raws.values())
     for row, number, fault in zip(rows, ("last", "2", "3"), (last, second, third), strict=False):
         assert fault is not None
@@ -154,34 +154,36 @@ BRAKING = {"BRA": 1, "VCAL": 4, "ULP0": 2280, "DEC": 30}
 
 def test_advice_that_a_value_rules_out_is_not_given() -> None:
     fault = readings_of(ATV71, BRAKING, NOW)
-    text = told(view(18, readings=fault), 100, 30)
+    text = reported(view(18, readings=fault), 100, 30)
     assert "(ruled out, BRA Yes) No resistor fitted" in text
     assert "(ruled out, ULP0 228.0 V) Mains voltage already high" in text
     assert text.index("The load drives the motor") < text.index("Mains voltage already high")
-    open_ = told(view(18, readings=readings_of(ATV71, {**BRAKING, "BRA": 0, "ULP0": 2580}, NOW)))
+    open_ = reported(
+        view(18, readings=readings_of(ATV71, {**BRAKING, "BRA": 0, "ULP0": 2580}, NOW))
+    )
     assert "ruled out" not in open_
     assert "No resistor fitted: BRA on" in open_
 
 
 def test_no_value_that_is_unknown_or_older_fault_rules_anything_out() -> None:
-    assert "ruled out" not in told(view(18))
+    assert "ruled out" not in reported(view(18))
     without_range = {code: raw for code, raw in BRAKING.items() if code not in ("VCAL", "BRA")}
-    assert "ruled out" not in told(view(18, readings=readings_of(ATV71, without_range, NOW)))
+    assert "ruled out" not in reported(view(18, readings=readings_of(ATV71, without_range, NOW)))
     older = view(18, present=False, readings=readings_of(ATV71, BRAKING, NOW))
-    assert "ULP0 228.0 V)" not in told(older, 100, 30)
-    assert "BRA Yes)" in told(older, 100, 30)
+    assert "ULP0 228.0 V)" not in reported(older, 100, 30)
+    assert "BRA Yes)" in reported(older, 100, 30)
 
 
 def test_a_value_of_now_does_not_exclude_what_was() -> None:
     profile = library.load("atv312")
     now = readings_of(profile, {"ULn": 2280, "VCAL": 2}, NOW)
-    text = told(view(None, profile=profile, fault=profile.fault(18), readings=now), 100, 30)
+    text = reported(view(None, profile=profile, fault=profile.fault(18), readings=now), 100, 30)
     assert "(not now, ULn 228.0 V) Mains voltage already high" in text
 
 
 def test_the_cause_that_becomes_the_first_is_not_shown_as_surely_known() -> None:
     readings = readings_of(ATV71, {"VCAL": 4, "ULP0": 2280}, NOW)
-    text = told(view(19, readings=readings), 100, 30)
+    text = reported(view(19, readings=readings), 100, 30)
     assert text.partition("Probably")[2].splitlines()[0].endswith("practice")
 
 

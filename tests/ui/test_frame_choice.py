@@ -37,7 +37,7 @@ READ, REFUSED, SILENT, TO_ALL, LATE, LAST = [0, 1], [2, 3], [4], [5], [6, 7], [8
 EVERYTHING = list(range(len(LOG)))
 
 
-def told(frames: Sequence[Frame]) -> list[str]:
+def reported(frames: Sequence[Frame]) -> list[str]:
     return decoded(frames, lambda _: ATV71, lambda _: {"INR": 1}, tcp=False)
 
 
@@ -64,20 +64,20 @@ def told(frames: Sequence[Frame]) -> list[str]:
     ],
 )
 def test_what_was_typed_chooses_whole_exchanges(typed: str, shown: list[int]) -> None:
-    assert chosen(LOG, choice_of(typed), told, tcp=False) == shown
+    assert chosen(LOG, choice_of(typed), reported, tcp=False) == shown
 
 
 def test_a_number_is_a_drive_and_bytes_are_found_by_their_letters() -> None:
     assert choice_of("2329") == FrameChoice(devices=frozenset({2329}))
     assert choice_of("0c81").words == ("0c81",)
-    assert chosen(LOG, choice_of("0c81"), told, tcp=False) == [*READ, *SILENT, *LAST]
+    assert chosen(LOG, choice_of("0c81"), reported, tcp=False) == [*READ, *SILENT, *LAST]
 
 
 @given(typed=st.text(max_size=20), data=st.lists(st.binary(max_size=12), max_size=6))
 @pytest.mark.sweep
 def test_whatever_is_typed_chooses_frames_that_are_there(typed: str, data: list[bytes]) -> None:
     log = [Frame(0.0, "out" if at % 2 else "in", one) for at, one in enumerate(data)]
-    found = chosen(log, choice_of(typed), told, tcp=False)
+    found = chosen(log, choice_of(typed), reported, tcp=False)
     assert found == sorted(set(found) & set(range(len(log))))
 
 
@@ -94,8 +94,8 @@ def test_the_time_of_day_has_its_thousandths(utc: None) -> None:
 
 
 def test_what_is_kept_has_a_line_a_frame_with_its_gap_on_the_line(utc: None) -> None:
-    places = chosen(LOG, choice_of("write 2"), told, tcp=False)
-    words = [told(LOG)[at] for at in places]
+    places = chosen(LOG, choice_of("write 2"), reported, tcp=False)
+    words = [reported(LOG)[at] for at in places]
     text = frames_text(LOG, places, words, 1_795_259_250.0, ["ttyUSB0", "2 frames"])
     head, count, titles, *lines = text.splitlines()
     assert (head, count) == ("# ttyUSB0", "# 2 frames")

@@ -37,8 +37,8 @@ def log() -> tuple[Frame, ...]:
     frames = []
     for number in range(24):
         at = fakes.NOW - 30.0 + 0.4 * number
-        asked, answered = ASKED[number % 4], ANSWERED[number % 4]
-        frames.append(Frame(at, "out", sealed(bytes.fromhex(asked))))
+        requested, answered = ASKED[number % 4], ANSWERED[number % 4]
+        frames.append(Frame(at, "out", sealed(bytes.fromhex(requested))))
         if answered:
             note = "damaged" if number == 6 else ""
             frames.append(Frame(at + 0.0123, "in", sealed(bytes.fromhex(answered)), note))

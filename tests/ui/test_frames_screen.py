@@ -173,7 +173,7 @@ async def test_the_drives_own_counters_are_reset_after_a_question_only() -> None
             if ended:
                 screen.session.arming.disarm("No key for a minute: no longer armed.")
             await made.pilot.press("y")
-            said = "Counters not reset: " if ended else "counters are reset"
-            await made.until(lambda said=said: said in made.shown("said"))  # type: ignore[misc]
+            output = "Counters not reset: " if ended else "counters are reset"
+            await made.until(lambda output=output: output in made.shown("said"))  # type: ignore[misc]
             assert (counters.frames >= before) is ended
             screen.session.arming.arm()

@@ -43,7 +43,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(strangers, "JITTER", 0.25)
 
 
-def said(app: DrivePanelApp) -> str:
+def output(app: DrivePanelApp) -> str:
     return "\n".join(event.text for event in app.events.events)
 
 
@@ -84,7 +84,7 @@ async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
             # there is no stop, and that is said
             assert "no stop here" in shown(app, "keys")
             await pilot.press("space")
-            await until(pilot, lambda: "No stop goes out" in said(app))
+            await until(pilot, lambda: "No stop goes out" in output(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
             assert not app.hearing
@@ -114,11 +114,11 @@ async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_beh
             await pilot.press("H")
             await pilot.pause(0.2)
             await pilot.press("H")
-            await until(pilot, lambda: "keys are ignored until it is open" in said(app))
+            await until(pilot, lambda: "keys are ignored until it is open" in output(app))
             may_open.set()
             await until(pilot, lambda: isinstance(app.screen, HeardScreen))
             await pilot.press("H")
-            await until(pilot, lambda: "listens already" in said(app))
+            await until(pilot, lambda: "listens already" in output(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
             assert not [one for one in threading.enumerate() if one.name == "listening"]
@@ -127,7 +127,7 @@ async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_beh
             await pilot.press("H")
             await until(pilot, lambda: app.opening.goes_on)
             await pilot.press("escape")
-            await until(pilot, lambda: "was canceled" in said(app))
+            await until(pilot, lambda: "was canceled" in output(app))
             may_open.set()
             await until(pilot, lambda: not app.hearing)
             assert not [one for one in threading.enumerate() if one.name == "listening"]
@@ -142,7 +142,7 @@ async def test_another_master_on_opening_is_offered_to_be_listened_to() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             talk(peer)
-            await until(pilot, lambda: "Another master asks" in said(app))
+            await until(pilot, lambda: "Another master asks" in output(app))
             await until(pilot, lambda: "H listens to it" in shown(app, "message"))
             await pilot.press("H")
             await heard(app, pilot, peer)
@@ -175,10 +175,10 @@ async def panel_with(
 async def test_a_drive_that_the_panel_feeds_is_not_left_alone() -> None:
     async with panel_with(DriveSpec("atv21", 1)) as (app, pilot, peer):
         await pilot.press("7", "H")
-        await until(pilot, lambda: "Not listened to, as the panel feeds drives" in said(app))
-        assert "Device 1, Altivar 21: on loss of communication it acts 3 s after" in said(app)
-        asked = len(peer.requests)
-        await until(pilot, lambda: len(peer.requests) > asked + 2)
+        await until(pilot, lambda: "Not listened to, as the panel feeds drives" in output(app))
+        assert "Device 1, Altivar 21: on loss of communication it acts 3 s after" in output(app)
+        requested = len(peer.requests)
+        await until(pilot, lambda: len(peer.requests) > requested + 2)
         assert not app.hearing
 
 
@@ -194,10 +194,10 @@ async def test_drives_that_do_not_act_are_left_to_their_master_with_a_yes() -> N
         await pilot.pause(0.4)  # a yes counts once the question has stood
         await pilot.press("y")
         await heard(app, pilot, peer)
-        asked = len(peer.requests)
+        requested = len(peer.requests)
         talk(peer)
         await pilot.pause(0.5)
-        assert len(peer.requests) == asked
+        assert len(peer.requests) == requested
 
 
 # Where the panel may not fall silent

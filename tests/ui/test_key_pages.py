@@ -41,13 +41,13 @@ def test_every_screen_has_its_table() -> None:
 
 
 def test_the_pages_tell_every_key_and_no_other() -> None:
-    told = {
+    reported = {
         (of, key)
         for of, table in tables().items()
         for cell, _ in ROW.findall(table)
         for key in cell.split(" or ")
     }
-    told = {(of, key) for of, key in told if key != "key"}
+    reported = {(of, key) for of, key in reported if key != "key"}
     wanted = {
         (of, named(key))
         for action in ACTIONS
@@ -57,8 +57,8 @@ def test_the_pages_tell_every_key_and_no_other() -> None:
     }
     keys = {key for _, key in wanted}
     assert {"Ctrl+P", "Shift+Tab", "PgUp", "Space", "?", "a", "A"} <= keys
-    assert wanted - told == set()
-    assert told - wanted == set()
+    assert wanted - reported == set()
+    assert reported - wanted == set()
 
 
 def test_every_action_is_told_in_its_words() -> None:

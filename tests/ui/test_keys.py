@@ -163,8 +163,8 @@ async def test_a_key_without_a_meaning_says_where_it_has_one_and_does_nothing() 
                     made.app.connection.drives.focus()  # in a field it is text
                 made.app.events.add("told", f"{key} is next on {screen}")
                 await made.pilot.press(key)
-                told = f"{action.shown} has a meaning on"
-                await until(made.pilot, lambda: notices(made).startswith(told))  # noqa: B023
+                reported = f"{action.shown} has a meaning on"
+                await until(made.pilot, lambda: notices(made).startswith(reported))  # noqa: B023
                 assert list(made.app.screen_stack) == stack, (screen, key)
             assert writes(made.app, before) == [], screen
 

@@ -76,10 +76,10 @@ async def test_another_drive_is_asked_about_and_read_only_till_then(simulation: 
     app = DrivePanelApp(start=line, device=2)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: bool(app.screen.query("#follows")))
-        told = str(app.screen.query_one("#follows").render())
-        assert "Device 2 was ATV31H037M2 MIXER" in told
-        assert "ATV71" in told
-        assert "read-only" in told
+        reported = str(app.screen.query_one("#follows").render())
+        assert "Device 2 was ATV31H037M2 MIXER" in reported
+        assert "ATV71" in reported
+        assert "read-only" in reported
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         assert app.chosen is not None
@@ -317,8 +317,8 @@ async def test_a_drive_that_says_who_it_is_is_believed_before_the_settings(
 
 
 def test_names_stand_above_the_ports_and_no_line_twice() -> None:
-    told = LineSettings(Path("settings.toml"), {"fan": NamedLine("fan", BY_ID, 5)})
-    named, serial, *_ = groups([("/dev/ttyUSB0", "")], [], told)
+    reported = LineSettings(Path("settings.toml"), {"fan": NamedLine("fan", BY_ID, 5)})
+    named, serial, *_ = groups([("/dev/ttyUSB0", "")], [], reported)
     assert (named.title, serial.title) == ("Named", "Serial ports")
     (fan,) = named.choices
     assert (fan.text, fan.name, fan.device) == (BY_ID, "fan", 5)
@@ -335,7 +335,7 @@ def test_names_stand_above_the_ports_and_no_line_twice() -> None:
     ],
 )
 def test_of_a_lasting_name_the_end_is_shown(width: int, text: str) -> None:
-    told = line_in(BY_ID, width)
-    assert len(told) <= width
-    assert told[1:] == text[1:]
+    reported = line_in(BY_ID, width)
+    assert len(reported) <= width
+    assert reported[1:] == text[1:]
     assert line_in("tcp:192.168.0.10", 10) == "tcp:192.1…"

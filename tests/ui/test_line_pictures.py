@@ -148,7 +148,7 @@ async def busy(app: Any, pilot: Pilot[None]) -> None:
 async def searching(app: Any, pilot: Pilot[None]) -> None:
     fleet = wall(0)
     fleet.search = Search(range(1, 32))
-    fleet.search.asked = fleet.search.at = 7
+    fleet.search.requested = fleet.search.at = 7
     app.connection.tell_search()
     await show(app, pilot, fleet, fakes.CONNECTED)
 
@@ -156,7 +156,7 @@ async def searching(app: Any, pilot: Pilot[None]) -> None:
 async def searching_found(app: Any, pilot: Pilot[None]) -> None:
     fleet = wall(3)
     fleet.search = Search(range(1, 32))
-    fleet.search.asked = fleet.search.at = 7
+    fleet.search.requested = fleet.search.at = 7
     fleet.search.answered = frozenset(range(1, 4))
     await show(app, pilot, fleet, fakes.CONNECTED)
 

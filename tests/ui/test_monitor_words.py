@@ -65,8 +65,8 @@ def test_who_commands_and_who_gives_the_reference_are_not_mixed_up() -> None:
     view = view_of(ATV71, fakes.RUNNING)
     assert view.snapshot is not None
     state = replace(view.snapshot.state, channel="terminals", reference="keypad")
-    told = replace(view, snapshot=replace(view.snapshot, state=state))
-    text = [line.plain.split() for line in state_lines(told, 22)]
+    reported = replace(view, snapshot=replace(view.snapshot, state=state))
+    text = [line.plain.split() for line in state_lines(reported, 22)]
     assert ["Command", "terminals"] in text
     assert ["Reference", "keypad"] in text
 
@@ -129,9 +129,9 @@ def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
             assert shown == f"No effect from here: {found.sentence}"
             assert len(notice_lines(view, 80)) <= NOTICE_ROWS
             line = RunLine("forward", "30", "Hz", 0.0, 0)
-            told = f"{found.text} {_after_esc(found.way)}".strip()
-            lines = [row.plain for row in run_lines(line, profile, {}, 9.0, 80, told)]
-            assert told in " ".join(" ".join(lines).split())
+            reported = f"{found.text} {_after_esc(found.way)}".strip()
+            lines = [row.plain for row in run_lines(line, profile, {}, 9.0, 80, reported)]
+            assert reported in " ".join(" ".join(lines).split())
 
 
 def test_a_word_says_nothing_of_what_is_so_while_all_is_well() -> None:
@@ -183,10 +183,10 @@ def test_a_bit_in_columns_says_of_what_it_tells() -> None:
     """At 80 columns two bits of LRS7 read 'In force', and nothing told which channels are."""
     view = view_of(ATV71, {**fakes.RUNNING, "LRS7": 0x0005})
     grid = bit_grid(view, word_pages([ATV71["LRS7"]], 15)[0], 79, 6)
-    told = "\n".join(line.plain for line in grid)
-    assert "● Reference channel" in told
-    assert "● Command channel 1" in told
-    assert "In force" not in told
+    reported = "\n".join(line.plain for line in grid)
+    assert "● Reference channel" in reported
+    assert "● Command channel 1" in reported
+    assert "In force" not in reported
 
 
 def test_addresses_that_are_empty_are_no_failures() -> None:

@@ -49,7 +49,7 @@ def dialog(app: DrivePanelApp) -> str:
     return str(app.screen.query_one("#follows", Plain).visual)
 
 
-def said(app: DrivePanelApp) -> str:
+def output(app: DrivePanelApp) -> str:
     return "\n".join(event.text for event in app.events.events)
 
 
@@ -59,7 +59,7 @@ async def test_a_drive_at_another_baud_is_found_and_the_line_stays_there() -> No
         async with panel_on(simulation.serve_pty()) as (app, pilot):
             assert not app.connection.found
             app.connection.action_scan_settings()
-            await until(pilot, lambda: "Drives answer at 9600 8E1" in said(app))
+            await until(pilot, lambda: "Drives answer at 9600 8E1" in output(app))
             assert set(app.connection.found) == {1}
             assert app.line_text.endswith(",9600,8E1")
             assert app.connection.form.line_at("p") == "serial:p,9600,8E1"
@@ -86,8 +86,8 @@ async def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.Monke
         async with panel_on(peer.path) as (app, pilot):
             app.connection.form.offer_addresses("1-3")
             app.connection.action_scan_settings()
-            await until(pilot, lambda: "Left are 300 and 600 baud: " in said(app))
-            assert "for Powerdrive, Proxidrive and Varmeca 33/34 alone. Esc ends" in said(app)
+            await until(pilot, lambda: "Left are 300 and 600 baud: " in output(app))
+            assert "for Powerdrive, Proxidrive and Varmeca 33/34 alone. Esc ends" in output(app)
             await until(pilot, lambda: "600 8E1, 2 of 3 settings. 3 s left." in advice(app))
             app.connection.action_stop_scan()
 
@@ -98,14 +98,14 @@ async def test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked() -
 
     with PtyPeer(garbled) as peer:
         async with panel_on(peer.path) as (app, pilot):
-            assert "The address is taken" in said(app)
-            assert "No drive answered" not in said(app)
+            assert "The address is taken" in output(app)
+            assert "No drive answered" not in output(app)
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
             assert "Device 2: what it does when it is asked no more" in dialog(app)
             await pilot.press("y")
             await until(
-                pilot, lambda: "Somebody answers, and not clearly, at 19200 8N2" in said(app)
+                pilot, lambda: "Somebody answers, and not clearly, at 19200 8N2" in output(app)
             )
 
 
@@ -136,11 +136,11 @@ async def test_drives_are_asked_on_while_the_person_decides_known_or_not() -> No
             assert "Device 2: what it does when it is asked no more is not" in dialog(app)
             before = len(peer.requests)
             for device in (1, 2):
-                await until(pilot, lambda: _asked(peer, device, before) >= 2)  # noqa: B023
+                await until(pilot, lambda: _requested(peer, device, before) >= 2)  # noqa: B023
             assert app.line_text.endswith(",19200,8E1")
 
 
-def _asked(peer: PtyPeer, device: int, since: int) -> int:
+def _requested(peer: PtyPeer, device: int, since: int) -> int:
     return sum(request[0] == device for request in peer.requests[since:])
 
 
@@ -151,7 +151,7 @@ async def test_another_master_is_told_and_nothing_is_sent() -> None:
             app.connection.action_scan_settings()
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             peer.send(read_frame(6, 3201, 4))
-            await until(pilot, lambda: "Address 6: read of register 3201" in said(app))
+            await until(pilot, lambda: "Address 6: read of register 3201" in output(app))
             assert len(peer.requests) == sent
 
 
@@ -161,7 +161,7 @@ async def test_a_search_of_a_port_listens_first() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             peer.send(read_frame(6, 3201, 4))
-            await until(pilot, lambda: "Address 6: read of register 3201" in said(app))
+            await until(pilot, lambda: "Address 6: read of register 3201" in output(app))
             assert not app.connection.scanning
             assert peer.requests == []
 
@@ -182,4 +182,4 @@ async def test_a_line_without_settings_says_so() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: app.opened is not None)
         app.connection.action_scan_settings()
-        await until(pilot, lambda: "no baud or format of its own" in said(app))
+        await until(pilot, lambda: "no baud or format of its own" in output(app))

@@ -21,7 +21,7 @@ from tui.screens.keys.table import ACTIONS, EVERYWHERE
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 
-from .test_command_flows import Bench, bench, told
+from .test_command_flows import Bench, bench, reported
 from .test_flows import shown, until
 from .test_questions import writes
 from .walk import every_step
@@ -120,7 +120,7 @@ async def test_eeprom_stops_nothing_and_leads_to_where_it_is_saved() -> None:
         await typed(made, "eeprom")
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
-        await until(made.pilot, lambda: "Not armed" in said(made))
+        await until(made.pilot, lambda: "Not armed" in output(made))
         assert not reports(made)
         assert writes(made.app) == []
         assert all(made.speed(device) > 2 for device in (1, 2, 3))
@@ -162,14 +162,14 @@ async def test_an_action_of_this_screen_is_done() -> None:
         options = await typed(made, "rated current")
         assert options.highlighted == 0
         await made.pilot.press("down", "up", "enter")
-        await until(made.pilot, lambda: "gives its current in A" in told(made.app))
+        await until(made.pilot, lambda: "gives its current in A" in reported(made.app))
         await typed(made, "line typ")
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, ConnectionScreen))
-        await until(made.pilot, lambda: "n on Line" in told(made.app))
+        await until(made.pilot, lambda: "n on Line" in reported(made.app))
         await typed(made, "report")
         await made.pilot.press("enter")
-        await until(made.pilot, lambda: "^p on Parameters" in told(made.app))
+        await until(made.pilot, lambda: "^p on Parameters" in reported(made.app))
         assert not isinstance(made.app.screen, Ask)
 
 
@@ -190,14 +190,14 @@ async def test_over_a_question_there_is_no_palette() -> None:
         await made.armed()
         await made.pilot.press("z")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask | Confirm))
-        asked = made.app.screen
+        requested = made.app.screen
         await made.pilot.press("ctrl+p")
         made.app.action_command_palette()
         await made.pilot.pause()
-        assert made.app.screen is asked
+        assert made.app.screen is requested
 
 
-def said(made: Bench) -> str:
+def output(made: Bench) -> str:
     """What was said last."""
     newest = made.app.events.newest
     return newest.text if newest is not None else ""

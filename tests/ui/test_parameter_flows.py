@@ -65,13 +65,13 @@ async def answer(made: Bench, key: str, text: str) -> None:
     await made.pilot.press("enter")
 
 
-async def stage(made: Bench, value: str, told: str) -> None:
+async def stage(made: Bench, value: str, reported: str) -> None:
     """Type a value for the parameter under the cursor; what is told of it."""
     await made.pilot.press("enter")
     await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
     made.app.screen.query_one(Input).value = value
     await made.pilot.press("enter")
-    await message(made, told)
+    await message(made, reported)
 
 
 async def open_file(made: Bench, file: Path) -> None:
@@ -90,11 +90,11 @@ def table(made: Bench) -> str:
 
 
 async def message(made: Bench, *parts: str) -> None:
-    def said() -> str:
+    def output() -> str:
         newest = made.app.events.newest
         return newest.text if newest is not None else ""
 
-    await until(made.pilot, lambda: all(part in said() for part in parts))
+    await until(made.pilot, lambda: all(part in output() for part in parts))
 
 
 def lines(made: Bench) -> str:
@@ -469,11 +469,11 @@ async def test_files_tell_their_drive_and_what_differs(
             return "\n".join(str(option.prompt) for option in files.options)
 
         await until(made.pilot, lambda: "..." not in lines())
-        told = {line.split()[0]: line for line in lines().splitlines() if ".toml" in line}
-        assert "1 differs" in told["own.toml"]
-        assert "Altivar 71" in told["alien.toml"]
-        assert "other family" in told["alien.toml"]
-        assert "is no set" in told["none.toml"]
+        reported = {line.split()[0]: line for line in lines().splitlines() if ".toml" in line}
+        assert "1 differs" in reported["own.toml"]
+        assert "Altivar 71" in reported["alien.toml"]
+        assert "other family" in reported["alien.toml"]
+        assert "is no set" in reported["none.toml"]
         assert writes(made.app) == []
 
 

@@ -350,5 +350,5 @@ def test_another_hands_value_is_told_as_the_drive_counts_it() -> None:
     image.take({"Inr": Reading.bad(increment, 1.0, "exception 2", absent=True)})
     editor.staging.stage("ACC", "7 s")
     image.confirm("ACC", 30, 2.0)
-    said = "\n".join(line.plain for line in parameter_lines(editor, "ACC", 100, 5))
-    assert "it was 5.0 s" in said
+    output = "\n".join(line.plain for line in parameter_lines(editor, "ACC", 100, 5))
+    assert "it was 5.0 s" in output

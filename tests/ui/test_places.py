@@ -214,9 +214,9 @@ def test_the_stop_comes_first_in_red_and_is_never_cut_off(screen: str, width: in
 
 @pytest.mark.parametrize("screen", EVERYWHERE)
 def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
-    whom = "ALL" if screen == CONNECTION else "99"
-    line = keys_shown(screen, 80, f"STOP {whom}").plain
-    assert line.startswith(f" Space STOP {whom}  ")
+    target = "ALL" if screen == CONNECTION else "99"
+    line = keys_shown(screen, 80, f"STOP {target}").plain
+    assert line.startswith(f" Space STOP {target}  ")
     labels = [action for action in of_screen(screen) if action.label][1:]
     wanted = [f" {action.shown} {action.label}" for action in labels]
     assert [words for words in wanted if words not in line] == []

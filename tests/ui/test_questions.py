@@ -110,68 +110,68 @@ YES: dict[str, tuple[Callable[[], Question[Any]], str, object]] = {
 @pytest.mark.parametrize("name", YES)
 async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
     make, key, answer = YES[name]
-    asked = Asked(make())
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
+    requested = Asked(make())
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
         for passed in (0.0, 0.1, MOMENT - 0.01):
-            asked.clock.now = fakes.NOW + passed
-            asked.app.events.add("told", f"{passed} s after it was drawn")
+            requested.clock.now = fakes.NOW + passed
+            requested.app.events.add("told", f"{passed} s after it was drawn")
             await pilot.press(key, key)
-            newest = asked.app.events.newest
+            newest = requested.app.events.newest
             assert newest is not None
             assert newest.text.startswith("Key ignored: it came before this could be read.")
-            assert asked.answers == []
-            assert asked.app.screen is asked.question
-        asked.clock.now = fakes.NOW + MOMENT + 0.01
+            assert requested.answers == []
+            assert requested.app.screen is requested.question
+        requested.clock.now = fakes.NOW + MOMENT + 0.01
         await pilot.press(key)
-        await until(pilot, lambda: bool(asked.answers))
+        await until(pilot, lambda: bool(requested.answers))
         if answer == "first":
-            assert asked.answers[0] is not None
+            assert requested.answers[0] is not None
         else:
-            assert asked.answers == [answer]
+            assert requested.answers == [answer]
 
 
 @pytest.mark.usefixtures("slow_hands")
 @pytest.mark.parametrize(("key", "answer"), [("s", "stop"), ("escape", "stay"), ("q", "stay")])
 async def test_a_stop_and_a_no_count_at_once(key: str, answer: str) -> None:
-    asked = Asked(Leave("it runs"))
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
+    requested = Asked(Leave("it runs"))
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
         await pilot.press(key)
-        await until(pilot, lambda: asked.answers == [answer])
+        await until(pilot, lambda: requested.answers == [answer])
 
 
 @pytest.mark.parametrize("key", ["escape", "q", "n"])
 @pytest.mark.parametrize("loses", [True, False])
 async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
-    asked = Asked(confirm(loses=loses))
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
+    requested = Asked(confirm(loses=loses))
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
         await pilot.press(key)
-        await until(pilot, lambda: asked.answers == [False])
+        await until(pilot, lambda: requested.answers == [False])
 
 
 @pytest.mark.usefixtures("slow_hands")
 async def test_what_is_typed_on_is_no_answer_to_a_question_that_comes_by_itself() -> None:
-    asked = Asked(confirm(by_itself=True))
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
+    requested = Asked(confirm(by_itself=True))
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
         for key in "frequency,any\ry":
-            asked.clock.now += 0.9
+            requested.clock.now += 0.9
             await pilot.press(_character_to_key(key))
-        assert asked.answers == []
-        assert asked.app.events.newest is not None
-        assert "A question came meanwhile" in asked.app.events.newest.text
-        asked.clock.now += 1.01
+        assert requested.answers == []
+        assert requested.app.events.newest is not None
+        assert "A question came meanwhile" in requested.app.events.newest.text
+        requested.clock.now += 1.01
         await pilot.press("y")
-        await until(pilot, lambda: asked.answers == [True])
+        await until(pilot, lambda: requested.answers == [True])
     for key in ("escape", "n"):
-        asked = Asked(confirm(by_itself=True))
-        async with asked.app.run_test(size=(80, 24)) as pilot:
-            await asked.put(pilot)
-            asked.clock.now += 0.0 if key == "escape" else 1.01
+        requested = Asked(confirm(by_itself=True))
+        async with requested.app.run_test(size=(80, 24)) as pilot:
+            await requested.put(pilot)
+            requested.clock.now += 0.0 if key == "escape" else 1.01
             await pilot.press(key)
-            await until(pilot, lambda: asked.answers == [False])  # noqa: B023
+            await until(pilot, lambda: requested.answers == [False])  # noqa: B023
 
 
 @pytest.mark.parametrize(
@@ -189,13 +189,13 @@ def test_questions_that_no_key_asks_for_come_by_themselves(place: str, calls: in
 
 
 async def test_enter_is_no_yes_where_something_is_lost_and_that_is_said() -> None:
-    asked = Asked(confirm())
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
-        hint = asked.question.query_one("#hint")
+    requested = Asked(confirm())
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
+        hint = requested.question.query_one("#hint")
         assert str(hint.render()).startswith("y writes")
         await pilot.press("enter", "enter", "w", "s")
-        assert asked.answers == []
+        assert requested.answers == []
         assert str(hint.render()).startswith("Enter is no answer here")
         assert "y writes" in str(hint.render())
     assert str(Confirm("", "", yes="goes", no="stays", loses=False)._keys).startswith("y or Enter")
@@ -203,13 +203,13 @@ async def test_enter_is_no_yes_where_something_is_lost_and_that_is_said() -> Non
 
 async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
     follows = "\n".join(f"line {number}" for number in range(40))
-    asked = Asked(Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True))
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
-        hint = asked.question.query_one("#hint")
+    requested = Asked(Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True))
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
+        hint = requested.question.query_one("#hint")
         await until(pilot, lambda: "Up, Down scroll" in str(hint.render()))
         await until(pilot, lambda: 0 < hint.region.bottom < 24)
-        says = asked.question.query_one("#says")
+        says = requested.question.query_one("#says")
         await pilot.press("down", "down")
         await until(pilot, lambda: says.scroll_y == 2)
 
@@ -218,29 +218,29 @@ async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
 
 
 async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
-    asked = Asked(confirm())
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
-        asked.question._voided = True
+    requested = Asked(confirm())
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
+        requested.question._voided = True
         await pilot.press("y")
-        await until(pilot, lambda: asked.answers == [False])
+        await until(pilot, lambda: requested.answers == [False])
     for question, no in ((confirm(), False), (Leave("it runs"), "stay"), (ask(), None)):
-        asked = Asked(question)
-        async with asked.app.run_test(size=(80, 24)) as pilot:
-            await asked.put(pilot)
+        requested = Asked(question)
+        async with requested.app.run_test(size=(80, 24)) as pilot:
+            await requested.put(pilot)
             question.void()
             question.void()
-            await until(pilot, lambda: bool(asked.answers))  # noqa: B023
+            await until(pilot, lambda: bool(requested.answers))  # noqa: B023
             await pilot.pause(0.1)
-            assert asked.app.screen is asked.app.connection
-            assert asked.answers == [no]
+            assert requested.app.screen is requested.app.connection
+            assert requested.answers == [no]
 
 
 async def test_a_question_that_a_stop_ends_at_once_leaves_nothing_to_do() -> None:
     question = confirm()
-    asked = Asked(question)
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
+    requested = Asked(question)
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
         question.void()
         await until(pilot, lambda: not question.query("#says"))
         question._tell_scrolling()  # after the refresh that has come too late
@@ -251,16 +251,16 @@ def ask() -> Ask:
 
 
 async def test_a_question_below_another_screen_is_voided_when_it_comes_up() -> None:
-    asked = Asked(confirm())
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
-        await asked.app.push_screen(HelpScreen("monitor"))
-        asked.question.void()
+    requested = Asked(confirm())
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
+        await requested.app.push_screen(HelpScreen("monitor"))
+        requested.question.void()
         await pilot.pause()
-        assert asked.app.screen.query("#help")
+        assert requested.app.screen.query("#help")
         await pilot.press("escape")
-        await until(pilot, lambda: asked.answers == [False])
-        assert asked.app.screen is asked.app.connection
+        await until(pilot, lambda: requested.answers == [False])
+        assert requested.app.screen is requested.app.connection
 
 
 async def test_only_questions_about_the_stopped_drive_end() -> None:
@@ -314,22 +314,22 @@ def test_where_nobody_watches_the_looks_of_the_line_tell_the_state() -> None:
 
 
 async def test_a_question_tells_what_the_motor_does_while_it_is_open() -> None:
-    asked = Asked(confirm())
+    requested = Asked(confirm())
     profile = library.load("atv71")
     console = fakes.console_of(fakes.snapshot_of(profile, fakes.RUNNING))
-    fakes.choose(asked.app, console)
+    fakes.choose(requested.app, console)
     session = console.session
-    asked.question._now = MotorsNow(asked.app, [session])
-    async with asked.app.run_test(size=(80, 24)) as pilot:
-        await asked.put(pilot)
-        now = asked.question.query_one("#now")
+    requested.question._now = MotorsNow(requested.app, [session])
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
+        now = requested.question.query_one("#now")
         assert "running forward" in str(now.render())
         stopped = fakes.snapshot_of(profile, fakes.READY)
         cast("Any", console.monitor)._latest = replace(stopped)
         await until(pilot, lambda: "ready" in str(now.render()))
-        two = MotorsNow(asked.app, [session, session])
+        two = MotorsNow(requested.app, [session, session])
         assert [line.split()[:2] for line in two().plain.splitlines()] == [["Now", "2"]] * 2
-        six = MotorsNow(asked.app, [session] * 6)
+        six = MotorsNow(requested.app, [session] * 6)
         assert six().plain.splitlines()[-1] == "and 2 more"
 
 
@@ -480,18 +480,18 @@ async def test_the_panel_is_not_left_past_a_question() -> None:
     async with bench("atv312") as made:
         await write_parameters(made)
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
-        asked = made.app.screen
+        requested = made.app.screen
         await made.pilot.press("ctrl+q", "ctrl+c")
         await made.pilot.pause(0.2)
-        assert made.app.screen is asked
+        assert made.app.screen is requested
         # by a way of its own it is asked too: what is staged would be lost
         await made.app.action_quit()
-        await until(made.pilot, lambda: made.app.screen is not asked)
+        await until(made.pilot, lambda: made.app.screen is not requested)
         await until(made.pilot, lambda: bool(made.app.screen.query("#question")))
         assert "Leave the panel?" in str(made.app.screen.query_one("#question").render())
         await made.app.action_quit()
         await made.pilot.press("q")
-        await until(made.pilot, lambda: made.app.screen is asked)
+        await until(made.pilot, lambda: made.app.screen is requested)
         assert made.app._exit is False
         assert writes(made.app) == []
 
@@ -504,14 +504,16 @@ async def test_the_keys_of_leaving_stand_below_however_much_is_told(
     def runs() -> Text:
         return Text("\n".join(["Now  running forward"] * motors))
 
-    told = "\n".join(f"Device {n}: on loss of communication it acts 3 s after." for n in range(40))
-    asked = Asked(Leave(told, cast(MotorsNow, runs)))
-    async with asked.app.run_test(size=size) as pilot:
-        await asked.put(pilot)
+    reported = "\n".join(
+        f"Device {n}: on loss of communication it acts 3 s after." for n in range(40)
+    )
+    requested = Asked(Leave(reported, cast(MotorsNow, runs)))
+    async with requested.app.run_test(size=size) as pilot:
+        await requested.put(pilot)
         await pilot.pause()
-        box = asked.question.query_one("#dialog").content_region
-        assert box.contains_region(asked.question.query_one("#hint").region)
-        assert asked.question.query_one("#says").max_scroll_y > 0
+        box = requested.question.query_one("#dialog").content_region
+        assert box.contains_region(requested.question.query_one("#hint").region)
+        assert requested.question.query_one("#says").max_scroll_y > 0
 
 
 async def test_enter_on_control_says_why_nothing_is_asked() -> None:

@@ -16,7 +16,7 @@ from tui.screens.monitor import run_line
 from tui.screens.monitor.run_line import RunLine, proposed
 
 from . import fakes
-from .test_command_flows import Bench, bench, disarmed, said, writes
+from .test_command_flows import Bench, bench, disarmed, output, writes
 from .test_flows import shown, until
 
 MOMENT = 0.3
@@ -107,7 +107,7 @@ async def ready() -> AsyncIterator[Bench]:
 
 
 def open_lines(made: Bench) -> Callable[[], bool]:
-    return lambda: "Esc no" in said(made.app)
+    return lambda: "Esc no" in output(made.app)
 
 
 async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,11 +190,11 @@ async def test_the_end_of_arming_closes_the_line() -> None:
 async def test_arrows_edit_the_line_and_step_a_reference_without_one() -> None:
     async with ready() as made:
         await made.pilot.press("f", "up", "up", "pagedown", "backspace", "2", "7")
-        await until(made.pilot, lambda: "REFERENCE at 27 Hz" in said(made.app))
+        await until(made.pilot, lambda: "REFERENCE at 27 Hz" in output(made.app))
         assert made.drive().raw("LFR") == 300
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 270)
-        await until(made.pilot, lambda: "Esc no" not in said(made.app))
+        await until(made.pilot, lambda: "Esc no" not in output(made.app))
         await made.pilot.press("down")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 260)
 
@@ -205,7 +205,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
         made.drive().set("LSP", 280)
         await made.pilot.press("pageup")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 330)
-        await until(made.pilot, lambda: "Esc no" not in said(made.app))
+        await until(made.pilot, lambda: "Esc no" not in output(made.app))
         await made.pilot.press("pagedown")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 280)
 
@@ -234,9 +234,9 @@ async def test_a_drive_whose_reference_is_not_given_from_here_has_a_line_without
     async with bench("varmeca") as made:
         await made.armed()
         await made.pilot.press("r")
-        await until(made.pilot, lambda: "the reference is given at the drive" in said(made.app))
+        await until(made.pilot, lambda: "the reference is given at the drive" in output(made.app))
         await made.pilot.press("3")
-        await until(made.pilot, lambda: "RUN FORWARD" not in said(made.app))
+        await until(made.pilot, lambda: "RUN FORWARD" not in output(made.app))
         await made.pilot.press("f")
         await made.message("is not known")
 
@@ -245,13 +245,13 @@ async def test_at_0_hz_r_says_so_and_takes_a_reference() -> None:
     async with bench("atv71") as made:
         await made.armed()
         await made.pilot.press("r")
-        await until(made.pilot, lambda: "The reference is 0" in said(made.app))
+        await until(made.pilot, lambda: "The reference is 0" in output(made.app))
         before = writes(made.app)
         await made.pilot.press("enter")
         await made.message("At 0 the motor would not turn")
         assert writes(made.app) == before
         await made.pilot.press("2", "0")
-        await until(made.pilot, lambda: "At 0" not in said(made.app))
+        await until(made.pilot, lambda: "At 0" not in output(made.app))
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.speed() > 2)
 
@@ -265,7 +265,7 @@ async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_th
         await made.message("No effect: The drive", "Esc, then 6 opens Control")
         before = writes(made.app)
         await made.pilot.press("enter")
-        await until(made.pilot, lambda: "Esc no" not in said(made.app))
+        await until(made.pilot, lambda: "Esc no" not in output(made.app))
         await made.message("The drive is not commanded by Modbus: command channel in force")
         assert writes(made.app) == before
 

@@ -126,8 +126,8 @@ def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
     profile = library.load("atv71")
     raws = {"HSP": 500, "LSP": 0, "TFR": 600, "ACC": 30, "INR": 1, "FRS": 500}
     readings = fakes.readings_of(profile, raws, fakes.NOW)
-    told, first, second = run_lines(LINE, profile, readings, 200.0, width, output=Decimal(0))
-    assert not told.plain.strip()
+    reported, first, second = run_lines(LINE, profile, readings, 200.0, width, output=Decimal(0))
+    assert not reported.plain.strip()
     assert "RUN FORWARD at" in first.plain
     assert "30.0  Hz" in first.plain
     assert "0 .. HSP 50.0" in first.plain

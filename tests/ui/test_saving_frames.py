@@ -86,8 +86,8 @@ def test_as_text(tmp_path: Path) -> None:
     assert save(path) == 3
     head, columns, *lines = path.read_text("utf-8").splitlines()
     assert (head, columns.split("\t")[-1]) == ("# serial:x", "bytes")
-    told = [line.split("\t") for line in lines]
-    assert [one[2:] for one in told] == [
+    reported = [line.split("\t") for line in lines]
+    assert [one[2:] for one in reported] == [
         ["request", "2 read ETA", "", "02 03 0C 81 00 01 D7 41"],
         ["reply", "", "", "00 02"],
         ["reply", "2 ETA 16#0637", "", "02 03 02 06 37 BE 32"],

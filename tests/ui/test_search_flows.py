@@ -46,7 +46,7 @@ async def panel(
         simulation.stop()
 
 
-def said(app: DrivePanelApp) -> list[str]:
+def output(app: DrivePanelApp) -> list[str]:
     return [event.text for event in app.events.events]
 
 
@@ -67,7 +67,7 @@ async def test_a_drive_is_opened_while_the_search_for_others_goes_on() -> None:
         await until(pilot, lambda: app.connection.drives.option_count == 2)
         assert app.connection.search is search
         assert search.goes_on
-        assert f"Search {search.asked} of" in shown(app, "search")
+        assert f"Search {search.requested} of" in shown(app, "search")
         await pilot.press("escape")
         await until(pilot, lambda: "stopped, 2 found" in shown(app, "search"))
         assert not search.goes_on
@@ -80,7 +80,7 @@ async def test_a_search_ends_with_its_line_and_says_nothing_of_it() -> None:
         assert search is not None
         await app.disconnect()
         await until(pilot, lambda: not search.goes_on)
-        assert "closed" not in " ".join(said(app))
+        assert "closed" not in " ".join(output(app))
 
 
 async def test_other_addresses_are_typed_in_place_and_remembered_for_the_line() -> None:
@@ -88,7 +88,7 @@ async def test_other_addresses_are_typed_in_place_and_remembered_for_the_line() 
         await until(pilot, lambda: app.connection.drives.has_focus)
         await pilot.press("c", "1", "3", "-", "enter")
         field = app.connection.query_one("#addresses", Input)
-        await until(pilot, lambda: "is no list of addresses" in said(app)[-1])
+        await until(pilot, lambda: "is no list of addresses" in output(app)[-1])
         assert field.has_focus
         await pilot.press("1", "4", "enter")
         await until(pilot, lambda: set(app.connection.found) == {1, 14})
@@ -114,19 +114,19 @@ async def test_who_trips_when_left_alone_is_told_once() -> None:
     async with panel(DriveSpec("atv21", 1), DriveSpec("atv71", 2)) as (app, pilot):
         await until(pilot, lambda: app.connection.drives.option_count == 2)
         await pilot.press("escape")
-        await until(pilot, lambda: any("1 (3 s)" in text for text in said(app)))
+        await until(pilot, lambda: any("1 (3 s)" in text for text in output(app)))
         await pilot.press("s")
         await until(pilot, lambda: app.connection.scanning)
         await pilot.press("escape")
         await until(pilot, lambda: not app.connection.scanning)
-        assert sum("Kept asking" in text for text in said(app)) == 1
+        assert sum("Kept asking" in text for text in output(app)) == 1
 
 
 async def test_a_drive_whose_reaction_to_a_silent_line_is_off_does_not_act() -> None:
     ignoring = DriveSpec("atv31", 1, sets={"SLL": 0})
     async with panel(ignoring, DriveSpec("atv21", 2)) as (app, pilot):
-        await until(pilot, lambda: any("Kept asking" in text for text in said(app)))
-        (text,) = (text for text in said(app) if "Kept asking" in text)
+        await until(pilot, lambda: any("Kept asking" in text for text in output(app)))
+        (text,) = (text for text in output(app) if "Kept asking" in text)
         assert "Kept asking: 2 (3 s). Otherwise they trip" in text
         assert app.fleet is not None
         assert set(app.fleet.line_watch.left_alone()) <= {2}
@@ -146,12 +146,12 @@ async def test_drive_whose_identification_comes_damaged_keeps_its_stop_keys() ->
         assert fleet.console(1) is console
         await app.connection._take(other)
         assert fleet.found[9].console is None
-        assert "It came damaged. The address is taken." in said(app)
+        assert "It came damaged. The address is taken." in output(app)
 
 
 async def test_swapped_bytes_are_shown_at_the_connection_and_on_monitor() -> None:
     async with panel(DriveSpec("atv71", 1), faults=FaultRates(swapped=1.0)) as (app, pilot):
-        await until(pilot, lambda: any("arrive swapped" in text for text in said(app)))
+        await until(pilot, lambda: any("arrive swapped" in text for text in output(app)))
         await until(pilot, lambda: 1 in app.connection.found)
         await pilot.press("enter")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))

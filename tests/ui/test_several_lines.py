@@ -86,7 +86,7 @@ async def test_stop_all_stops_the_motors_of_every_line() -> None:
 async def test_a_stop_on_line_stops_the_motors_of_every_line() -> None:
     async with two_lines() as made:
         await made.until(lambda: turning(made) == [True, True])
-        assert made.app.stops_whom == "STOP ALL"
+        assert made.app.stop_target_text == "STOP ALL"
         await made.pilot.press("space")
         await made.until(lambda: turning(made) == [False, False])
 
@@ -112,11 +112,11 @@ async def test_leaving_tells_of_the_drives_of_both() -> None:
             one.fleet.sessions[0].note_command()
         await made.pilot.press("q")
         await made.until(lambda: app.screen is not app.connection)
-        said = "\n".join(str(one.render()) for one in app.screen.query("#follows"))
+        output = "\n".join(str(one.render()) for one in app.screen.query("#follows"))
         for one in app.panel_lines:
-            assert one.opened.label in said
-        assert "Altivar 71" in said
-        assert "Altivar 312" in said
+            assert one.opened.label in output
+        assert "Altivar 71" in output
+        assert "Altivar 312" in output
 
 
 async def test_the_same_line_with_other_settings_is_closed_only_after_asking() -> None:
@@ -138,10 +138,12 @@ async def test_foreign_frames_are_reported_with_the_name_of_a_line_that_is_not_s
             assert isinstance(line, Line)
             for _ in range(SEVERAL_FRAMES):
                 line._engine.tally.count_minute(None, "foreign")
-        told = f"{SEVERAL_FRAMES} foreign frames in the last minute."
+        reported = f"{SEVERAL_FRAMES} foreign frames in the last minute."
 
         def reports() -> set[str]:
-            return {e.text.partition(told)[0] for e in made.app.events.events if told in e.text}
+            return {
+                e.text.partition(reported)[0] for e in made.app.events.events if reported in e.text
+            }
 
         await made.until(lambda: reports() == {"", f"{below.opened.label}: "})
         await made.until(lambda: "▲ foreign frames" in made.shown("strip"))

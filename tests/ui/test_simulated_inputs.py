@@ -8,7 +8,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.monitor.input_keys import NOT_SIMULATED
 from tui.widgets.plain import Plain
 
-from .test_command_flows import Bench, bench, said, writes
+from .test_command_flows import Bench, bench, output, writes
 from .test_flows import until
 
 
@@ -17,7 +17,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-async def asked(made: Bench) -> None:
+async def requested(made: Bench) -> None:
     assert made.app.opened is not None
     made.app.opened.simulation = made.simulation
     await made.pilot.press("l")
@@ -26,11 +26,11 @@ async def asked(made: Bench) -> None:
 
 async def test_a_text_sets_the_inputs_of_the_drive_shown_and_writes_nothing() -> None:
     async with bench("atv312") as made:
-        await asked(made)
+        await requested(made)
         before = writes(made.app)
         await made.pilot.press(*"li4=1,ai1=5V", "enter")
         await until(made.pilot, lambda: not isinstance(made.app.screen, Ask))
-        assert "LI4 = 1, AI1 = 50 %" in said(made.app)
+        assert "LI4 = 1, AI1 = 50 %" in output(made.app)
         terminals = made.drive().terminals
         assert (terminals.closed("LI4"), terminals.level("AI1")) == (True, 0.5)
         assert writes(made.app) == before
@@ -38,7 +38,7 @@ async def test_a_text_sets_the_inputs_of_the_drive_shown_and_writes_nothing() ->
 
 async def test_a_wrong_text_is_told_and_sets_nothing() -> None:
     async with bench("atv312") as made:
-        await asked(made)
+        await requested(made)
         await made.pilot.press(*"LI1=1,LI9=1", "enter")
         fault = made.app.screen.query_one("#fault", Plain)
         await until(made.pilot, lambda: "No input is called" in str(fault.render()))
@@ -50,5 +50,5 @@ async def test_a_wrong_text_is_told_and_sets_nothing() -> None:
 async def test_on_a_real_line_it_asks_nothing() -> None:
     async with bench("atv312") as made:
         await made.pilot.press("l")
-        await until(made.pilot, lambda: NOT_SIMULATED[:40] in said(made.app))
+        await until(made.pilot, lambda: NOT_SIMULATED[:40] in output(made.app))
         assert not isinstance(made.app.screen, Ask)

@@ -194,15 +194,15 @@ async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
             assert app.take_stop_key("f9")
             await until(pilot, lambda: app.stroke is None)
             await pilot.pause()
-        told = [event for event in app.events.events if event.kind == "failed"]
-        assert {event.text.partition(",")[0] for event in told} == {"NOT STOPPED: device 7"}
+        reported = [event for event in app.events.events if event.kind == "failed"]
+        assert {event.text.partition(",")[0] for event in reported} == {"NOT STOPPED: device 7"}
         assert not app._notifications, "nothing may lie over it, and it over nothing else"
         (text,) = app.frame_now().not_stopped
         assert text.startswith("NOT STOPPED: device 7")
         app.chosen = app.fleet.consoles[0]
         assert app.take_stop_key("space")  # one drive is meant, and reached
         await pilot.pause()
-        assert [event for event in app.events.events if event.kind == "failed"] == told
+        assert [event for event in app.events.events if event.kind == "failed"] == reported
 
 
 @pytest.mark.parametrize("passed", [(SharedFacts, "commander"), (Commander, "arm")])
@@ -286,7 +286,9 @@ async def test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive(
 
 async def test_nothing_covers_that_a_motor_is_not_stopped() -> None:
     """Armed, in a question and on each size: who runs it and where to stop it, to the last word."""
-    told = "drive 1: run by its terminals (Fr1), not by Modbus. Stop it there or at the machine."
+    reported = (
+        "drive 1: run by its terminals (Fr1), not by Modbus. Stop it there or at the machine."
+    )
     async with bench("atv31", sets={"CHCF": 1, "Fr1": 1}) as made:
         made.drive().set_input("LI1", "1")
         made.drive().set_input("AI1", "5")
@@ -301,7 +303,7 @@ async def test_nothing_covers_that_a_motor_is_not_stopped() -> None:
                 made.app.look_around()
                 await made.pilot.pause()
                 screen = " ".join(line.strip() for line in picture(made.app).splitlines())
-                assert f"NOT STOPPED, {told}" in " ".join(screen.split()), (size, keys)
+                assert f"NOT STOPPED, {reported}" in " ".join(screen.split()), (size, keys)
                 assert not made.app._notifications
         made.drive().set_input("LI1", "0")
         await until(made.pilot, lambda: "NOT STOPPED" not in picture(made.app))

@@ -10,7 +10,7 @@ from rich.cells import cell_len
 from tests.drive.test_fault_reset import BY_TERMINALS
 from tui.drive.fault_reset import not_in_command
 from tui.drive.profile import library
-from tui.screens.frame import TABS, said_lines
+from tui.screens.frame import TABS, message_lines
 from tui.screens.keys.table import MONITOR, PLACES
 from tui.session.command.carry_out import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
@@ -147,9 +147,9 @@ def test_without_a_drive_the_strip_tells_the_line() -> None:
 def test_a_long_name_of_a_line_hides_nothing_that_is_told_of_it() -> None:
     path = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0 19200 8E1"
     view = StripView(line=f"{path} · only listened to", load=0.74, clock="14:02:11")
-    told = strip_line(view, 80).plain
-    assert told.startswith(" Drive Panel · …BI-if00-port0 19200 8E1 · only listened to ")
-    assert len(told) == 80
+    reported = strip_line(view, 80).plain
+    assert reported.startswith(" Drive Panel · …BI-if00-port0 19200 8E1 · only listened to ")
+    assert len(reported) == 80
     short = StripView(line="/dev/ttyUSB0 19200 8E1 · only listened to", clock="14:02:11")
     assert " · /dev/ttyUSB0 19200 8E1 · only listened to " in strip_line(short, 80).plain
 
@@ -175,8 +175,8 @@ def test_a_mark_moves_no_tab() -> None:
 @pytest.mark.parametrize("kind", ["refused", "done"])
 def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
     text = "Not sent: 80.0 Hz is above the high speed HSP, 60.0 Hz. Raise HSP on Parameters first."
-    new = said_lines(Said("14:02:11", text, kind, 1.0), 80)
-    later = said_lines(Said("14:02:11", text, kind, 60.0), 80)
+    new = message_lines(Said("14:02:11", text, kind, 1.0), 80)
+    later = message_lines(Said("14:02:11", text, kind, 60.0), 80)
     assert " ".join(" ".join(line.plain for line in new).split()).endswith(text)
     assert len(later) == 1
     assert "…" in later[0].plain
@@ -188,7 +188,7 @@ def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
 def test_failed_reset_is_shown_whole(family: str, width: int) -> None:
     for why in (not_in_command(library.load(family), BY_TERMINALS[family]), STILL_IN_FAULT):
         text = f"Fault reset: {why}"
-        lines = said_lines(Said("14:02:11", text, "done", 1.0), width)
+        lines = message_lines(Said("14:02:11", text, "done", 1.0), width)
         assert text in " ".join(" ".join(line.plain for line in lines).split())
         assert all(line.cell_len <= width for line in lines)
 

@@ -129,7 +129,7 @@ async def parameters(made: Bench) -> None:
     await files(made)
 
 
-def told(made: Bench) -> str:
+def reported(made: Bench) -> str:
     """What Scanner says, or what was said last."""
     newest = made.app.events.newest
     here = shown(made.app, "message") if made.app.screen.query("#message") else ""
@@ -142,7 +142,7 @@ async def files(made: Bench) -> None:
         file = Path(name)
         write(file, "format = 1\n[drive\n")
         await open_file(made, file)
-        await until(made.pilot, lambda: name[:20] in told(made))  # noqa: B023
+        await until(made.pilot, lambda: name[:20] in reported(made))  # noqa: B023
         assert made.app.is_running
 
 

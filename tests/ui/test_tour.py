@@ -33,8 +33,8 @@ def steps() -> list[tuple[list[str], list[str]]]:
     return [([_key(key) for key in typed.split()], SEEN.findall(see)) for typed, see in rows]
 
 
-def _key(told: str) -> str:
-    return NAMES.get(told, told if len(told) == 1 else told.lower())
+def _key(reported: str) -> str:
+    return NAMES.get(reported, reported if len(reported) == 1 else reported.lower())
 
 
 def plain(text: str) -> str:
@@ -52,10 +52,10 @@ def demo(*_: object, **__: object) -> OpenLine:
 
 
 def test_the_tour_has_its_steps() -> None:
-    told = steps()
-    assert len(told) >= 24
-    assert ["ctrl+u", "3", "full_stop", "5"] in [keys for keys, _ in told]
-    assert sum(len(texts) for _, texts in told) >= QUOTES
+    reported = steps()
+    assert len(reported) >= 24
+    assert ["ctrl+u", "3", "full_stop", "5"] in [keys for keys, _ in reported]
+    assert sum(len(texts) for _, texts in reported) >= QUOTES
 
 
 @pytest.mark.sweep  # what it shows is tested screen by screen

@@ -44,7 +44,7 @@ async def on_line(path: str) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]
         yield app, pilot
 
 
-async def told(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
+async def reported(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
     """Ask, and wait for what is found."""
     await pilot.press("N")
     await until(pilot, lambda: isinstance(app.screen, WhyScreen))
@@ -60,7 +60,7 @@ async def test_on_line_it_is_asked_by_the_address_and_the_profile_of_the_form(
         await pilot.press("escape")
         app.connection.form._fields["profile"].value = "atv71"
         app.connection.form._fields["addresses"].value = "7-9"
-        text = await told(app, pilot, "Nobody answers at address 7")
+        text = await reported(app, pilot, "Nobody answers at address 7")
         assert "Address: ADD. At OFF (0)" in text
         assert "Address 7 on" in shown(app, "asked")
         assert {request[1] for request in nobody.requests} <= {3, 43}
@@ -76,7 +76,7 @@ async def test_a_line_that_could_not_be_opened_tells_why(tmp_path: Path) -> None
     path = str(tmp_path / "ttyUSB4")
     async with on_line(f"serial:{path}") as (app, pilot):
         await until(pilot, lambda: app.connection.refused is not None)
-        text = await told(app, pilot, "There is no port")
+        text = await reported(app, pilot, "There is no port")
         assert path in "".join(text.split())
         assert "dmesg" in text
 
@@ -87,20 +87,20 @@ async def test_a_line_that_is_not_open_is_not_opened_for_it(nobody: PtyPeer) -> 
         app.connection.lines.offer(nobody.path)
         app.connection.lines.focus()
         await pilot.pause()
-        await told(app, pilot, "Nothing is wrong with this line as far as it is seen")
+        await reported(app, pilot, "Nothing is wrong with this line as far as it is seen")
         assert app.opened is None
         assert nobody.requests == []
 
 
 async def test_on_monitor_it_is_the_open_drive() -> None:
     async with panel() as made:
-        await told(made.app, made.pilot, "Address 1 answers")
+        await reported(made.app, made.pilot, "Address 1 answers")
         await made.pilot.press("space")
         await made.until(lambda: "STOPPING" in made.shown("strip"))
 
 
 def silence(family: str) -> Diagnosis:
-    heard = Heard(asked=2)
+    heard = Heard(requested=2)
     return diagnosed(Sight(SerialLink("/dev/ttyUSB0"), 2, library.load(family), heard=heard))
 
 
@@ -125,7 +125,7 @@ def test_picture(snap_compare: Callable[..., bool], size: tuple[int, int]) -> No
     async def found() -> Diagnosis:
         return silence("atv71")
 
-    async def asked(pilot: Pilot[None]) -> None:
+    async def requested(pilot: Pilot[None]) -> None:
         await pilot.pause()
         app.push_screen(WhyScreen("Why no answer? Address 2 on /dev/ttyUSB0 19200 8E1", found))
         await until(pilot, lambda: "Nobody answers" in shown(app, "reasons"))
@@ -134,4 +134,4 @@ def test_picture(snap_compare: Callable[..., bool], size: tuple[int, int]) -> No
         app.screen.draw_frame(app.frame_now())
         await pilot.pause()
 
-    assert snap_compare(app, terminal_size=size, run_before=asked)
+    assert snap_compare(app, terminal_size=size, run_before=requested)

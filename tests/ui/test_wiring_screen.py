@@ -43,9 +43,9 @@ async def test_the_page_of_the_open_drive_with_its_model() -> None:
 async def test_verdict_of_n_is_the_first_section_until_the_drive_is_well(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    seen = [Sight(RtuTcpLink("h", 1), 1, heard=Heard(asked=40, answered=30), measure=Measure(
-        asked=40, answered=30, lost=10, seconds=2.0))]  # fmt: skip
-    seen.append(replace(seen[0], measure=Measure(asked=40, answered=40)))
+    seen = [Sight(RtuTcpLink("h", 1), 1, heard=Heard(requested=40, answered=30), measure=Measure(
+        requested=40, answered=30, lost=10, seconds=2.0))]  # fmt: skip
+    seen.append(replace(seen[0], measure=Measure(requested=40, answered=40)))
 
     async def examined(*_: object, **__: object) -> Sight:
         return seen.pop(0)

@@ -49,7 +49,7 @@ def file_of(form: PacketForm, path: Path) -> Path:
     return path
 
 
-def told(program: str, path: Path, *options: str) -> str:
+def reported(program: str, path: Path, *options: str) -> str:
     """What tshark says of a file."""
     done = subprocess.run(
         [program, *options, "-r", str(path)],
@@ -65,7 +65,7 @@ def told(program: str, path: Path, *options: str) -> str:
 def fields(program: str, path: Path, *names: str, options: tuple[str, ...] = ()) -> list[list[str]]:
     """Fields of each packet, as tshark takes them out."""
     wanted = [part for name in names for part in ("-e", name)]
-    text = told(program, path, *options, "-T", "fields", "-E", "separator=;", *wanted)
+    text = reported(program, path, *options, "-T", "fields", "-E", "separator=;", *wanted)
     return [line.split(";") for line in text.splitlines()]
 
 
@@ -77,8 +77,8 @@ def test_tshark_decodes_modbus_tcp_at_once(peer: Peer, tmp_path: Path) -> None:
     )  # fmt: skip
     assert {one[0] for one in found} == {"Modbus/TCP"}
     sent = [one for one in found if one[4].startswith("192.0.2.")]
-    asked = [(d, int(request[:2], 16)) for d, request, _ in EXCHANGES]
-    assert [(int(one[1]), int(one[3])) for one in sent] == [*asked, (0, 6)]
+    requested = [(d, int(request[:2], 16)) for d, request, _ in EXCHANGES]
+    assert [(int(one[1]), int(one[3])) for one in sent] == [*requested, (0, 6)]
     assert [one[4] for one in sent] == [f"192.0.2.{one[1]}" for one in sent]
     # a reply has the number of its request
     assert [one[1:4] for one in found[0:-1:2]] == [one[1:4] for one in found[1::2]]
@@ -88,7 +88,7 @@ def test_tshark_finds_the_values_and_no_fault_in_modbus_tcp(peer: Peer, tmp_path
     path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
     program = peer("tshark", "tshark")
     checked = ("-o", "ip.check_checksum:TRUE", "-o", "tcp.check_checksum:TRUE")
-    assert told(program, path, *checked, "-Y", "_ws.malformed or tcp.analysis.flags") == ""
+    assert reported(program, path, *checked, "-Y", "_ws.malformed or tcp.analysis.flags") == ""
     sums = fields(program, path, "ip.checksum.status", "tcp.checksum.status", options=checked)
     assert {tuple(one) for one in sums} == {("1", "1")}
     (values,) = [
@@ -119,8 +119,8 @@ def test_tshark_reads_raw_frames_as_it_is_told(peer: Peer, tmp_path: Path) -> No
     assert (last, file) == ("-r", "FILE")
     names = ("_ws.col.Protocol", "mbrtu.unit_id", "mbrtu.crc16.status")
     whole = fields(program, path, *names, options=tuple(options))[: 2 * len(EXCHANGES)]
-    asked = [[str(device)] * 2 for device, _, _ in EXCHANGES]
-    assert whole == [["Modbus RTU", device, "1"] for pair in asked for device in pair]
+    requested = [[str(device)] * 2 for device, _, _ in EXCHANGES]
+    assert whole == [["Modbus RTU", device, "1"] for pair in requested for device in pair]
     damaged = tmp_path / "damaged.pcapng"
     damaged.write_bytes(path.read_bytes().replace(bytes.fromhex("0637"), b"\x06\x38", 1))
     checked = fields(program, damaged, *names, options=tuple(options))

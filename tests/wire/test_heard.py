@@ -176,7 +176,7 @@ def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]
 
 
 @pytest.mark.parametrize(
-    ("readings", "told"),
+    ("readings", "reported"),
     [
         ((READ, WORDS), [(2, 3, "ok")]),
         ((READ + WORDS,), [(2, 3, "ok")]),
@@ -202,9 +202,9 @@ def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]
     ],
 )
 def test_what_becomes_of_requests(
-    readings: tuple[bytes, ...], told: list[tuple[int, int, str]]
+    readings: tuple[bytes, ...], reported: list[tuple[int, int, str]]
 ) -> None:
-    assert answers(*readings) == told
+    assert answers(*readings) == reported
 
 
 def test_a_write_that_is_sent_again_is_no_reply() -> None:

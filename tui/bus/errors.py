@@ -113,7 +113,7 @@ class ExchangeError(LineError):
         super().__init__(text)
 
 
-def _asked(function: int, address: int) -> str:
+def _request_text(function: int, address: int) -> str:
     return f"function {function}" + (f", register {address}" if function in _WITH_ADDRESS else "")
 
 
@@ -134,7 +134,7 @@ class NoAnswer(ExchangeError):
     ) -> None:
         self.retry_in = retry_in
         self.detail = detail
-        text = detail or f"Device {device} did not answer ({_asked(function, address)})."
+        text = detail or f"Device {device} did not answer ({_request_text(function, address)})."
         if retry_in is not None:
             text += f" It is asked again in {retry_in:.1f} s."
         super().__init__(device, function, address, text)
@@ -149,7 +149,7 @@ class ChecksumFault(ExchangeError):
         self.received = received
         self.detail = detail
         text = detail or (
-            f"The answer of device {device} was damaged ({_asked(function, address)}). "
+            f"The answer of device {device} was damaged ({_request_text(function, address)}). "
             "Check wiring, termination and the format of the line."
         )
         super().__init__(device, function, address, text)
@@ -163,7 +163,8 @@ class WrongReply(ExchangeError):
     ) -> None:
         self.received = received
         self.detail = detail
-        text = f"Device {device} answered something else than asked ({_asked(function, address)})"
+        request = _request_text(function, address)
+        text = f"Device {device} sent an unexpected reply ({request})"
         super().__init__(device, function, address, f"{text}: {detail}." if detail else f"{text}.")
 
 
@@ -197,7 +198,8 @@ class DeviceException(ExchangeError):
             device,
             function,
             address,
-            f"Device {device} refused {_asked(function, address)} with exception {code}{why}.",
+            f"Device {device} refused {_request_text(function, address)} with exception"
+            f" {code}{why}.",
         )
 
 

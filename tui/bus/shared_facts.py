@@ -16,7 +16,7 @@ from .keep_alive import KeepAlives
 from .leases import WriteLeases
 from .notes import Notes
 from .program import KEEPER, Program
-from .share.messages import AnyMessage, AskedFor, Claim, Granting, Hush, StopGiven, Told
+from .share.messages import AnyMessage, AskedFor, Claim, Granting, Notified, PollPause, StopGiven
 from .share.voices import LineVoice
 from .stop_counts import GivenStops, StopCounts
 
@@ -37,7 +37,7 @@ class SharedFacts(FactsHeard):
         """All on the line, the owner first."""
         self.commanders: Mapping[int, str] = MappingProxyType({})
         """Ids of the programs that command, by device."""
-        self.hushed: Mapping[int, tuple[str, str]] = MappingProxyType({})
+        self.paused: Mapping[int, tuple[str, str]] = MappingProxyType({})
         """Devices that nobody asks now: by whose id, and why."""
         self.stops = StopCounts()
         """How many stops each device was given, by all programs."""
@@ -77,7 +77,7 @@ class SharedFacts(FactsHeard):
         programs: tuple[Program, ...],
         commanders: Mapping[int, str],
         given: GivenStops,
-        hushed: Mapping[int, tuple[str, str]],
+        paused: Mapping[int, tuple[str, str]],
         departed: tuple[Program, ...] = (),
     ) -> tuple[int, ...]:
         """Take over what the owner tells; what this program claims is its own until denied.
@@ -87,9 +87,9 @@ class SharedFacts(FactsHeard):
         with self._lock:
             others = {d: one for d, one in commanders.items() if one != self.me.id}
             mine = {d: one for d, one in self.commanders.items() if one == self.me.id}
-            told = {d: one for d, one in hushed.items() if one[0] != self.me.id}
-            own = {d: one for d, one in self.hushed.items() if one[0] == self.me.id}
-            self.hushed = MappingProxyType({**told, **own})
+            reported = {d: one for d, one in paused.items() if one[0] != self.me.id}
+            own = {d: one for d, one in self.paused.items() if one[0] == self.me.id}
+            self.paused = MappingProxyType({**reported, **own})
             self.commanders = MappingProxyType({**others, **mine})
             unheard = self.stops.replace(given, self.me.id)
             known = {one.id for one in (*self.departed, *programs, self.me)}
@@ -114,7 +114,7 @@ class SharedFacts(FactsHeard):
     def tell_all(self, device: int, text: str) -> None:
         """Have every program on the line tell its person something about a device."""
         self.hear_text(device, text)
-        self._tell(Told(device, text[:MOST_TEXT]))
+        self._tell(Notified(device, text[:MOST_TEXT]))
 
     def _tell(self, message: AnyMessage) -> None:
         """Carry what is done here to the other programs, if there are any; in any thread."""
@@ -123,26 +123,26 @@ class SharedFacts(FactsHeard):
 
     # Left alone
 
-    def hush(self, device: int, why: str) -> None:
+    def pause_polling(self, device: int, why: str) -> None:
         """Let nobody ask a device, but for what belongs to a stop."""
-        self.note_hush(device, self.me.id, why)
-        self._tell(Hush(device, why[:MOST_NOTICE]))
+        self.note_pause(device, self.me.id, why)
+        self._tell(PollPause(device, why[:MOST_NOTICE]))
 
     def unhush(self, device: int) -> None:
         """Let a device be asked again."""
-        self.note_hush(device, self.me.id, "")
-        self._tell(Hush(device, ""))
+        self.note_pause(device, self.me.id, "")
+        self._tell(PollPause(device, ""))
 
-    def note_hush(self, device: int, program: str, why: str) -> None:
+    def note_pause(self, device: int, program: str, why: str) -> None:
         """A program leaves a device alone, or with no reason no longer."""
         with self._lock:
-            rest = {d: one for d, one in self.hushed.items() if d != device}
-            self.hushed = MappingProxyType({**rest, device: (program, why)} if why else rest)
+            rest = {d: one for d, one in self.paused.items() if d != device}
+            self.paused = MappingProxyType({**rest, device: (program, why)} if why else rest)
 
     def _leave_alone_no_more(self, devices: Iterable[int]) -> None:
         """A stop ends what a device was left alone for: it is looked at until it stands."""
         for device in devices:
-            self.note_hush(device, "", "")
+            self.note_pause(device, "", "")
 
     # Stops
 
@@ -216,8 +216,8 @@ class SharedFacts(FactsHeard):
         with self._lock:
             held = {d: one for d, one in self.commanders.items() if one != program.id}
             self.commanders = MappingProxyType(held)
-            left = {d: one for d, one in self.hushed.items() if one[0] != program.id}
-            self.hushed = MappingProxyType(left)
+            left = {d: one for d, one in self.paused.items() if one[0] != program.id}
+            self.paused = MappingProxyType(left)
             rest = tuple(one for one in self.programs if one.id != program.id)
         self.leases.end(program.id)
         self.keep_alives.end(program.id)

@@ -84,7 +84,7 @@ class StopCounts:
             self.learn_times(dict.fromkeys(news, when or time.monotonic()))
             return news
 
-    def learn_times(self, told: Mapping[int, float]) -> None:
+    def learn_times(self, reported: Mapping[int, float]) -> None:
         """Take over when devices were stopped; a time to come is of an earlier run of the machine.
 
         It decides about commands that were typed before a stop and came to the line after it.
@@ -92,7 +92,7 @@ class StopCounts:
         now = time.monotonic()
         with self._lock:
             known = dict(self.times)
-            for device, when in told.items():
+            for device, when in reported.items():
                 if when <= now:
                     known[device] = max(when, known.get(device, when))
             self.times = MappingProxyType(known)
@@ -108,14 +108,14 @@ class StopCounts:
         since = time.monotonic() - STOPS_KEPT
         return {device: when for device, when in self.times.items() if when > since}
 
-    def learn(self, told: GivenStops) -> tuple[int, ...]:
+    def learn(self, reported: GivenStops) -> tuple[int, ...]:
         """Take over counts that are higher than those known; returns the devices of which some are.
 
         A count never goes down: that would let a write through that a stop has voided.
         """
         with self._lock:
             most = {device: dict(counts) for device, counts in self.given.items()}
-            for device, counts in told.items():
+            for device, counts in reported.items():
                 known = most.setdefault(device, {})
                 for program, count in counts.items():
                     if is_newer(count, known.get(program, 0)):
@@ -151,7 +151,7 @@ class StopCounts:
             self.fold(set().union(*crowded) - {program, GIVEN_BY_NOBODY, *present})
             return tuple({*news, *corrected})
 
-    def replace(self, told: GivenStops, me: str) -> tuple[int, ...]:
+    def replace(self, reported: GivenStops, me: str) -> tuple[int, ...]:
         """Take over the counts of the line's owner, but for those of this program itself.
 
         Returns the devices of which stops are told that were not known.
@@ -160,7 +160,7 @@ class StopCounts:
             own = {
                 device: {me: counts[me]} for device, counts in self.given.items() if me in counts
             }
-            before, self.given = self.totals, MappingProxyType(told)
+            before, self.given = self.totals, MappingProxyType(reported)
             self.learn(own)
             return self._risen(before)
 

@@ -28,10 +28,10 @@ def _tell(error: BaseException) -> None:
     """Tell an error and end with its status."""
     import click
 
-    from .shared.errors import told
+    from .shared.errors import reported
 
     @click.command()
-    @told
+    @reported
     def failed() -> None:
         raise error
 

@@ -167,7 +167,9 @@ class Commands(click.Group):
             return list({item.value: item for item in (*own, *more)}.values())
         from .shared.completion import complete_line
 
-        names = [CompletionItem(name, help=told) for name, (_, told) in sorted(COMMANDS.items())]
+        names = [
+            CompletionItem(name, help=reported) for name, (_, reported) in sorted(COMMANDS.items())
+        ]
         lines = complete_line(ctx, panel.params[0], incomplete)
         return [*(item for item in names if item.value.startswith(incomplete)), *lines]
 
@@ -182,8 +184,8 @@ def no_such_command(name: str) -> str:
     from difflib import get_close_matches
 
     near = get_close_matches(name.lower(), COMMANDS, n=1)
-    meant = f", did you mean {near[0]}?" if near else ", and no LINE."
-    return f"{name}: no such command{meant}"
+    intended = f", did you mean {near[0]}?" if near else ", and no LINE."
+    return f"{name}: no such command{intended}"
 
 
 @click.group(

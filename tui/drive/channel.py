@@ -44,9 +44,9 @@ def channel_codes(profile: Profile) -> list[str]:
     """Codes of all words that tell the channels in force, and what switches them."""
     channels = profile.data.channels
     rows = [*channels.command, *channels.reference]
-    told = [(row.parameter, row.when) for row in rows]
-    told += [(switch.parameter, switch.when) for switch in channels.switches]
-    codes = [code for own, when in told for code in (*(one.parameter for one in when), own)]
+    reported = [(row.parameter, row.when) for row in rows]
+    reported += [(switch.parameter, switch.when) for switch in channels.switches]
+    codes = [code for own, when in reported for code in (*(one.parameter for one in when), own)]
     return list(dict.fromkeys(codes))
 
 

@@ -51,7 +51,7 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
     chart = profile.chart(raws)
     word = raws.get(chart.status) if chart else None
     if chart is None or word is None:
-        return ChartState(TOLD_FAULT if told_fault(profile, raws) is not None else UNKNOWN)
+        return ChartState(TOLD_FAULT if fault_number(profile, raws) is not None else UNKNOWN)
     return ChartState(
         state=state_now(profile, chart, raws),
         own=state_of(chart, word),
@@ -76,12 +76,12 @@ def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
     """
     word = raws.get(chart.status)
     own = state_of(chart, word) if word is not None else UNKNOWN
-    if own.kind == "fault" or told_fault(profile, raws) is None:
+    if own.kind == "fault" or fault_number(profile, raws) is None:
         return own
     return next((state for state in chart.states if state.kind == "fault"), TOLD_FAULT)
 
 
-def told_fault(profile: Profile, raws: Mapping[str, int]) -> int | None:
+def fault_number(profile: Profile, raws: Mapping[str, int]) -> int | None:
     """The fault of now by the fault word; None where it tells none, or keeps the last one."""
     faults = profile.data.faults
     raw = raws.get(faults.parameter)

@@ -101,11 +101,11 @@ def _flowed(row: PageRow, width: int) -> Iterator[PageLine]:
 
 
 def _warnings(data: ProfileData) -> Iterator[PageRow]:
-    said = [*data.wiring.warnings]
-    for one in said:
+    message = [*data.wiring.warnings]
+    for one in message:
         yield PageRow("!", one.text, SURENESS[one.confidence], True)
     watch = data.communication_fault
-    known = {one.text for one in said}
+    known = {one.text for one in message}
     for text in watch.warnings if watch else ():
         if text not in known:
             yield PageRow("!", text, "", True)

@@ -54,7 +54,7 @@ class ResetText:
     """How a fault ends, in a sentence or two, and whether the drive itself says so."""
 
     text: str
-    told_by_drive: bool
+    by_drive: bool
     wait: str = ""
 
 
@@ -76,20 +76,20 @@ def reset_text(
 
 def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
     """Whether the drive says that a reset can work now; None where it does not tell."""
-    told = profile.data.faults.reset_ready
-    raw = raws.get(told.parameter) if told else None
-    if told is None or raw is None:
+    reported = profile.data.faults.reset_ready
+    raw = raws.get(reported.parameter) if reported else None
+    if reported is None or raw is None:
         return None
-    return (raw >> told.bit & 1) == told.value
+    return (raw >> reported.bit & 1) == reported.value
 
 
 def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
     """Parameters to read for a fault that is looked at."""
-    told = profile.data.faults.reset_ready
+    reported = profile.data.faults.reset_ready
     codes = [look.code for look in hint.look_at] if hint else []
     for row in hint.ruled_out if hint else ():
         codes += [row.parameter, *(when.parameter for when in row.when)]
-    return list(dict.fromkeys([*codes, *([told.parameter] if told else [])]))
+    return list(dict.fromkeys([*codes, *([reported.parameter] if reported else [])]))
 
 
 def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: bool) -> FaultAdvice:

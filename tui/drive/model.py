@@ -29,7 +29,7 @@ def model_of(profile: Profile, raws: Mapping[str, int]) -> Model | None:
     return found[0] if len(found) == 1 else None
 
 
-def model_told(profile: Profile, raws: Mapping[str, int]) -> str:
+def model_read(profile: Profile, raws: Mapping[str, int]) -> str:
     """The model that a drive tells, in words; empty where it tells none."""
     model = model_of(profile, raws)
     if model is not None:

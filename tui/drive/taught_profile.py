@@ -35,9 +35,9 @@ def is_raw(family: Profile, parameter: Parameter) -> bool:
     """
     measured = parameter.access == "r" and parameter.quantity is None
     measured = measured and (parameter.min, parameter.max, parameter.factory) == (None, None, None)
-    told = bool(parameter.unit or parameter.scale_by or parameter.unit_by or parameter.values)
-    told = told or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
-    return not told and (measured or not is_verified(parameter)) and word_count(parameter) == 1
+    reported = bool(parameter.unit or parameter.scale_by or parameter.unit_by or parameter.values)
+    reported = reported or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
+    return not reported and (measured or not is_verified(parameter)) and word_count(parameter) == 1
 
 
 def teachable_codes(family: Profile) -> list[str]:

@@ -142,8 +142,8 @@ def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
     """Every scale of the list with which all looks agree, with its sign; none without a look."""
     if not looks or (unit := _unit_of(looks)) is None:
         return []
-    told = any(look.word >= SIGN_FROM for look in looks)
-    signs: tuple[bool | None, ...] = (False, True) if told else (None,)
+    reported = any(look.word >= SIGN_FROM for look in looks)
+    signs: tuple[bool | None, ...] = (False, True) if reported else (None,)
     tried = (TaughtScale(scale, unit, signed) for scale in SCALES for signed in signs)
     return [one for one in tried if all(_agrees(look, one) for look in looks)]
 

@@ -174,7 +174,7 @@ class Panel(LeanApp):
 
     @property
     @abstractmethod
-    def stops_whom(self) -> str:
+    def stop_target_text(self) -> str:
         """The words of the stop key in the line of keys."""
 
     def tell(self, text: str) -> None:

@@ -89,13 +89,13 @@ class PanelScreen(Framed):
 
     def _keys(self, width: int) -> list[Text]:
         """The line of keys."""
-        whom, field = self.app.stops_whom, self.focused
+        target, field = self.app.stop_target_text, self.focused
         if self.app.opening.goes_on:
-            keys = opening_line(width, whom)
+            keys = opening_line(width, target)
         elif takes_text(field):
-            keys = typing_line(width, whom, self.typing_keys(), spaces=takes_space(field))
+            keys = typing_line(width, target, self.typing_keys(), spaces=takes_space(field))
         else:
-            keys = keys_line(self.name_of_screen, width, whom)
+            keys = keys_line(self.name_of_screen, width, target)
         return [key_line(keys)]
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
@@ -111,8 +111,8 @@ class PanelScreen(Framed):
         """A key that means nothing here says where it does, and does nothing."""
         if event.key in self.active_bindings or isinstance(self.focused, Input):
             return
-        if said := elsewhere(self.name_of_screen, event.key, event.character):
-            self.app.tell(said)
+        if message := elsewhere(self.name_of_screen, event.key, event.character):
+            self.app.tell(message)
 
     def hint_keys(self, keys: str) -> None:
         """Show a sentence about keys after the newest message, on this screen only."""

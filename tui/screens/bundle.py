@@ -37,7 +37,7 @@ ABOUT_BUNDLE = (
 
 def ask_bundle(app: Panel) -> None:
     """Ask for the name of the file; then collect what goes into it."""
-    find_target = getattr(app.screen, "why_meant", None)
+    find_target = getattr(app.screen, "why_target_now", None)
     target = find_target() if find_target is not None else None
     opened = target.opened if target is not None else app.opened
     text = target.text if target is not None else app.line_text

@@ -23,7 +23,7 @@ from tui.widgets.drawing import key_line, wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
 from tui.widgets.small import is_too_small, small_lines
-from tui.widgets.strip import FrameView, Said, Tab, said_line, strip_line, tabs_line
+from tui.widgets.strip import FrameView, Said, Tab, message_line, strip_line, tabs_line
 
 from .keys.action import (
     BLOCKS,
@@ -103,17 +103,17 @@ class Framed(Screen[Any]):
         here = (self.TITLE or "").lower() or view.place
         here = FRAMES if here == LISTENING else here  # a mode of it
         lead = not self.takes_letters
-        news = view.said is not None or not view.not_stopped
+        news = view.message is not None or not view.not_stopped
         parts = {
             "strip": [strip_line(view.strip, width)],
             "tabs": [tabs_line(TABS, here, view.marks, width, lead=lead)],
             "said": [
                 *not_stopped_lines(view.not_stopped, width),
-                *(said_lines(view.said, width, lead=lead) if news else ()),
+                *(message_lines(view.message, width, lead=lead) if news else ()),
             ],
         }
         if self.is_modal:
-            stops = stop_keys(self.app.stops_whom, typing=takes_space(self.focused))
+            stops = stop_keys(self.app.stop_target_text, typing=takes_space(self.focused))
             parts[DIALOG_KEYS] = [key_line(stops)]
         return parts
 
@@ -168,12 +168,12 @@ class Framed(Screen[Any]):
             part = self._frame_parts.get(place)
             if part is None or not part.is_attached:
                 continue  # a screen that is being made, or goes
-            if place == "said" and self.said_rows != len(lines):
+            if place == "said" and self.message_rows != len(lines):
                 part.styles.height = len(lines)
             part.show(lines)
 
     @property
-    def said_rows(self) -> int:
+    def message_rows(self) -> int:
         """Rows of the message."""
         part = self._frame_parts.get("said")
         height = part.styles.height if part is not None else None
@@ -191,7 +191,7 @@ class Framed(Screen[Any]):
                 return  # the frame would come over it
             self._small = Lines(id="small")
             self.mount(self._small)
-        self._small.show(small_lines(view.strip, self.app.stops_whom, *self.size))
+        self._small.show(small_lines(view.strip, self.app.stop_target_text, *self.size))
 
 
 def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
@@ -203,27 +203,31 @@ def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
     return [Text(f" {part:<{room}} ", FAULT_BLOCK, no_wrap=True) for part in parts]
 
 
-def said_lines(said: Said | None, width: int, *, lead: bool = True) -> list[Text]:
+def message_lines(message: Said | None, width: int, *, lead: bool = True) -> list[Text]:
     """The message; one that is new has as many lines as it takes, up to `WHOLE_LINES`.
 
     `lead` says whether the keys that show more lead there now.
     """
-    if said is None:
+    if message is None:
         return [Text("")]
-    style = SAID_STYLES.get(said.kind, FAINT)
+    style = SAID_STYLES.get(message.kind, FAINT)
     room = width - 12
-    if said.kind in WHOLE_KINDS and said.age < WHOLE_FOR and len(plain(said.text)) > room - 12:
-        parts = wrapped(said.text, max(10, room), WHOLE_LINES)
+    if (
+        message.kind in WHOLE_KINDS
+        and message.age < WHOLE_FOR
+        and len(plain(message.text)) > room - 12
+    ):
+        parts = wrapped(message.text, max(10, room), WHOLE_LINES)
         lines = []
         for number, part in enumerate(parts):
-            line = Text(f" {said.when if not number else '':<8} ", FAINT, no_wrap=True)
+            line = Text(f" {message.when if not number else '':<8} ", FAINT, no_wrap=True)
             line.append(part, style)
             lines.append(line)
         return lines
     hint = "m messages" if width >= 60 and lead else ""
-    if lead and said.there and said.kind == "fault" and width >= 72:
+    if lead and message.there and message.kind == "fault" and width >= 72:
         hint = "[ ] there"
-    return [said_line(said.when, said.text, style, hint, width)]
+    return [message_line(message.when, message.text, style, hint, width)]
 
 
 def at(wall: float) -> str:

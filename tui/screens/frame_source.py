@@ -64,7 +64,7 @@ class FrameSource:
             trouble=fleet.health.troubles[0].signs if fleet and fleet.health.troubles else (),
         )
         marks = _marks(console, fleet)
-        news, not_stopped = self._said(console, now), not_stopped_texts(app, now)
+        news, not_stopped = self._message(console, now), not_stopped_texts(app, now)
         if news is not None and repeats(news.text, not_stopped):
             news = None
         return FrameView(strip, app.place, marks, news, not_stopped)
@@ -102,7 +102,7 @@ class FrameSource:
             self._busy = (now, busy)
         return self._load
 
-    def _said(self, console: DriveConsole | None, now: float) -> Said | None:
+    def _message(self, console: DriveConsole | None, now: float) -> Said | None:
         """What holds now before what was said: a lost line, a drive that is not heard."""
         holds = self._line_trouble(now) or self._not_heard() or self._trouble_below(now)
         if holds:
@@ -169,9 +169,9 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
     report = fleet.stopper.reports.get(session.device)
     by_look = snapshot is None or (look is not None and look.time > snapshot.time)
     state, age, readings = _seen(console, look if by_look else None, now)
-    kind, words = said_state(console, state, report, now, readings)
+    kind, words = state_cell(console, state, report, now, readings)
     values = {
-        quantity: said_value(console, readings, quantity)
+        quantity: value_cell(console, readings, quantity)
         for quantity in ("output_frequency", "frequency_reference", "motor_current")
     }
     armed = console.commander.armed_for
@@ -208,7 +208,7 @@ def _seen(
     return snapshot.state, age if lost else None, dict(snapshot.readings)
 
 
-def said_state(
+def state_cell(
     console: DriveConsole,
     state: DriveState | None,
     report: StopReport | None,
@@ -253,7 +253,7 @@ def stands_by(console: DriveConsole, state: DriveState) -> bool:
     return chart_in_force(profile, raws) is not None and hindrance(profile, raws) is None
 
 
-def said_value(
+def value_cell(
     console: DriveConsole, readings: Mapping[str, Reading], quantity: str
 ) -> tuple[str, str]:
     """Text and unit of a quantity that was read; empty where it was not."""

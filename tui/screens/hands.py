@@ -268,7 +268,7 @@ class Hands(Panel):
         return chosen if known else None
 
     @property
-    def stops_whom(self) -> str:
+    def stop_target_text(self) -> str:
         """The words of the stop key in the line of keys."""
         chosen = self._open_drive()
         if self.hearing and not self.fleets:

@@ -40,8 +40,8 @@ def why_not_hear(fleet: Fleet) -> str:
         who = "; ".join(names_of([one]) for one in running)
         return f"Not listened to: {who} runs by a command from here. Stop it first."
     if acting := watch.left_alone():
-        told = next(one for one in fleet.sessions if one.device in acting)
-        text = left_alone_text(told, watch=acting[told.device])
+        reported = next(one for one in fleet.sessions if one.device in acting)
+        text = left_alone_text(reported, watch=acting[reported.device])
         return f"Not listened to, as the panel feeds drives. {text} {CLOSE_FIRST}"
     if unread := watch.unread():
         who = names_of([unread[0]])

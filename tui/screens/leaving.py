@@ -28,7 +28,7 @@ class Leaving(Panel):
 
     settled: bool
     """Whether it was decided what becomes of motors that run by an order from here."""
-    _asked: Confirm | None = None
+    _requested: Confirm | None = None
     """The question before leaving, while nothing runs by a command from here."""
 
     async def action_quit(self) -> None:
@@ -39,36 +39,36 @@ class Leaving(Panel):
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
-            told = self._told(self.fleets, on_purpose=True)
-            asked = Leave("\n".join(told), MotorsNow(self, running))
-            self.push_screen(asked, self._leave_motors)
+            reported = self._leaving_report(self.fleets, on_purpose=True)
+            requested = Leave("\n".join(reported), MotorsNow(self, running))
+            self.push_screen(requested, self._leave_motors)
             return
-        if self._asked in self.screen_stack:
+        if self._requested in self.screen_stack:
             return
-        self._asked = self._question(self.fleets, "Leave the panel?", yes="leaves", no="stays")
-        if self._asked is None:
+        self._requested = self._question(self.fleets, "Leave the panel?", yes="leaves", no="stays")
+        if self._requested is None:
             self.exit()
         else:
-            self.push_screen(self._asked, self._leave)
+            self.push_screen(self._requested, self._leave)
 
     def _motors(self) -> list[DriveSession]:
         """Drives of all lines commanded from here whose motors do not surely stand."""
         return [one for fleet in self.fleets for one in fleet.line_watch.under_command()]
 
-    def _told(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
+    def _leaving_report(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
         """What becomes of the drives of lines that are left; of several lines each by its name.
 
         `on_purpose`: motors that run are put on record as left running.
         """
-        told = []
+        reported = []
         for fleet in fleets:
             running = fleet.line_watch.under_command()
             here = self._left_running(fleet, running, on_purpose=on_purpose)
             here += self._left_behind(fleet)
             here += [*self._tripping(fleet, running), *self._unfinished(fleet)]
             label = next((o.opened.label for o in self.panel_lines if o.fleet is fleet), "")
-            told += [f"{label}:", *here] if here and len(self.panel_lines) > 1 else here
-        return told
+            reported += [f"{label}:", *here] if here and len(self.panel_lines) > 1 else here
+        return reported
 
     def _left_running(
         self, fleet: Fleet, sessions: list[DriveSession], *, on_purpose: bool
@@ -77,11 +77,11 @@ class Leaving(Panel):
         from tui.session.monitor.timeout import left_alone_text
         from tui.session.sharing.leaving import left_to_others
 
-        told = []
+        reported = []
         for one in sessions:
-            told.append(left_alone_text(one, watch=fleet.line_watch.watch(one.device)))
-            told += [others] if (others := left_to_others(one, on_purpose=on_purpose)) else []
-        return told
+            reported.append(left_alone_text(one, watch=fleet.line_watch.watch(one.device)))
+            reported += [others] if (others := left_to_others(one, on_purpose=on_purpose)) else []
+        return reported
 
     def _left_behind(self, fleet: Fleet) -> list[str]:
         """Motors that no program commands, who started each, and what to do."""
@@ -97,18 +97,18 @@ class Leaving(Panel):
         """Which drives act on their communication timeout once they are left, and when."""
         from tui.session.monitor.timeout import left_alone_text, names_of
 
-        told = {session.device for session in but}
+        reported = {session.device for session in but}
         line_watch = fleet.line_watch
         alike: dict[tuple[str, TimeoutWatch], list[DriveSession]] = {}
         for console in fleet.consoles:
             watch = line_watch.left_alone().get(console.device)
-            if watch is not None and console.device not in told:
+            if watch is not None and console.device not in reported:
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
         found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
             f"{names_of([one])}: what it does on loss of communication was not read yet."
             for one in line_watch.unread()
-            if one.device not in told
+            if one.device not in reported
         ]
         found += [
             f"Device {device}: what it does when it is asked no more is not known."
@@ -176,16 +176,16 @@ class Leaving(Panel):
         the answer.
         """
         fleets = [self.fleet] if self.fleet is not None else []
-        asked = self._question(fleets, question, yes=yes, no=no, always=always)
-        if asked is None:
+        requested = self._question(fleets, question, yes=yes, no=no, always=always)
+        if requested is None:
             return True
         answer: asyncio.Future[bool | None] = asyncio.get_running_loop().create_future()
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if not answer.done():  # who asked may have given up meanwhile
                 answer.set_result(sure)
 
-        self.push_screen(asked, told)
+        self.push_screen(requested, reported)
         return bool(await answer)
 
     def _question(
@@ -195,31 +195,31 @@ class Leaving(Panel):
         from .dialogs.confirm import Confirm
         from .dialogs.now import MotorsNow
 
-        told = self._told(fleets)
+        reported = self._leaving_report(fleets)
         if always:
-            told.insert(0, always)
-        if not told:
+            reported.insert(0, always)
+        if not reported:
             return None
         drives = [one for fleet in fleets for one in _concerned(fleet)]
         now = MotorsNow(self, drives) if drives else None
-        return Confirm(question, "\n".join(told), yes=yes, no=no, loses=True, now=now)
+        return Confirm(question, "\n".join(reported), yes=yes, no=no, loses=True, now=now)
 
     def _unfinished(self, fleet: Fleet) -> list[str]:
         """What would be lost of the work on parameters."""
-        told = []
+        reported = []
         for console in fleet.consoles:
             device, editor = console.device, console.begun_editor
             if editor is not None and len(editor.staging.edits):
                 count = len(editor.staging.edits)
                 edits = "edit is" if count == 1 else "edits are"
-                told.append(f"Device {device}: {count} staged {edits} not written.")
+                reported.append(f"Device {device}: {count} staged {edits} not written.")
             if count := len(console.session.unsaved):
                 are, they = ("setting is", "it is") if count == 1 else ("settings are", "they are")
-                told.append(
+                reported.append(
                     f"Device {device}: {count} written {are} not saved to EEPROM; {they} lost at"
                     " power-off."
                 )
-        return told
+        return reported
 
 
 def _concerned(fleet: Fleet) -> list[DriveSession]:

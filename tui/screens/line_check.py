@@ -25,7 +25,7 @@ class LineCheck(Panel):
 
     def __init__(self) -> None:
         super().__init__()
-        self._asked_of: tuple[str, ...] = ()
+        self._waiting_for: tuple[str, ...] = ()
         """What differs, as it was asked about last."""
         self._line_question: Confirm | None = None
         """The last question of that."""
@@ -35,13 +35,13 @@ class LineCheck(Panel):
         """Ask about what differs, once nobody searches and no other question stands."""
         known = self._known()
         if known is None:
-            self._asked_of, self._connected_since = (), None
+            self._waiting_for, self._connected_since = (), None
             return
         self._look_again(known)
         self._ask_again_if_hidden()
         if not known.changed:
-            self._asked_of = ()
-        elif set(known.changed) - {*self._asked_of} and not self._is_busy():
+            self._waiting_for = ()
+        elif set(known.changed) - {*self._waiting_for} and not self._is_busy():
             self._ask(known, by_itself=True)
 
     def action_accept_line(self) -> None:
@@ -74,7 +74,7 @@ class LineCheck(Panel):
         if self.screen.is_modal:
             return
         question.void()  # nothing is asked twice by a way back to it
-        self._asked_of, self._line_question = (), None
+        self._waiting_for, self._line_question = (), None
 
     def _look_again(self, known: KnownLine) -> None:
         """A line that was lost may have come back with another adapter."""
@@ -89,17 +89,17 @@ class LineCheck(Panel):
     def _ask(self, known: KnownLine, *, by_itself: bool = False) -> None:
         from .dialogs.confirm import Confirm
 
-        self._asked_of = changed = known.changed
+        self._waiting_for = changed = known.changed
         self.events.add("alarm", " ".join(changed))
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if sure and known.changed == changed:
                 # in a thread: the disk may hang, and the line is written to at once
                 threading.Thread(target=known.accept, name="line check", daemon=True).start()
             elif sure:
-                self._asked_of = ()  # more has come meanwhile: all of it is asked
+                self._waiting_for = ()  # more has come meanwhile: all of it is asked
 
-        asked = Confirm(
+        requested = Confirm(
             QUESTION,
             "\n".join((*changed, FOLLOWS)),
             yes="takes it as it is now",
@@ -107,5 +107,5 @@ class LineCheck(Panel):
             loses=True,
             by_itself=by_itself,
         )
-        self._line_question = asked
-        self.push_screen(asked, told)
+        self._line_question = requested
+        self.push_screen(requested, reported)

@@ -32,7 +32,7 @@ class Lookout(Panel):
         self._drawn: object = None
         """What of the frame is shown at once, as it was drawn last."""
         self._drawn_at = 0.0
-        self._keys_meant = ("", False)
+        self._keys_shown = ("", False)
         """Whom the stop key meant at the last look, and whether other keys meant nothing."""
         self._journal_trouble = ""
         self._left_behind_seen: set[DriveConsole] = set()
@@ -66,9 +66,9 @@ class Lookout(Panel):
         """Put the frame of the screen on top as it is now; on a slow link its figures seldom."""
         if not isinstance(self.screen, Framed):
             return
-        keys_meant = self.stops_whom, self.opening.goes_on
-        if keys_meant != self._keys_meant:
-            self._keys_meant = keys_meant
+        keys_shown_now = self.stop_target_text, self.opening.goes_on
+        if keys_shown_now != self._keys_shown:
+            self._keys_shown = keys_shown_now
             self.screen.draw_stop_keys()
         view, now = self._frame.view(), self.clock.monotonic()
         drawn = (self.screen, self.screen.size, view.at_once)

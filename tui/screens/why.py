@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 def ask_why(app: Panel) -> None:
     """Look at the drive that is meant on Line, else at the open one, and show what fails."""
-    meant = getattr(app.screen, "why_meant", None)
-    target: WhyTarget | None = meant() if meant is not None else _open_drive(app)
+    intended = getattr(app.screen, "why_target_now", None)
+    target: WhyTarget | None = intended() if intended is not None else _open_drive(app)
     if target is None:
         app.tell("No drive is meant yet: choose a line, or a drive, on Line.")
         return

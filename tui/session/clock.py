@@ -45,9 +45,9 @@ class Clock:
         """Let others go on for so many seconds; of a loop, and never less than one turn of it."""
         await asyncio.sleep(seconds)
 
-    def of_line(self, told: float) -> float:
+    def of_line(self, reported: float) -> float:
         """A moment that the line has told, time.monotonic(), on this clock."""
-        return told
+        return reported
 
 
 REAL_CLOCK = Clock()

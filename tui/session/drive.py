@@ -68,14 +68,14 @@ class DriveSession:
         self.arming.trouble = lambda: self.byte_order.text
         self.work = WorkQueue(line, device, self.arming, clock)
         """What is being done to it; a stop ends it."""
-        self.work.on_change = self.stir
+        self.work.on_change = self.request_full_read
         self.ratings: dict[str, Rating] = {}
         """What 100 % is, by code, where a person has told it from the nameplate."""
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
         self.timeout: Timeout | None = None
         """What it has told of its communication timeout; None while it was not asked."""
-        self.told_by_line = False
+        self.reported_by_line = False
         """Whether a command or reference word was written to it from here, a stop among them."""
         self.unsaved_settings = UnsavedSettings()
         """What was written by this program and is lost at power-off until the drive saves it."""
@@ -105,7 +105,7 @@ class DriveSession:
                 session.work.stop(f"{by}, {program.text}")
                 if session.starts is not None:
                     session.starts.withdraw(session)
-                session.stir()
+                session.request_full_read()
 
         def denied(device: int, why: str) -> None:
             session = held()
@@ -138,11 +138,11 @@ class DriveSession:
     def learn(self, profile: Profile) -> None:
         """Go by the family's profile with what was taught of this drive."""
         self.profile = profile
-        self.stir()
+        self.request_full_read()
 
     def note_command(self) -> None:
         """A command or reference was sent."""
-        self.told_by_line = True
+        self.reported_by_line = True
         self.commanded_at = self.clock.monotonic()
 
     def note_given(self) -> None:
@@ -157,7 +157,7 @@ class DriveSession:
             raise error
         self.image.take(found)
 
-    def stir(self) -> None:
+    def request_full_read(self) -> None:
         """Something was done to the drive: whoever watches it looks at all of it again."""
         self.stirs += 1
 

@@ -71,11 +71,11 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
         fault=fault,
         fault_raw=fault_raw,
         alarms=_alarms(profile, raws),
-        headline=_headline(chart, fault) if _asked(profile, readings) else "",
+        headline=_headline(chart, fault) if _requested(profile, readings) else "",
     )
 
 
-def _asked(profile: Profile, readings: Mapping[str, Reading]) -> bool:
+def _requested(profile: Profile, readings: Mapping[str, Reading]) -> bool:
     """Whether the words that tell the state are among those read at all."""
     return any(chart.status in readings for chart in profile.data.charts)
 

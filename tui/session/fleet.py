@@ -152,8 +152,8 @@ class Fleet:
         session.work.on_tell = partial(self._note_outcome, session.device)
         session.byte_order.on_swapped = partial(self.events.add, "failed", device=session.device)
         console = DriveConsole(session, self.journal)
-        said = identity or session.known_identity
-        self._put(FoundDrive(said, console))
+        stated = identity or session.known_identity
+        self._put(FoundDrive(stated, console))
         if before is not None:
             before.close()
         self._strangers.let_go(session.device)
@@ -169,10 +169,10 @@ class Fleet:
         if not runs or before.known_identity != session.known_identity:
             return False
         names = before.profile.name, session.profile.name
-        told = (
+        reported = (
             f"It runs by a command from here: it stays {names[0]}. Stop it, then name {names[1]}."
         )
-        self.events.add("refused", told, session.device)
+        self.events.add("refused", reported, session.device)
         return True
 
     def _recall(self, console: DriveConsole) -> None:
@@ -180,9 +180,9 @@ class Fleet:
 
         One that may be of another family is prepared to be stopped as that, too.
         """
-        session, said = console.session, console.session.known_identity
+        session, stated = console.session, console.session.known_identity
         if session.guessed or session.contradiction:
-            may_be = [said.profile] if said.profile else said.candidates
+            may_be = [stated.profile] if stated.profile else stated.candidates
             others = [library.load(one) for one in may_be if one != session.profile.id]
             families = [session.profile, *others]
             session.prepared = prepared_stop(self.line, session.device, families)

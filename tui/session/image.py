@@ -55,7 +55,7 @@ class RegisterImage:
         self._doubted: dict[str, float] = {}
         """When a word was last written, or may have been."""
         self._trusted_from = -math.inf
-        self._asked_of: dict[str, Callable[[int], None]] = {}
+        self._waiting_for: dict[str, Callable[[int], None]] = {}
         """Who wants to know what a word holds that was written without a sure answer."""
 
     @property
@@ -99,7 +99,7 @@ class RegisterImage:
 
     def take(self, found: Mapping[str, Reading]) -> None:
         """Keep replies of the drive: values, and refusals."""
-        told: list[tuple[Callable[[int], None], int]] = []
+        reported: list[tuple[Callable[[int], None], int]] = []
         with self._lock:
             held, refused = dict(self._now.held), dict(self._now.refused)
             for code, one in found.items():
@@ -114,16 +114,16 @@ class RegisterImage:
                     refused[code] = one
                 else:
                     held[code] = one
-                    if (asked := self._asked_of.pop(code, None)) is not None:
-                        told.append((asked, one.raw))
+                    if (requested := self._waiting_for.pop(code, None)) is not None:
+                        reported.append((requested, one.raw))
             self._set(held, refused)
-        for asked, raw in told:
-            asked(raw)
+        for requested, raw in reported:
+            requested(raw)
 
-    def tell_once(self, code: str, told: Callable[[int], None]) -> None:
+    def tell_once(self, code: str, reported: Callable[[int], None]) -> None:
         """Call back with what a word holds as soon as it is read again, before its next write."""
         with self._lock:
-            self._asked_of[code] = told
+            self._waiting_for[code] = reported
 
     def confirm(self, code: str, raw: int, time: float, origin: Origin = Origin.READ_BACK) -> None:
         """Keep one raw value that was read at a time on the monotonic clock."""
@@ -132,7 +132,7 @@ class RegisterImage:
     def doubt(self, code: str) -> None:
         """A word is being written: what it holds is unknown until it is read again."""
         with self._lock:
-            self._asked_of.pop(code, None)
+            self._waiting_for.pop(code, None)
             self._doubted = {**self._doubted, code: self._clock.monotonic()}
             held = {c: one for c, one in self._now.held.items() if c != code}
             self._set(held, self._now.refused)

@@ -103,7 +103,7 @@ class Journal:
         self._failures = 0
         self._lost = 0
         self._closed = False
-        self._asked = False
+        self._requested = False
         """Whether somebody waits for another try that was not begun yet."""
         self._ending: Callable[[], None] | None = None
         """What waits for the last entries where the program ends without close()."""
@@ -151,8 +151,8 @@ class Journal:
                 why = f"the disk has not answered for {since:.0f} s"
         if not why:
             return ""
-        told = f"The journal cannot be written: {why}: {self.path}."
-        return told + (f" {lost} entries lost." if lost else "")
+        reported = f"The journal cannot be written: {why}: {self.path}."
+        return reported + (f" {lost} entries lost." if lost else "")
 
     def add(self, entry: Entry, *, sent: bool = True) -> None:
         """Keep an entry; returns at once and never raises, whatever the disk does.
@@ -178,7 +178,7 @@ class Journal:
         with self._changed:
             failures = self._failures
             if not self._is_done():
-                self._asked = True
+                self._requested = True
                 self._begin()
                 self._changed.notify_all()
             self._changed.wait_for(lambda: self._is_done() or self._failures > failures, timeout)
@@ -255,16 +255,16 @@ class Journal:
             if not self._waiting:
                 self._thread = None
                 return None
-            self._begun, self._asked = time.monotonic(), False
+            self._begun, self._requested = time.monotonic(), False
             return self._waiting.popleft()
 
     def _may_go_on(self) -> bool:
         """Whether the disk is to be tried again, after a moment or as soon as somebody waits."""
         with self._changed:
-            if self._closed and not self._asked:
+            if self._closed and not self._requested:
                 self._thread = None
                 return False
-            self._changed.wait_for(lambda: self._asked, RETRY_DISK_AFTER)
+            self._changed.wait_for(lambda: self._requested, RETRY_DISK_AFTER)
             return True
 
     def _cry(self) -> None:

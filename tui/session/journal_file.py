@@ -140,10 +140,10 @@ def _opened(path: Path) -> int:
     flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     handle = os.open(path, flags, OWN_MODE)
     try:
-        told = os.fstat(handle)
-        if not stat.S_ISREG(told.st_mode):
+        reported = os.fstat(handle)
+        if not stat.S_ISREG(reported.st_mode):
             raise OSError(errno.EINVAL, "Not a regular file")
-        if told.st_mode & 0o077 and hasattr(os, "fchmod"):
+        if reported.st_mode & 0o077 and hasattr(os, "fchmod"):
             with suppress(OSError):  # of another owner, or a file system without modes
                 os.fchmod(handle, OWN_MODE)
     except BaseException:

@@ -142,7 +142,7 @@ def _entry(line: bytes) -> Entry | None:
 def _is_mark(line: bytes) -> bool:
     """Whether a line only says of the one before it that it was cut off."""
     try:
-        told = json.loads(line)
+        reported = json.loads(line)
     except (ValueError, RecursionError):
         return False
-    return isinstance(told, dict) and told.get("kind") == "mended"
+    return isinstance(reported, dict) and reported.get("kind") == "mended"

@@ -39,15 +39,15 @@ def remember_line(text: str) -> None:
     _keep(_recent_file(), lines)
 
 
-def addresses_asked(key: str) -> str:
+def address_text(key: str) -> str:
     """The addresses that were asked last on a line, as they were typed; empty where none were."""
-    asked = _all_addresses().get(key, "")
-    return asked if isinstance(asked, str) else ""
+    requested = _all_addresses().get(key, "")
+    return requested if isinstance(requested, str) else ""
 
 
 def remember_addresses(key: str, text: str) -> None:
     """Keep the addresses to ask on a line; a folder that cannot be written is no error."""
-    known = {line: asked for line, asked in _all_addresses().items() if line != key}
+    known = {line: requested for line, requested in _all_addresses().items() if line != key}
     latest = {key: text, **known}
     _keep(_addresses_file(), dict(list(latest.items())[:ADDRESSES_LENGTH]))
 

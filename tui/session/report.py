@@ -11,7 +11,7 @@ from tui.drive.channel import switch_texts
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.hints import advice, hint_markdown, reset_text
-from tui.drive.model import model_told
+from tui.drive.model import model_read
 from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
@@ -69,7 +69,7 @@ class _Report:
         """What the drive is, and when and where it was read."""
         head = self.values.head
         known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
-        model = model_told(self.profile, self.values.raws)
+        model = model_read(self.profile, self.values.raws)
         known += [f"- Model by its own code: {_cell(model)}"] if model else []
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
@@ -113,9 +113,9 @@ class _Report:
         raws = self.values.raws
         source = source_in_force(self.profile, raws)
         lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
-        told = read_chart(self.profile, raws)
-        lines += [f"- Commanded by: {told.channel}"] if told.channel else []
-        lines += [f"- Reference from: {told.reference}"] if told.reference else []
+        reported = read_chart(self.profile, raws)
+        lines += [f"- Commanded by: {reported.channel}"] if reported.channel else []
+        lines += [f"- Reference from: {reported.reference}"] if reported.reference else []
         lines += [f"- {text}" for text in switch_texts(self.profile, raws)]
         for quantity in CHANNEL_QUANTITIES:
             parameter = self.profile.quantity(quantity)
@@ -153,10 +153,10 @@ class _Report:
         if watch is None:
             return [*lines, "What this family does then is in no document at hand."]
         raw = self.values.raws.get(watch.timeout)
-        told = self.text(watch.timeout)
-        if raw is not None and raw == watch.off and told.casefold() != "off":
-            told += ", the watch is off"
-        lines.append(f"- Timeout ({watch.timeout}): {told}")
+        reported = self.text(watch.timeout)
+        if raw is not None and raw == watch.off and reported.casefold() != "off":
+            reported += ", the watch is off"
+        lines.append(f"- Timeout ({watch.timeout}): {reported}")
         if watch.reaction:
             held = self.values.raws.get(watch.reaction)
             known = next((r for r in watch.reactions if r.raw == held), None)
@@ -196,8 +196,8 @@ class _Report:
             held = self.values.raws
             latest = raw == held.get(self.profile.data.faults.parameter)
             left = advice(self.profile, help_, held, latest=latest)
-            told = hint_markdown(self.profile, help_, left, self.text, reset)
-            lines += ["", f"What {fault.code} {fault.name} points at:", "", *told]
+            reported = hint_markdown(self.profile, help_, left, self.text, reset)
+            lines += ["", f"What {fault.code} {fault.name} points at:", "", *reported]
         return lines
 
     def _fault(self, code: str) -> str:

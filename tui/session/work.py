@@ -186,8 +186,8 @@ class WorkQueue:
             worker, self._worker, self._doing = self._worker, None, None
             self._turn = object()
             # one that is told of twice leaves the reason of the first
-            told = self.arming.why_disarmed == STOPPED_DISARMS
-            why = STOPPED_DISARMS if self.arming.armed or told else ""
+            reported = self.arming.why_disarmed == STOPPED_DISARMS
+            why = STOPPED_DISARMS if self.arming.armed or reported else ""
             self.arming.disarm(why)
         if worker is not None:
             worker.cancel()
@@ -252,5 +252,5 @@ class WorkQueue:
 
 def _given_up(task: Task) -> str:
     """Let a task end undone; what it says of that, with a space before it."""
-    said = task.given_up() if task.given_up is not None else None
-    return f" {said}" if said else ""
+    message = task.given_up() if task.given_up is not None else None
+    return f" {message}" if message else ""

@@ -195,12 +195,12 @@ class SimulatedDrive:
         SimulatorError for an input that the drive does not have, or a value that it cannot take.
         """
         with self._lock:
-            told = self._body.terminals.set(name, text)
+            reported = self._body.terminals.set(name, text)
             self._wanderer.begin(None)
             if self._body.powered:
                 self._chart.follow()
                 self._refresh()
-            return told
+            return reported
 
     def provoke(self, fault: str | int, *, persists: bool = False) -> None:
         """Trip the drive with a fault given by code or raw value.

@@ -16,8 +16,8 @@ def set_inputs(simulation: Simulation, text: str) -> str:
     Nothing is set where a part of the line is wrong. Raises SimulatorError.
     """
     drive, assignments = check_inputs(simulation, text)
-    told = [drive.set_input(name, value) for name, value in assignments]
-    return f"{drive.address}: {', '.join(told) if told else drive.terminals.told()}"
+    reported = [drive.set_input(name, value) for name, value in assignments]
+    return f"{drive.address}: {', '.join(reported) if reported else drive.terminals.reported()}"
 
 
 def check_inputs(simulation: Simulation, text: str) -> tuple[SimulatedDrive, list[tuple[str, str]]]:

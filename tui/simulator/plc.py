@@ -79,8 +79,8 @@ class PlcOnLine:
     def _ask(self, request: bytes) -> None:
         """One exchange, which everybody hears as it goes."""
         self._say(request)
-        asked = time.monotonic()
-        self._conversation.feed(request, asked)
+        requested = time.monotonic()
+        self._conversation.feed(request, requested)
         answered = False
         while not self._stopping.wait(_STEP):
             now = time.monotonic()
@@ -89,7 +89,7 @@ class PlcOnLine:
                 answered = True
             if answered and self._conversation.due is None:
                 return
-            if not answered and now - asked > _ANSWER_WITHIN:
+            if not answered and now - requested > _ANSWER_WITHIN:
                 return
 
     def _say(self, data: bytes) -> None:
@@ -103,10 +103,10 @@ def plc_cycle(drives: Sequence[tuple[int, Profile]]) -> list[bytes]:
     for address, profile in drives:
         if profile.function(43):
             found.append(bytes([address, 43, 14, 1, 0]))
-        asked = [profile.quantity(one) for one in _ASKED]  # type: ignore[arg-type]
+        requested = [profile.quantity(one) for one in _ASKED]  # type: ignore[arg-type]
         found += [
             bytes([address, one.function, *one.address.to_bytes(2, "big"), 0, 1])
-            for one in asked
+            for one in requested
             if one is not None
         ]
         given = [profile.quantity(one) for one in _GIVEN]  # type: ignore[arg-type]

@@ -190,5 +190,5 @@ def _addresses(parameter: Parameter) -> range:
 def _put_words(words: dict[int, int], parameter: Parameter, raw: int) -> None:
     """Put a raw value into words by address; other fields of the same word stay."""
     addresses = _addresses(parameter)
-    told = to_words(parameter, raw, words.get(addresses[0], 0))
-    words.update(zip(addresses, told, strict=True))
+    reported = to_words(parameter, raw, words.get(addresses[0], 0))
+    words.update(zip(addresses, reported, strict=True))

@@ -83,8 +83,8 @@ def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:
     """
     if sys.platform == "win32":
         return UTF_8  # it has no locale of this kind, and consoles that know all signs
-    told = next((value for name in LOCALE if (value := environment.get(name))), "")
-    name = told.partition(".")[2].partition("@")[0] or told
+    reported = next((value for name in LOCALE if (value := environment.get(name))), "")
+    name = reported.partition(".")[2].partition("@")[0] or reported
     try:
         "a".encode(name)
         encoding = codecs.lookup(name).name

@@ -224,17 +224,17 @@ def _read_keys(driver: Any) -> None:
 
 def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[TerminalInput]:
     """Wait for bytes, or until something is known without."""
-    asked, deadline = time.monotonic(), keys.deadline
+    requested, deadline = time.monotonic(), keys.deadline
     wait = (
         END_POLL_INTERVAL
         if deadline is None
-        else min(END_POLL_INTERVAL, max(0.0, deadline - asked))
+        else min(END_POLL_INTERVAL, max(0.0, deadline - requested))
     )
     if not selector.select(wait):
         return keys.tick(time.monotonic())
     # Where this thread was kept waiting, the bytes were there before now. The stamp comes before
     # the bytes: where a stop of somebody else falls between, it voids them.
-    now, stamp = min(time.monotonic(), asked + wait), cast("Stops", driver._app).stop_stamp()
+    now, stamp = min(time.monotonic(), requested + wait), cast("Stops", driver._app).stop_stamp()
     return keys.read(_typed(driver), now, stamp)
 
 

@@ -13,15 +13,15 @@ TEXT_FIELDS = frozenset({"Input", "TextArea"})
 
 def takes_text(widget: Widget | None) -> bool:
     """Whether what is typed becomes text in this widget."""
-    told = getattr(widget, "takes_text", None)
-    if told is not None:
-        return bool(told)
+    reported = getattr(widget, "takes_text", None)
+    if reported is not None:
+        return bool(reported)
     return any(kind.__name__ in TEXT_FIELDS for kind in type(widget).__mro__)
 
 
 def takes_space(widget: Widget | None) -> bool:
     """Whether a space is text in this widget; in a field for numbers it is none."""
-    told = getattr(widget, "takes_space", None)
-    if told is not None:
-        return bool(told)
+    reported = getattr(widget, "takes_space", None)
+    if reported is not None:
+        return bool(reported)
     return takes_text(widget) and getattr(widget, "type", "text") == "text"

@@ -45,7 +45,7 @@ class LeanApp(App[None]):
         self.fit_terminal(EVERYTHING)
         self._hurries_until = float("-inf")
         self._later: asyncio.TimerHandle | None = None
-        self._asked_first = False
+        self._first_request = False
         self._begun = False
         """Whether a frame was sent in part."""
 
@@ -114,10 +114,10 @@ class LeanApp(App[None]):
         if self._picture.is_shown or not self._draws:
             return
         now = time.monotonic()
-        if not self._asked_first:
+        if not self._first_request:
             # its answer tells how long the way is, before there is anything on it
             self._write("", now)
-            self._asked_first = self._begun = True
+            self._first_request = self._begun = True
         hurry = now < self._hurries_until
         while room := self._pacing.room(now, hurry=hurry, rest=self._begun):
             first = hurry and room < WHOLE and not self._begun

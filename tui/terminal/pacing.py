@@ -49,21 +49,21 @@ class Pacing:
     """
 
     def __init__(self, *, slow: bool = False) -> None:
-        self._asked: deque[tuple[float, int]] = deque(maxlen=OWED_MOST)
+        self._requested: deque[tuple[float, int]] = deque(maxlen=OWED_MOST)
         self._answers = False
         self._quickest = float("inf")
         self._piece = PIECE_LEAST if slow else WHOLE
 
     def sent(self, size: int, now: float) -> None:
         """So many bytes went out, and the question behind them."""
-        self._asked.append((now, size))
+        self._requested.append((now, size))
 
     def answered(self, now: float) -> None:
         """An answer came: the oldest frame on its way is drawn."""
         self._answers = True
-        if not self._asked:
+        if not self._requested:
             return  # it was taken for lost
-        since, size = self._asked.popleft()
+        since, size = self._requested.popleft()
         self._quickest = min(self._quickest, now - since)
         self._learn(size, now - since - self._quickest)
 
@@ -90,11 +90,11 @@ class Pacing:
         """Seconds until an answer that is waited for counts as lost; None where none is."""
         if not self._on_its_way(now):
             return None
-        return max(0.0, self._asked[-1][0] + self._patience - now)
+        return max(0.0, self._requested[-1][0] + self._patience - now)
 
     def forget(self) -> None:
         """The terminal was left for a while: what it still owes does not come."""
-        self._asked.clear()
+        self._requested.clear()
 
     @property
     def _patience(self) -> float:
@@ -102,11 +102,15 @@ class Pacing:
 
     def _is_mute(self, now: float) -> bool:
         """Whether the terminal has had the time to answer, and never did."""
-        return not self._answers and bool(self._asked) and now >= self._asked[0][0] + MUTE_AFTER
+        return (
+            not self._answers
+            and bool(self._requested)
+            and now >= self._requested[0][0] + MUTE_AFTER
+        )
 
     def _on_its_way(self, now: float) -> list[int]:
         """The sizes of the frames that are still waited for; an empty one counts as a byte."""
         if self._answers:
-            while self._asked and now >= self._asked[0][0] + self._patience:
-                self._asked.popleft()
-        return [max(1, size) for at, size in self._asked if now < at + self._patience]
+            while self._requested and now >= self._requested[0][0] + self._patience:
+                self._requested.popleft()
+        return [max(1, size) for at, size in self._requested if now < at + self._patience]

@@ -124,7 +124,7 @@ class KeyReader:
                 self._left_at = self._left(token)
                 self._bursts.key(token)
         given = self._bursts.given(now, self._tokens.pending)
-        return [*reports, *(_told(one) for one in given)]
+        return [*reports, *(_to_input(one) for one in given)]
 
     def _stopped(self, key: KeyToken) -> bool:
         """Whether a key was a stop."""
@@ -136,7 +136,7 @@ class KeyReader:
         return self._left_at if writes or key.name in EDITING else key.began
 
 
-def _told(given: Given) -> Pressed | Paste:
+def _to_input(given: Given) -> Pressed | Paste:
     key = given.what
     if not isinstance(key, KeyToken):
         return key

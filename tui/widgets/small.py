@@ -25,7 +25,7 @@ def is_too_small(width: int, height: int) -> bool:
     return width < LEAST_WIDTH or height < LEAST_HEIGHT
 
 
-def small_lines(view: StripView, whom: str, width: int, height: int) -> list[Text]:
+def small_lines(view: StripView, target: str, width: int, height: int) -> list[Text]:
     """The state first, then figures, keys, and last the sentence; what does not fit is left out.
 
     `whom` says whom the stop key stops.
@@ -35,12 +35,12 @@ def small_lines(view: StripView, whom: str, width: int, height: int) -> list[Tex
     if view.faults:
         lines.append(Text(f" {view.faults} in fault on this line", FAULT))
     apart = [Text()] if height >= ROWS_FOR_GAPS else []
-    lines += [*apart, *_keys(whom, width), *apart]
-    said = (
+    lines += [*apart, *_keys(target, width), *apart]
+    message = (
         f"{width} x {height} is too small: make it {LEAST_WIDTH} x {LEAST_HEIGHT}."
         " Until then only the stop keys work."
     )
-    lines += [Text(f" {part}", ALARM) for part in wrapped(said, max(8, width - 2), 4)]
+    lines += [Text(f" {part}", ALARM) for part in wrapped(message, max(8, width - 2), 4)]
     for line in lines:
         line.no_wrap = True
         line.truncate(width)
@@ -67,11 +67,11 @@ def _of_drive(drive: DriveNow, width: int) -> list[Text]:
     return [line, values, name]
 
 
-def _keys(whom: str, width: int) -> list[Text]:
+def _keys(target: str, width: int) -> list[Text]:
     """The keys that stop, on as many lines as they take."""
     lines = [Text()]
     for key, label in STOPS:
-        part = Text(f" {key} {label or whom} ", STOP_KEY)
+        part = Text(f" {key} {label or target} ", STOP_KEY)
         if lines[-1].cell_len + part.cell_len > width:
             lines.append(Text())
         lines[-1].append_text(part)

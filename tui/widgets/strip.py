@@ -103,8 +103,8 @@ def strip_line(view: StripView, width: int) -> Text:
         left = Text(no_wrap=True)
         left.append(" Drive Panel", STRONG)
         room = max(0, width - right.cell_len - 1)
-        told = _line_text(plain(view.line), room - left.cell_len - len(BETWEEN))
-        left.append(f"{BETWEEN}{told}" if told else "", FAINT)
+        reported = _line_text(plain(view.line), room - left.cell_len - len(BETWEEN))
+        left.append(f"{BETWEEN}{reported}" if reported else "", FAINT)
         left.truncate(room, overflow="ellipsis")
     else:
         left = _drive(view.drive, width)
@@ -249,12 +249,12 @@ def tabs_line(
     return text
 
 
-def said_line(when: str, said: str, style: Style, hint: str, width: int) -> Text:
+def message_line(when: str, message: str, style: Style, hint: str, width: int) -> Text:
     """The last line but one: the newest event with its time, and which key shows more."""
     text = Text(no_wrap=True)
     text.append(f" {cut(when, 8)} ", FAINT)
     room = max(8, width - text.cell_len - (len(hint) + 2 if hint else 1))
-    text.append(cut_at_word(said, room), style)
+    text.append(cut_at_word(message, room), style)
     if hint:
         text.append(" " * max(1, width - text.cell_len - len(hint) - 1))
         key, _, does = hint.partition(" ")
@@ -280,17 +280,17 @@ class FrameView(NamedTuple):
     strip: StripView
     place: str
     marks: dict[str, tuple[str, Style]]
-    said: Said | None
+    message: Said | None
     not_stopped: tuple[str, ...] = ()
     """A text for each motor that a stop does not stop; drawn over everything, whole."""
 
     @property
     def at_once(self) -> object:
         """What is shown at once on a slow link too: state, stop, fault, arming, what was said."""
-        strip, drive, said = self.strip, self.strip.drive, self.said
+        strip, drive, message = self.strip, self.strip.drive, self.message
         who = drive and (drive.device, drive.kind, drive.words, drive.age is None, drive.by)
         armed = drive is not None and drive.armed is not None
         # figures in a message count seconds
-        text = said and re.sub(r"\d+", "", said.text)
+        text = message and re.sub(r"\d+", "", message.text)
         faults = strip.faults, strip.unseen, bool(strip.trouble)
         return who, armed, faults, strip.off_record, self.place, self.marks, text, self.not_stopped

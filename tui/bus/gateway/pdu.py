@@ -75,7 +75,7 @@ class IdentifyAsked:
 GatewayAsked = ReadAsked | WriteAsked | DiagnoseAsked | IdentifyAsked
 
 
-def gateway_asked(pdu: bytes) -> GatewayAsked:
+def parse_request(pdu: bytes) -> GatewayAsked:
     """What the bytes of a request ask for. Raises Unanswerable."""
     function, data = pdu[0], pdu[1:]
     match function:
@@ -149,10 +149,10 @@ def words_pdu(function: int, words: Sequence[int]) -> bytes:
     return bytes([function, 2 * len(words)]) + struct.pack(f">{len(words)}H", *words)
 
 
-def written_pdu(asked: WriteAsked) -> bytes:
+def written_pdu(requested: WriteAsked) -> bytes:
     """The answer of function 6 or 16."""
-    second = asked.values[0] if asked.function == 6 else len(asked.values)
-    return struct.pack(">BHH", asked.function, asked.address, second)
+    second = requested.values[0] if requested.function == 6 else len(requested.values)
+    return struct.pack(">BHH", requested.function, requested.address, second)
 
 
 def diagnosed_pdu(subfunction: int, data: int) -> bytes:
@@ -160,17 +160,19 @@ def diagnosed_pdu(subfunction: int, data: int) -> bytes:
     return struct.pack(">BHH", 8, subfunction, data)
 
 
-def identified_pdu(asked: IdentifyAsked, conformity: int, objects: Mapping[int, bytes]) -> bytes:
+def identified_pdu(
+    requested: IdentifyAsked, conformity: int, objects: Mapping[int, bytes]
+) -> bytes:
     """The answer of function 43/14; says by which object it goes on. Raises Unanswerable."""
     ends = {1: REGULAR, 2: EXTENDED}
     wanted = {number: value for number, value in sorted(objects.items())
-              if number < ends.get(asked.read_code, 0x100)}  # fmt: skip
-    if asked.read_code == 4:
-        if asked.first not in wanted:
+              if number < ends.get(requested.read_code, 0x100)}  # fmt: skip
+    if requested.read_code == 4:
+        if requested.first not in wanted:
             raise Unanswerable(ILLEGAL_ADDRESS)
-        wanted = {asked.first: wanted[asked.first]}
-    elif asked.first in wanted:
-        wanted = {number: value for number, value in wanted.items() if number >= asked.first}
+        wanted = {requested.first: wanted[requested.first]}
+    elif requested.first in wanted:
+        wanted = {number: value for number, value in wanted.items() if number >= requested.first}
     body, count, more = b"", 0, 0
     for number, value in wanted.items():
         one = bytes([number, len(value)]) + value
@@ -179,4 +181,4 @@ def identified_pdu(asked: IdentifyAsked, conformity: int, objects: Mapping[int, 
             break
         body, count = body + one, count + 1
     follows = bytes([0xFF if more else 0, more, count])
-    return bytes([IDENTIFY, MEI_IDENTIFICATION, asked.read_code, conformity]) + follows + body
+    return bytes([IDENTIFY, MEI_IDENTIFICATION, requested.read_code, conformity]) + follows + body

@@ -168,7 +168,7 @@ class TcpGateway:
                     log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
                     return
                 pdu = await reader.take(length - 1)
-                talk.asked = asyncio.get_running_loop().time()
+                talk.requested = asyncio.get_running_loop().time()
                 await talk.room_for_writes()
                 request = TcpRequest(client, unit, pdu, reader.stale, talk.turn())
                 await self._begin(talk, transaction, request)

@@ -32,7 +32,7 @@ class ClientTalk:
         self.client = client
         self.writer = writer
         self.reads = asyncio.Lock()
-        self.asked = asyncio.get_running_loop().time()
+        self.requested = asyncio.get_running_loop().time()
         """When a request came last, on the loop's clock."""
         self.goes = False
         """Whether it is about to end for another one."""
@@ -48,7 +48,7 @@ class ClientTalk:
     def place(self) -> ServedConnection:
         """As it counts when one more client comes."""
         waits = bool(self._under_way) and not self._writes
-        idle = 0.0 if waits else asyncio.get_running_loop().time() - self.asked
+        idle = 0.0 if waits else asyncio.get_running_loop().time() - self.requested
         host = host_of(self.writer.get_extra_info("peername"))
         return ServedConnection(host, idle, writes=bool(self._writes))
 

@@ -63,15 +63,15 @@ class AliveReads:
         retry = min(LONGEST_RETRY, period / 2)
         heard = max(self._devices[one.device].heard or 0.0, self._since[one.device])
         due, last = heard + period, self._jobs.get(one.device)
-        if last is not None and last.asked > heard:
+        if last is not None and last.requested > heard:
             # it waits for the line, or was not answered
-            due = max(due, last.asked + retry) if last.answer.done() else now + retry
+            due = max(due, last.requested + retry) if last.answer.done() else now + retry
         if due > now:
             return due
         # beyond its timeout it has acted: it need no longer go before the others
         priority = Priority.FEED if now - heard < one.timeout else Priority.POLL
         job = Job(one.request, priority, self._devices[one.device].limits)
-        job.program, job.asked = program, now
+        job.program, job.requested = program, now
         self._jobs[one.device] = job
         self._submit(job)
         return now + retry

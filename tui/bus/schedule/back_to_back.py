@@ -58,7 +58,7 @@ class BackToBack:
 
     def _count_read(self, job: Job, begun: float, now: float) -> None:
         self._read += now - begun
-        pause = job.asked - self._ended
+        pause = job.requested - self._ended
         if pause > REST_AT_MOST:
             self._rests.clear()
         else:

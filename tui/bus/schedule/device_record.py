@@ -61,7 +61,7 @@ class Device:
     )
     """The last requests that were answered, with their replies."""
     heard: float | None = None
-    told_usual: float | None = None
+    reported_usual: float | None = None
     """The usual turnaround as the program told that owns the line."""
     last: Expectation | None = None
     last_time: float = 0.0

@@ -112,7 +112,7 @@ class Dispatcher:
 
     def void_older(self, than: float, why: str) -> None:
         """Refuse what waits to change anything since before a moment, but for stops."""
-        self._queue.refuse(lambda job: why if job.commands and job.asked < than else "")
+        self._queue.refuse(lambda job: why if job.commands and job.requested < than else "")
 
     def stray(self, piece: Piece, time: float) -> None:
         """A whole frame came that nobody waited for; it may be what others were held back for."""

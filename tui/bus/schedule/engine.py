@@ -171,7 +171,7 @@ class Engine:
         """Hand a job to the loop. Raises LineClosed."""
         job.program = self.facts.me.id
         job.stamp = self.facts.stops.stamp(job.request.device)
-        job.asked = self._clock()
+        job.requested = self._clock()
         self._enter(self._take, job)
 
     def _enter(self, action: Callable[[T], None], argument: T) -> None:

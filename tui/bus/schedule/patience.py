@@ -64,7 +64,7 @@ class Devices:
             record.silent_since,
             record.next_try,
             record.turnaround,
-            usual(record.recent) or record.told_usual,
+            usual(record.recent) or record.reported_usual,
             record.heard,
             record.lateness,
             max(record.settle, self._settle),
@@ -81,7 +81,7 @@ class Devices:
         record = self[device]
         record.answers, record.failures = state.answers, state.failures
         record.silent_since, record.next_try = state.silent_since, state.next_try
-        record.turnaround, record.told_usual = state.turnaround, state.usual_turnaround
+        record.turnaround, record.reported_usual = state.turnaround, state.usual_turnaround
         record.heard, record.repeated = state.heard, state.heard or 0.0
         record.refused, record.lateness = state.refused, state.lateness
         record.settle = state.copies_within
@@ -120,8 +120,8 @@ class Devices:
     ) -> float | None:
         """Seconds until a silent device is polled again; None now, or to look `within` a time."""
         record = self[device]
-        asked_now = within is not None or priority < Priority.POLL
-        if asked_now or record.next_try is None or now >= record.next_try:
+        on_request = within is not None or priority < Priority.POLL
+        if on_request or record.next_try is None or now >= record.next_try:
             return None
         if priority >= Priority.BACKGROUND and not record.ever_answered:
             return None
@@ -184,7 +184,7 @@ class Devices:
         recent = record.recent.get(pdu[0], ())
         if not self._mistakable or pdu[0] != Read.function or len(recent) < KNOWN:
             return False
-        if not any(reply == replied and pdu != asked for asked, replied in record.exchanges):
+        if not any(reply == replied and pdu != sent for sent, replied in record.exchanges):
             return False
         # the median: one late reply must not make every lateness usual
         early, late = UNUSUAL_EARLY * min(recent), UNUSUAL_LATE * median(recent) + JITTER

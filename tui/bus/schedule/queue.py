@@ -47,7 +47,7 @@ class Job:
     """Id of the program that asks."""
     stamp: int = 0
     """The count of stops of the device that it knew of."""
-    asked: float = 0.0
+    requested: float = 0.0
     """When it was handed over, by the line's clock."""
     max_age: float = 0.0
     """A reply to the same question is taken, from whoever asked it, up to this age in seconds."""

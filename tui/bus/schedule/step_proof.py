@@ -76,7 +76,7 @@ class StepProof:
             return
         if (before := self._repeats.get(device)) is not None:
             before.answer.cancel()
-        self._repeats[device] = again = Job(job.request, Priority.FEED, job.limits, asked=time)
+        self._repeats[device] = again = Job(job.request, Priority.FEED, job.limits, requested=time)
         self._submit(again)
 
     def not_before(self, job: Job, now: float) -> float:

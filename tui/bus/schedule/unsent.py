@@ -39,10 +39,10 @@ def fail_lost(
         job.fail(error)
         return None
     fail_without_line(job, error)
-    if not is_stop_word(job) or now - job.asked > STOP_KEPT_FOR:
+    if not is_stop_word(job) or now - job.requested > STOP_KEPT_FOR:
         return None
     kept = Job(job.request, job.priority, job.limits, order=job.order)
-    kept.program, kept.asked = job.program, job.asked
+    kept.program, kept.requested = job.program, job.requested
     return kept
 
 
@@ -78,8 +78,8 @@ def refusal_of(job: Job, facts: SharedFacts) -> str:
     """Why a write must not go out: a stop came after it, or another program commands."""
     if job.priority is Priority.STOP or not job.program:
         return ""
-    if hushed := facts.hushed.get(job.request.device):
-        return hushed[1]
+    if paused := facts.paused.get(job.request.device):
+        return paused[1]
     if not job.commands:
         return ""
     writes = job.request.function != Diagnose.function

@@ -17,7 +17,7 @@ from ..program import Program
 from ..requests import Request
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .carried import asked_request, failure_told
+from .carried import failure_message, request_from
 from .messages import (
     Alive,
     Answer,
@@ -62,7 +62,7 @@ class Client:
     """Stops that it had asked when it went."""
     stops_due: dict[int, float] = field(default_factory=dict)
     """When it stopped devices, by device, that have not answered a word of it yet."""
-    asked: dict[int, Job] = field(default_factory=dict)
+    requested: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
     counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
     heard: float = 0.0
@@ -111,8 +111,8 @@ class Client:
 
     def forget(self) -> list[Job]:
         """Drop what it asked, except stops: they are sent although no program waits for them."""
-        asked, self.asked = self.asked, {}
-        for job in asked.values():
+        requested, self.requested = self.requested, {}
+        for job in requested.values():
             if job.request.changes and (job.begun or job.priority is Priority.STOP):
                 self.left(self.program, job.request, job.answer)
             if job.priority is Priority.STOP:
@@ -123,42 +123,42 @@ class Client:
 
     def ask(self, inside: LineInside, message: Asking) -> None:
         """It asks for something on the line. Raises NoMessage."""
-        if len(self.asked) >= MOST_ASKED:
+        if len(self.requested) >= MOST_ASKED:
             raise NoMessage("too many requests at once")
         try:
-            request = asked_request(message.kind, message.fields)
+            request = request_from(message.kind, message.fields)
         except ValueError as error:
             raise NoMessage(str(error)) from error
         priority = message.priority
         limits = message.limits or self.limits.get(request.device, CAUTIOUS)
         job = Job(request, priority, limits, replaceable=message.replaceable)
         job.program, job.stamp = self.program.id, message.stamp
-        job.max_age, job.asked = message.max_age, message.asked
+        job.max_age, job.requested = message.max_age, message.requested
         job.within = message.within
-        self.asked[message.number] = job
+        self.requested[message.number] = job
         job.answer.add_done_callback(partial(self._answered, message.number))
-        late = inside.clock() - message.asked
+        late = inside.clock() - message.requested
         if job.commands and late > TOO_LATE:
             job.fail(RequestRefused(stood_still(late)))
         else:
             inside.submit(job)
 
     def _answered(self, number: int, answer: Future[Reply]) -> None:
-        job = self.asked.pop(number, None)
+        job = self.requested.pop(number, None)
         if job is None or answer.cancelled():
             return
         error = answer.exception()
         if error is None and job.priority is Priority.STOP and job.request.changes:
             self.stops_due.pop(job.request.device, None)
         if error is not None:
-            self.say(Failed(number, *failure_told(error)))
+            self.say(Failed(number, *failure_message(error)))
         else:
             reply = answer.result()
             self.say(Answer(number, reply.pdu, reply.time))
 
     def withdraw(self, number: int) -> None:
         """It does not wait for a request any more."""
-        job = self.asked.get(number)
+        job = self.requested.get(number)
         if job is not None:
             job.answer.cancel()
 
@@ -178,7 +178,7 @@ class Client:
         self.counted = counters.devices
         plain = replace(counters, devices={})
         error = inside.error()
-        failure = failure_told(error) if error is not None else None
+        failure = failure_message(error) if error is not None else None
         return News(
             inside.state(), plain, changed, shares, failure, frames, counted, inside.pace.stretch
         )

@@ -64,7 +64,7 @@ def request_form(request: Request) -> tuple[str, dict[str, Any]]:
     return type(request).__name__, msgspec.to_builtins(request, builtin_types=(bytes,))
 
 
-def asked_request(kind: str, fields: dict[str, Any]) -> Request:
+def request_from(kind: str, fields: dict[str, Any]) -> Request:
     """The request that a message carries. Raises ValueError."""
     if kind not in REQUEST_KINDS:
         raise ValueError(f"request {kind!r}")
@@ -117,7 +117,7 @@ _KINDS: Mapping[type[LineError], tuple[str, ...]] = {
 _NAMED = {kind.__name__: kind for kind in _KINDS}
 
 
-def failure_told(error: BaseException) -> tuple[str, ErrorForm]:
+def failure_message(error: BaseException) -> tuple[str, ErrorForm]:
     """The kind of an error and what it tells, as a message carries them."""
     kind = _NAMED.get(type(error).__name__, LineError)
     held = {name: _clipped(getattr(error, name)) for name in _KINDS[kind]}

@@ -15,7 +15,6 @@ from ..link import label
 from ..model import LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
-from .asked import RequestsAsked
 from .carried import Polled
 from .messages import (
     VERSION,
@@ -31,9 +30,9 @@ from .messages import (
     Hello,
     News,
     NoMessage,
+    Notified,
     PollWish,
     StopGiven,
-    Told,
     TurnedAway,
     Welcome,
     next_message,
@@ -43,6 +42,7 @@ from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .polls import PollsSubmitted
+from .requested import RequestsAsked
 from .signs import Heartbeat
 from .voices import LineVoice, give_up_own, tell_own
 
@@ -67,13 +67,13 @@ class ShareClient:
         self._say = say
         self._loop = asyncio.get_running_loop()
         self.writer: asyncio.StreamWriter | None = None
-        self._asked = RequestsAsked(inside, self._tell)
+        self._requested = RequestsAsked(inside, self._tell)
         self._polls = PollsSubmitted(
-            inside, self._tell, self._asked.describe, lambda: not self.watching.frozen
+            inside, self._tell, self._requested.describe, lambda: not self.watching.frozen
         )
         self._news = NewsHeard(inside, say)
         self._wish: tuple[dict[int, float], bool] = ({}, False)
-        self._gone, self._told = False, ""
+        self._gone, self._reported = False, ""
         self.again = False  # attached to the line before
         self.taken_in = False  # attached to this owner
         self.watching = OwnerWatch(inside.clock, owner)
@@ -109,7 +109,7 @@ class ShareClient:
                 await self._leave(reader, writer)
             with suppress(OSError, RuntimeError):
                 writer.close()
-            self._asked.give_up_all(closing=closing)
+            self._requested.give_up_all(closing=closing)
 
     async def _until_one_ends(self, *works: Coroutine[Any, Any, None]) -> None:
         """Do several things at once until one of them ends; its error is raised."""
@@ -152,7 +152,7 @@ class ShareClient:
             raise NotShared(message.why)
         if not isinstance(message, Welcome):
             raise NotShared(f"{self._owner.program.text} owns the line and does not share it.")
-        if not message.asked:
+        if not message.requested:
             self._news.note = f" It is open as {message.label}."
         self._gone, self.taken_in = message.gone, True
         self._heartbeat = Heartbeat(self._owner.socket, self._inside.facts.me.id)
@@ -187,7 +187,7 @@ class ShareClient:
         dispatcher = self._inside.dispatcher
         while True:
             for job in await dispatcher.all_waiting():
-                self._asked.send(job)
+                self._requested.send(job)
 
     # An owner that is frozen
 
@@ -210,22 +210,22 @@ class ShareClient:
 
     def _hear_life(self, message: AnyMessage) -> None:
         self.watching.hear(message)
-        if self._told:
-            self._told = ""
+        if self._reported:
+            self._reported = ""
             self._news.tell_state()
 
     def _wait_for_owner(self) -> None:
         """Fail what waits for a frozen owner, once it is known that this program cannot end it."""
         remedy = self.watching.remedy
-        told = f"{self._owner.program.text} {OWNER_SILENT}. {remedy}".rstrip()
-        if told != self._told:
-            self._told = told
-            self._say(LineStatus.LOST, told, None)
+        reported = f"{self._owner.program.text} {OWNER_SILENT}. {remedy}".rstrip()
+        if reported != self._reported:
+            self._reported = reported
+            self._say(LineStatus.LOST, reported, None)
         for job in self._inside.dispatcher.take_all():
-            self._asked.send(job)
+            self._requested.send(job)
         self._polls.lose_all()
         if remedy:
-            self._asked.fail_all(told)
+            self._requested.fail_all(reported)
 
     # What the owner says
 
@@ -235,14 +235,14 @@ class ShareClient:
             case Alive():
                 pass
             case Answer() | Failed():
-                self._asked.answered(message)
+                self._requested.answered(message)
             case Polled():
                 self._polls.hear(message)
             case News():
                 self._news.hear(message)
             case Facts():
                 self._hear_facts(message)
-            case Told(device=device, text=text):
+            case Notified(device=device, text=text):
                 facts.hear_text(device, text)
             case LineNote():
                 facts.notes.hear(message)
@@ -261,11 +261,15 @@ class ShareClient:
             case _:
                 log.error("the owner says %s", type(message).__name__)
 
-    def _hear_facts(self, told: Facts) -> None:
+    def _hear_facts(self, reported: Facts) -> None:
         facts = self._inside.facts
-        facts.stops.learn_times(told.stopped)
+        facts.stops.learn_times(reported.stopped)
         unheard = facts.learn(
-            told.programs, told.commanders, told.stops, told.hushed, told.departed
+            reported.programs,
+            reported.commanders,
+            reported.stops,
+            reported.paused,
+            reported.departed,
         )
         if unheard and self.again:  # given while this program was with no owner
             facts.hear_stop(unheard, STOP_UNHEARD[self._gone], self._owner.program)

@@ -17,7 +17,7 @@ from .messages import (
     Claim,
     Denied,
     Granting,
-    Hush,
+    PollPause,
 )
 
 
@@ -41,11 +41,11 @@ class Commanding:
             case Claim():
                 self.claimed(program, message)
             case AskedFor(device=device):
-                self.asked_for(program, device)
+                self.drive_requested(program, device)
             case Granting():
                 self.replied(program, message)
-            case Hush(device=device, why=why):
-                facts.note_hush(device, program.id, why)
+            case PollPause(device=device, why=why):
+                facts.note_pause(device, program.id, why)
                 self._tell_facts()
             case Armed():
                 self._armed(program, message)
@@ -88,7 +88,7 @@ class Commanding:
             facts.note_commander(device, program.id if take else None)
         self._tell_facts()
 
-    def asked_for(self, program: Program, device: int) -> None:
+    def drive_requested(self, program: Program, device: int) -> None:
         """Hand a question on to the program that commands a device."""
         facts = self._facts
         holder = facts.commanders.get(device)

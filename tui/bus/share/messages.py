@@ -75,7 +75,7 @@ class Welcome(Message, frozen=True):
     owner: Program
     label: Text
     """The line as it is open."""
-    asked: bool = True
+    requested: bool = True
     """Whether it is open with the settings that were meant."""
     gone: bool = False
     """Whether it was taken for gone meanwhile: it commands nothing any more."""
@@ -105,7 +105,7 @@ class Asking(Message, frozen=True):
     max_age: Seconds
     stamp: StopCount
     """The count of stops of the device that the asker knew of."""
-    asked: MonotonicTime
+    requested: MonotonicTime
     limits: Limits | None = None
     """Where they are not those of the device: of a broadcast."""
     within: Seconds | None = None
@@ -201,14 +201,14 @@ class Granting(Message, frozen=True):
     why: Text = ""
 
 
-class Hush(Message, frozen=True):
+class PollPause(Message, frozen=True):
     """A device is left alone, or with no reason no longer."""
 
     device: DeviceId
     why: Notice
 
 
-class Told(Message, frozen=True):
+class Notified(Message, frozen=True):
     """Something that every person on the line is to read."""
 
     device: DeviceId
@@ -230,7 +230,7 @@ class Facts(Message, frozen=True):
     """Ids of the programs that command, by device."""
     stops: StopsByDevice
     """How many stops each device was given, by program."""
-    hushed: Annotated[dict[DeviceId, tuple[ProgramId, Notice]], Meta(max_length=MOST_DEVICES)]
+    paused: Annotated[dict[DeviceId, tuple[ProgramId, Notice]], Meta(max_length=MOST_DEVICES)]
     """Who leaves which device alone, and why."""
     stopped: StopTimes = {}
     """When each device was stopped last."""
@@ -265,7 +265,7 @@ class Goodbye(Message, frozen=True):
 
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
-    | Alive | Pulse | Claim | Denied | AskedFor | Granting | Told | Hush | PollWish
+    | Alive | Pulse | Claim | Denied | AskedFor | Granting | Notified | PollPause | PollWish
     | Facts | News | Goodbye | Armed | LineNote | KeepAlive | Subscribe
     | Unsubscribe | Polled
 )  # fmt: skip

@@ -21,7 +21,7 @@ from ..schedule.pace import SHARE, greatest
 from ..schedule.polls import Subscription
 from ..schedule.queue import Job
 from .attached import Client
-from .carried import Polled, PolledReply, Subscribe, Unsubscribe, error_of, failure_told
+from .carried import Polled, PolledReply, Subscribe, Unsubscribe, error_of, failure_message
 from .messages import AnyMessage, NoMessage
 
 log = logging.getLogger(__name__)
@@ -76,7 +76,7 @@ class PollsServed:
         if one.size + sum(other.size for other in served.values()) > MOST_PLANNED:
             why = why or f"Not polled: more than {MOST_PLANNED} reads."
         if why:
-            failure = PolledReply(b"", 0.0, failure_told(RequestRefused(why)))
+            failure = PolledReply(b"", 0.0, failure_message(RequestRefused(why)))
             client.say(Polled(message.number, 0, self._inside.clock(), (failure,)))
             return
         served[message.number] = one
@@ -161,7 +161,7 @@ class PollsServed:
             try:
                 reply = await self._read(one, read)
             except LineError as error:
-                found.append(PolledReply(b"", 0.0, failure_told(error)))
+                found.append(PolledReply(b"", 0.0, failure_message(error)))
                 if not isinstance(error, DeviceException):
                     break
             else:
@@ -175,7 +175,7 @@ class PollsServed:
         request = read_request(device, read.address, read.count, read.function)
         limits = one.client.limits.get(device, CAUTIOUS)
         job = Job(request, Priority.POLL, limits)
-        job.program, job.asked = one.client.program.id, now
+        job.program, job.requested = one.client.program.id, now
         period = one.message.plan.period * self._inside.pace.stretch
         # nothing that this program has been given already
         since = now - one.read_at.get(read, 0.0) - CLOCK_STEP

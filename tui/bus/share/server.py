@@ -26,9 +26,9 @@ from .messages import (
     Facts,
     Goodbye,
     NoMessage,
+    Notified,
     PollWish,
     StopGiven,
-    Told,
     Welcome,
     Withdraw,
     next_message,
@@ -206,8 +206,8 @@ class ShareServer:
     def _tell_facts(self) -> None:
         facts = self._inside.facts
         given, times = facts.stops.plain, facts.stops.late_times
-        commanders, hushed, gone = dict(facts.commanders), dict(facts.hushed), facts.departed
-        self._tell_all(Facts(facts.programs, commanders, given, hushed, times, gone))
+        commanders, paused, gone = dict(facts.commanders), dict(facts.paused), facts.departed
+        self._tell_all(Facts(facts.programs, commanders, given, paused, times, gone))
 
     # What clients say
 
@@ -240,7 +240,7 @@ class ShareServer:
             case StopGiven() if message.program.id == client.program.id:
                 client.stops_due |= dict.fromkeys(message.devices, self._inside.clock())
                 self._stopped(message)
-            case Told(device=device, text=text):
+            case Notified(device=device, text=text):
                 self._inside.facts.hear_text(device, text)
                 self._tell_all(message, but=client.program.id)
             case LineNote(data=b""):
@@ -256,9 +256,9 @@ class ShareServer:
     def _say(self, message: AnyMessage) -> None:
         """Called in any thread."""
         with suppress(RuntimeError):  # the loop has ended, and with it whoever would hear
-            self._loop.call_soon_threadsafe(self._said, message)
+            self._loop.call_soon_threadsafe(self._message, message)
 
-    def _said(self, message: AnyMessage) -> None:
+    def _message(self, message: AnyMessage) -> None:
         match message:
             case StopGiven():
                 self._tell_stop(message)

@@ -68,13 +68,13 @@ class SignsOfLife:
         self._inside = inside
         self._clients = clients
         self._tell = tell
-        self._said = inside.clock()
+        self._beat = inside.clock()
         """When the last sign was given."""
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
         """Begin to tell."""
-        self._said = self._inside.clock()
+        self._beat = self._inside.clock()
         self._inside.dispatcher.held_back = lambda: self._stood > SENDS_WITHIN
         self._task = asyncio.get_running_loop().create_task(self._work(), name="signs of life")
 
@@ -86,22 +86,22 @@ class SignsOfLife:
 
     @property
     def _stood(self) -> float:
-        return self._inside.clock() - self._said
+        return self._inside.clock() - self._beat
 
     async def _work(self) -> None:
         while True:
             await asyncio.sleep(NEWS_INTERVAL)
-            said = self._inside.clock()
+            beat = self._inside.clock()
             try:
                 self._let_silent_go()
                 if self._stood > SENDS_WITHIN:
                     await self._hear_stops()
-                    said = self._inside.clock()
+                    beat = self._inside.clock()
                 self._tell()
             except Exception:
                 # without signs of life the line would be held back for good
                 log.exception("telling the news of the line failed")
-            self._said = said
+            self._beat = beat
 
     def _let_silent_go(self) -> None:
         """A client that is frozen counts as gone: its motor must not be fed by the others."""

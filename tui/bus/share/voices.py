@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .beside import send_plain_stop
-from .messages import AnyMessage, Armed, Claim, Hush
+from .messages import AnyMessage, Armed, Claim, PollPause
 
 if TYPE_CHECKING:
     from ..shared_facts import SharedFacts
@@ -45,9 +45,9 @@ def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
     for device, holder in facts.commanders.items():
         if holder == me:
             send(Claim(device, True))
-    for device, (program, why) in facts.hushed.items():
+    for device, (program, why) in facts.paused.items():
         if program == me:
-            send(Hush(device, why))
+            send(PollPause(device, why))
 
 
 def give_up_own(facts: SharedFacts, why: str) -> None:

@@ -112,6 +112,6 @@ def _hand_over_at_once(descriptor: int) -> None:
 
     fields = struct.Struct(f"{_SERIAL_FIELDS}i")
     with suppress(OSError):
-        told = list(fields.unpack(fcntl.ioctl(descriptor, _TIOCGSERIAL, bytes(fields.size))))
-        told[_FLAGS] |= _LOW_LATENCY
-        fcntl.ioctl(descriptor, _TIOCSSERIAL, fields.pack(*told))
+        reported = list(fields.unpack(fcntl.ioctl(descriptor, _TIOCGSERIAL, bytes(fields.size))))
+        reported[_FLAGS] |= _LOW_LATENCY
+        fcntl.ioctl(descriptor, _TIOCSSERIAL, fields.pack(*reported))

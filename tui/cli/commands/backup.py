@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure, told
+from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure, reported
 from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.say import say
@@ -32,7 +32,7 @@ STANDARD_OUTPUT = Path("-")
 @json_option
 @settings_options
 @never_forced
-@told
+@reported
 def backup(target: Target, file: Path, force: bool, everything: bool, as_json: bool) -> None:
     """Write the settings of a drive to FILE, one line a parameter; `-` is standard output.
 

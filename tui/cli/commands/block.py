@@ -16,8 +16,8 @@ from ..shared.errors import (
     DRIVE_REFUSED,
     REFUSED_HERE,
     Failure,
+    reported,
     status_of,
-    told,
 )
 from ..shared.options import (
     Target,
@@ -31,7 +31,7 @@ from ..shared.options import (
 )
 from ..shared.say import say
 from ..shared.sets import dry_run_option, write_down
-from .orders import arm_option, close_journal, complain, need_arming, permit_of, told_journal
+from .orders import arm_option, close_journal, complain, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment
@@ -53,7 +53,7 @@ WRITING = frozenset({"set", "factory", "load"})
 @read_only_option
 @never_forced
 @settings_options
-@told
+@reported
 def block(
     target: Target,
     action: str,
@@ -186,7 +186,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
             head = drive_json(line_text, session)
             print_json({**head, "dry_run": True, "changes": changes})
         return DONE
-    journal, sent, permit = told_journal(), dict[str, bool](), permit_of(session)
+    journal, sent, permit = journal_document(), dict[str, bool](), permit_of(session)
     try:
         for plan in plans:
             done = await write_assignment(

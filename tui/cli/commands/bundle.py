@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.devices import devices_option
-from ..shared.errors import USAGE, Failure, told
+from ..shared.errors import USAGE, Failure, reported
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 )
 @click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 @json_option
-@told
+@reported
 def bundle(
     line_text: str,
     devices: tuple[int, ...],

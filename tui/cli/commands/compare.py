@@ -10,7 +10,7 @@ import click
 
 from ..shared.completion import complete_side
 from ..shared.devices import devices_option
-from ..shared.errors import DIFFERENT, USAGE, Failure, told
+from ..shared.errors import DIFFERENT, USAGE, Failure, reported
 from ..shared.line_argument import LINE_VARIABLE, named_line_of
 from ..shared.options import Target, json_option, never_forced, profile_of
 from ..shared.say import say
@@ -39,7 +39,7 @@ FACTORY = "factory"
 @profile_of("Profile of the drives.")
 @devices_option("Slave address of the drive; twice where A and B are two drives.")
 @never_forced
-@told
+@reported
 def compare(
     a: str,
     b: str,
@@ -88,8 +88,8 @@ def compare(
     rows = rows_of(profile, *sides, all_rows=all_rows)
     if as_json:
         equal = not any(row.differs for row in rows)
-        told = {"a": names[0], "b": names[1], "profile": profile.id, "equal": equal}
-        print_json({**told, "rows": [_row_json(row) for row in rows]})
+        reported = {"a": names[0], "b": names[1], "profile": profile.id, "equal": equal}
+        print_json({**reported, "rows": [_row_json(row) for row in rows]})
     else:
         say(table(rows, names, format_).removesuffix("\n"), indent=3)
     if any(row.differs for row in rows):

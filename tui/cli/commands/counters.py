@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure, told
+from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure, reported
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
@@ -23,7 +23,7 @@ from ..shared.options import (
 )
 from ..shared.output import drive_json, minute_json, print_json
 from ..shared.say import say, say_row
-from .orders import arm_option, close_journal, need_arming, told_journal
+from .orders import arm_option, close_journal, journal_document, need_arming
 
 if TYPE_CHECKING:
     from tui.bus.api import DeviceCounters
@@ -61,7 +61,7 @@ COUNTER_TITLES = 18
 @arm_option
 @read_only_option
 @json_option
-@told
+@reported
 def counters(
     target: Target,
     frames: int,
@@ -118,9 +118,9 @@ async def _look(watch: CounterWatch) -> None:
 async def _reset(watch: CounterWatch) -> None:
     if not watch.can_reset_drive:
         why = "the line is read-only" if watch.session.line.read_only else "it has no such command"
-        told = f"The counters of device {watch.session.device} are not reset: {why}."
-        raise Failure(told, REFUSED_HERE)
-    journal = told_journal()
+        reported = f"The counters of device {watch.session.device} are not reset: {why}."
+        raise Failure(reported, REFUSED_HERE)
+    journal = journal_document()
     try:
         await watch.reset_drive(journal)
     finally:
@@ -147,9 +147,9 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
     yield "Turnaround", ", ".join(seen) or "-----"
     for name, one in found.drive:
         errors = f"{one.last.damaged}{' or more' if one.last.saturated else ''}"
-        told = f"{one.last.frames} frames, {errors} with a wrong checksum"
+        reported = f"{one.last.frames} frames, {errors} with a wrong checksum"
         meanwhile = f"{one.frames} and {one.damaged} since the first look"
-        yield name.capitalize(), f"{told}; {meanwhile}"
+        yield name.capitalize(), f"{reported}; {meanwhile}"
     if found.trouble:
         yield "Drive", found.trouble
 

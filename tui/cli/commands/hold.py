@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import click
 
-from ..running.holding import Holding, kept_asked
+from ..running.holding import Holding, keep_polling
 from ..shared.devices import several_devices_option
-from ..shared.errors import LINE_TROUBLE, Failure, status_of, told
+from ..shared.errors import LINE_TROUBLE, Failure, reported, status_of
 from ..shared.left_alone import timeout_json
 from ..shared.options import (
     Target,
@@ -52,7 +52,7 @@ class HeldTeller(Protocol):
 @force_profile_option
 @read_only_option
 @json_option
-@told
+@reported
 def hold(
     line_text: str,
     device: tuple[int, ...],
@@ -71,7 +71,7 @@ def hold(
     tell = _json_teller(line_text) if as_json else _teller
 
     async def work(opened: OpenLine) -> None:
-        async with kept_asked(opened, tell) as (holding, ending):
+        async with keep_polling(opened, tell) as (holding, ending):
             taking = asyncio.create_task(_take_all(opened, targets, holding, tell))
             end = asyncio.create_task(ending.event.wait())
             try:

@@ -12,7 +12,7 @@ from tui.drive.plain import plain
 
 from ..shared.devices import several_devices_option
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, REFUSED_HERE, Failure, told
+from ..shared.errors import DONE, REFUSED_HERE, Failure, reported
 from ..shared.left_alone import look_after
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import (
@@ -42,7 +42,7 @@ IDENTITY_TITLES = 11
 @hold_option
 @read_only_option
 @json_option
-@told
+@reported
 def identify(
     line_text: str,
     device: tuple[int, ...],
@@ -66,19 +66,19 @@ def identify(
         words = await _model_words(session)
         if not as_json:
             _say_identity(identity, words)
-        told = {"line": line_text, "timeout": None}
+        reported = {"line": line_text, "timeout": None}
         if session is not None:
             sessions.append(session)
             await look_after(opened, session, line_text).learn()
-            told = drive_json(line_text, session)
+            reported = drive_json(line_text, session)
         elif hold:
             raise Failure(
                 f"Device {drive.device} does not identify itself, so it cannot be kept alive."
                 " Use 'drivepanel hold' with -p.",
                 REFUSED_HERE,
             )
-        told |= {key: getattr(identity, key) for key in IDENTITY_KEYS}
-        return {**told, "model": _model(identity, words)}, DONE
+        reported |= {key: getattr(identity, key) for key in IDENTITY_KEYS}
+        return {**reported, "model": _model(identity, words)}, DONE
 
     async def work(opened: OpenLine) -> int:
         status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
@@ -139,14 +139,14 @@ def _model(identity: DriveIdentity, words: Mapping[str, int]) -> dict[str, Any] 
     """The model by the drive's own code word; null where there is none."""
     if identity.profile is None or not words:
         return None
-    from tui.drive.model import model_of, model_told
+    from tui.drive.model import model_of, model_read
     from tui.drive.profile import library
 
     profile = library.load(identity.profile)
     model = model_of(profile, words)
     return {
         "code": words.get(profile.data.identification.model_parameter),
-        "text": model_told(profile, words),
+        "text": model_read(profile, words),
         "reference": (model.reference or None) if model else None,
         "voltage": (model.voltage or None) if model else None,
         "power_kw": (model.power_kw or None) if model else None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import USAGE, Failure, told
+from ..shared.errors import USAGE, Failure, reported
 from ..shared.options import json_option
 from ..shared.output import print_json
 from ..shared.say import say
@@ -83,7 +83,7 @@ def since(text: str, now: datetime) -> datetime | None:
     help="Start at: 2h, 30m, 7d, 08:30 or 2026-03-01T08:30.",
 )
 @json_option
-@told
+@reported
 def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
     """Show what was written to drives from this computer, trips that were seen, and proofs.
 
@@ -133,8 +133,8 @@ def entry_line(entry: Entry) -> str:
     from tui.session.journal_reading import time_of
 
     when = time_of(entry)
-    told = f"{when:%Y-%m-%d %H:%M:%S}" if when is not None else entry.time
-    head = f"{told}  {entry.device}/{entry.line}"
+    reported = f"{when:%Y-%m-%d %H:%M:%S}" if when is not None else entry.time
+    head = f"{reported}  {entry.device}/{entry.line}"
     if entry.kind == "fault":
         return f"{head}  FAULT {entry.code} {entry.new}: {entry.answer}"
     if entry.kind == "proof":

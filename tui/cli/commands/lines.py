@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import USAGE, told
+from ..shared.errors import USAGE, reported
 from ..shared.left_behind import LeftBehind, left_on_lines
 from ..shared.options import json_option
 from ..shared.say import say
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @json_option
-@told
+@reported
 def lines(as_json: bool) -> None:
     """List the lines that the settings file names, and the adapters and drives remembered.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.completion import complete_line, complete_profile
-from ..shared.errors import INTERRUPTED, USAGE, Failure, told
+from ..shared.errors import INTERRUPTED, USAGE, Failure, reported
 from ..shared.line_argument import LineArgument
 from ..shared.numbers import seconds
 from ..shared.options import json_option
@@ -65,7 +65,7 @@ LAST_ADDRESS_HEARD = 255
     help="Listen for S seconds, else until Ctrl-C.",
 )
 @json_option
-@told
+@reported
 def listen(
     line_text: str,
     profile_ids: tuple[str, ...],

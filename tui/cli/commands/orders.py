@@ -56,7 +56,7 @@ def complain(text: str) -> None:
         say(f"drivepanel: {text}", err=True)
 
 
-def told_journal() -> Journal:
+def journal_document() -> Journal:
     """A journal whose trouble is said at once, on standard error."""
     from tui.session.journal import Journal
 
@@ -98,7 +98,7 @@ async def watched(
     from ..shared.drive_status import shown_codes
 
     session = await connect_drive(opened, target)
-    journal = told_journal()
+    journal = journal_document()
     # the motors of a simulated line end with it
     fleet = Fleet(opened.line, journal, None if opened.simulation else starts)
     console = fleet.take(session)

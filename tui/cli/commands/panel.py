@@ -9,7 +9,7 @@ import click
 from ..opening import DEMO_LINE, LEAVE_RUNNING, STOP, open_panel, terminal_trouble
 from ..shared.completion import complete_line
 from ..shared.devices import SLAVE_ADDRESS, one_device
-from ..shared.errors import USAGE, Failure, told
+from ..shared.errors import USAGE, Failure, reported
 from ..shared.line_argument import LineArgument, share_group_option
 from ..shared.lines import is_line
 from ..shared.options import read_only_option
@@ -57,7 +57,7 @@ ascii_option = click.option(
 @mouse_option
 @bell_option
 @ascii_option
-@told
+@reported
 def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bool | None) -> None:
     """Open the panel on one simulated line with five running drives."""
     run_panel(
@@ -95,7 +95,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
 @mouse_option
 @bell_option
 @ascii_option
-@told
+@reported
 def panel(
     line_text: str | None,
     device: int | None,

@@ -6,14 +6,14 @@ from typing import Any
 
 import click
 
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.options import json_option
 from ..shared.say import say
 
 
 @click.command()
 @json_option
-@told
+@reported
 def ports(as_json: bool) -> None:
     """List the serial ports of this machine and who holds them."""
     from tui.bus.transport.port_names import lasting_name

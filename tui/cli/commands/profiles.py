@@ -10,7 +10,7 @@ import click
 from tui.drive.plain import plain
 
 from ..shared.completion import complete_profile
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.options import json_option
 from ..shared.say import say
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     help="Show warnings, wiring, LEDs, command words and errata.",
 )
 @json_option
-@told
+@reported
 def profiles(
     profile_id: str | None,
     more: tuple[str, ...],
@@ -102,8 +102,8 @@ def check_files(files: list[Path], as_json: bool) -> None:
 
         if as_json:
             raise click.exceptions.Exit(USAGE)
-        told_count = f"{len(faults)} fault{'s' if len(faults) > 1 else ''}"
-        raise Failure("\n".join((f"{told_count} found:", *faults)), USAGE)
+        count_text = f"{len(faults)} fault{'s' if len(faults) > 1 else ''}"
+        raise Failure("\n".join((f"{count_text} found:", *faults)), USAGE)
 
 
 def _tell_folder(as_json: bool) -> None:
@@ -200,8 +200,8 @@ def _show_wiring(profile: Profile, as_json: bool) -> None:
     if as_json:
         import msgspec
 
-        told = [msgspec.to_builtins(section) for section in sections]
-        print_json({"id": profile.id, "name": profile.name, "sections": told})
+        reported = [msgspec.to_builtins(section) for section in sections]
+        print_json({"id": profile.id, "name": profile.name, "sections": reported})
         return
     say(plain(f"{profile.vendor} {profile.name}"))
     for line in page_lines(sections, min(100, get_terminal_size().columns)):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DIFFERENT, DRIVE_REFUSED, REFUSED_HERE, Failure, told
+from ..shared.errors import DIFFERENT, DRIVE_REFUSED, REFUSED_HERE, Failure, reported
 from ..shared.options import (
     Target,
     drive_options,
@@ -47,7 +47,7 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 @click.option("--reset", is_flag=True, help="Reset the fault that the test has caused.")
 @read_only_option
 @json_option
-@told
+@reported
 def prove(
     target: Target,
     arm: bool,

@@ -12,7 +12,7 @@ import click
 from ..plant.broker import Broker, broker_of, mqtt_password_option
 from ..plant.wish import check_names
 from ..shared.completion import complete_line_or_code
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.numbers import check_rate
 from ..shared.options import Target, drives_options, every_option, json_option
 from ..shared.output import print_json
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @mqtt_password_option
 @every_option
 @json_option
-@told
+@reported
 def publish(
     target: Target,
     codes: tuple[str, ...],

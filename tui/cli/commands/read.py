@@ -8,7 +8,7 @@ import click
 
 from ..shared.completion import complete_code
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, DRIVE_REFUSED, told
+from ..shared.errors import DONE, DRIVE_REFUSED, reported
 from ..shared.options import (
     Target,
     connect_drive,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 @hold_option
 @read_only_option
 @json_option
-@told
+@reported
 def read(
     target: Target,
     codes: tuple[str, ...],
@@ -66,8 +66,8 @@ def read(
         refused = [reading for reading in readings.values() if reading.raw is None]
         for reading in refused:
             say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
-        told = readings_json(target.line_text, session, readings)
-        return told, DRIVE_REFUSED if refused else DONE
+        reported = readings_json(target.line_text, session, readings)
+        return reported, DRIVE_REFUSED if refused else DONE
 
     async def work(opened: OpenLine) -> int:
         status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..shared.errors import INTERRUPTED, Failure, told
+from ..shared.errors import INTERRUPTED, Failure, reported
 from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.sets import (
@@ -25,7 +25,7 @@ from ..shared.sets import (
 @json_option
 @settings_options
 @never_forced
-@told
+@reported
 def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.
 

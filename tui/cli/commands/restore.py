@@ -9,7 +9,7 @@ import click
 
 from ..shared.devices import devices_option
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, told
+from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, reported
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -35,7 +35,7 @@ from ..shared.sets import (
     set_in,
     status_of_results,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
+from .orders import arm_option, close_journal, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
@@ -68,7 +68,7 @@ CODES_NAMED = 12
     default=(1,),
     show_default=True,
 )
-@told
+@reported
 def restore(
     line_text: str,
     file: Path,
@@ -208,9 +208,9 @@ async def _restore(
     from tui.session.settings.restore import restore_set as bring_back
 
     source, messages = library.load(values.head.profile), telling.messages
-    if told_before := Mark.of(session).interrupted:
-        messages.tell(told_before)
-    journal, permit = told_journal(), permit_of(session)
+    if interrupted_before := Mark.of(session).interrupted:
+        messages.tell(interrupted_before)
+    journal, permit = journal_document(), permit_of(session)
     try:
         done = await bring_back(
             session, journal, values, source, options, permit=permit,

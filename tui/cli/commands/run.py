@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from ..running.motor import Wish, run_motor
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
@@ -48,7 +48,7 @@ from .orders import arm_option, need_arming
 @read_only_option
 @json_option
 @never_forced
-@told
+@reported
 def run(
     target: Target,
     reverse: bool,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import INTERRUPTED, LINE_TROUBLE, REFUSED_HERE, Failure, told
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, REFUSED_HERE, Failure, reported
 from ..shared.options import hold_option, json_option, line_argument, on_line, read_only_option
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ ALL_ADDRESSES = "1-247"
 @hold_option
 @read_only_option
 @json_option
-@told
+@reported
 def scan(
     line_text: str,
     addresses: str,

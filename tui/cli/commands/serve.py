@@ -18,7 +18,7 @@ from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
 from ..shared.completion import complete_line
 from ..shared.devices import devices_option
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors, say_shared
@@ -78,7 +78,7 @@ from ..shared.signals import BY_SIGNAL, never_suspended
 @devices_option("Serve this drive, which does not identify itself; needs -p.")
 @profile_of("Profile of the drives of -d.")
 @json_option
-@told
+@reported
 def serve(
     lines: tuple[str, ...],
     tcp: str | None,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.completion import complete_profile
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
 from ..shared.options import json_option
@@ -88,7 +88,7 @@ USUAL = (19200, "8E1")
     help="Run the motors at this frequency from the start.",
 )
 @json_option
-@told
+@reported
 def simulate(
     drives: tuple[str, ...],
     pty: str | None,
@@ -179,8 +179,8 @@ def _follow(simulation: Simulation, as_json: bool) -> None:
                 continue
             if as_json:
                 # click knows no command in a thread
-                told = {"command": "simulate", "event": "inputs", "text": text}
-                say_beside(json_text(document(told)), as_it_is=True)
+                reported = {"command": "simulate", "event": "inputs", "text": text}
+                say_beside(json_text(document(reported)), as_it_is=True)
             else:
                 say_beside(text)
 

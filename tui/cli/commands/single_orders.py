@@ -13,7 +13,7 @@ from tui.bus.errors import LineError
 from tui.drive.fault_reset import not_in_command, reset_codes, reset_follows
 from tui.drive.reset_text import MAY_START
 
-from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, told
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, reported
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -76,7 +76,7 @@ def _ordered(
 @read_only_option
 @json_option
 @never_forced
-@told
+@reported
 def reference(
     target: Target,
     text: str,
@@ -101,7 +101,7 @@ def reference(
 @read_only_option
 @json_option
 @never_forced
-@told
+@reported
 def reset(
     target: Target,
     arm: bool,

@@ -9,7 +9,7 @@ import click
 from ..shared.completion import complete_line
 from ..shared.drive_status import status_json, status_of_drive
 from ..shared.drives import each_drive
-from ..shared.errors import told
+from ..shared.errors import reported
 from ..shared.every_drive import USUAL_SEARCH, every_drive
 from ..shared.line_argument import takes_line_as
 from ..shared.options import (
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 )
 @read_only_option
 @json_option
-@told
+@reported
 def status(
     target: Target,
     more: tuple[str, ...],

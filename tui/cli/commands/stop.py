@@ -16,7 +16,7 @@ from ..running.stop_targets import (
     remembered,
 )
 from ..running.stop_telling import StopTelling
-from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, reported
 from ..shared.left_alone import LeftAlone, look_after
 from ..shared.left_behind import forget_start
 from ..shared.options import (
@@ -28,7 +28,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.output import print_json
-from .orders import close_journal, complain, told_journal
+from .orders import close_journal, complain, journal_document
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -64,7 +64,7 @@ NAMES_NO_FAMILY = (
 @click.option("--arm", is_flag=True, help="Arm the drive for --give-back; no stop needs it.")
 @read_only_option
 @json_option
-@told
+@reported
 def stop(
     target: Target,
     every: bool,
@@ -92,7 +92,7 @@ def stop(
     telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
-        journal = told_journal()
+        journal = journal_document()
         wish = StopWish(opened, target.profile_id, order, journal, telling)
         try:
             if every or target.others:
@@ -234,8 +234,8 @@ async def _stop_all(wish: StopWish, named: Sequence[int]) -> int:
     found: StoppableDrive | None
     try:
         for patient in (False, True):
-            asked, left = left, []
-            for device in asked:
+            requested, left = left, []
+            for device in requested:
                 patience = Priority.BACKGROUND
                 if patient:
                     patience = Priority.OPERATOR_READ if device in likely else Priority.PATIENT

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..shared.completion import complete_code
-from ..shared.errors import DIFFERENT, told
+from ..shared.errors import DIFFERENT, reported
 from ..shared.options import (
     Target,
     connect_drive,
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 )
 @json_option
 @never_forced
-@told
+@reported
 def teach(
     target: Target,
     code: str | None,
@@ -118,8 +118,8 @@ async def _look(teacher: Teacher, code: str, value: str, unit: str, *, as_json: 
 def _confirm(teacher: Teacher, code: str) -> str:
     from tui.session.teaching.teacher import reference_asks
 
-    said = teacher.confirm_reference(code)
-    return f"{said} {reference_asks(teacher.family, code)}"
+    message = teacher.confirm_reference(code)
+    return f"{message} {reference_asks(teacher.family, code)}"
 
 
 def _tell_change(teacher: Teacher, text: str, *, as_json: bool) -> None:

@@ -14,7 +14,7 @@ import click
 
 from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
-from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, told
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, reported
 from ..shared.found_drives import find_drives
 from ..shared.numbers import check_rate
 from ..shared.options import (
@@ -101,7 +101,7 @@ class CsvWish:
 @force_profile_option
 @read_only_option
 @json_option
-@told
+@reported
 def watch(
     target: Target,
     codes: tuple[str, ...],

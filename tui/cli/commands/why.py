@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import LINE_TROUBLE, told
+from ..shared.errors import LINE_TROUBLE, reported
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import (
     Target,
@@ -36,7 +36,7 @@ SICK_COUNTS = (
 @settings_options
 @read_only_option
 @json_option
-@told
+@reported
 def why(target: Target, read_only: bool, as_json: bool) -> None:
     """Diagnose why a drive does not answer: the cause in a sentence, and the next steps.
 
@@ -56,7 +56,7 @@ def why(target: Target, read_only: bool, as_json: bool) -> None:
     named = library.load(target.profile_id) if target.profile_id else None
 
     async def work(opened: OpenLine) -> tuple[Diagnosis, dict[str, Any]]:
-        return await _asked(opened, target, named)
+        return await _requested(opened, target, named)
 
     try:
         found, about = on_line(target, work, read_only=read_only)
@@ -69,7 +69,7 @@ def why(target: Target, read_only: bool, as_json: bool) -> None:
         raise click.exceptions.Exit(LINE_TROUBLE)
 
 
-async def _asked(
+async def _requested(
     opened: OpenLine, target: Target, named: Profile | None
 ) -> tuple[Diagnosis, dict[str, Any]]:
     """The diagnosis of a drive on an open line, and how a document about it begins."""
@@ -159,7 +159,9 @@ def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool
         return
     say(found.text)
     if (measure := found.sight.measure) is not None:
-        say(f"Sent {measure.asked} short reads in {measure.seconds:.1f} s; nothing was written.")
+        say(
+            f"Sent {measure.requested} short reads in {measure.seconds:.1f} s; nothing was written."
+        )
     if found.certainty != "certain":
         say(f"This is {found.certainty}. It could also be:")
         for other in found.others:
@@ -183,7 +185,7 @@ def why_json(found: Diagnosis) -> dict[str, Any]:
         "next": list(found.steps),
         "measured": _measured_json(found),
         "seen": {
-            "asked": heard.asked,
+            "asked": heard.requested,
             "answered": heard.answered,
             "late": heard.late,
             "echoed": heard.echoed,
@@ -206,8 +208,8 @@ def _measured_json(found: Diagnosis) -> dict[str, Any] | None:
     measure = found.sight.measure
     if measure is None:
         return None
-    counts = ("asked", "answered", *SICK_COUNTS)
     return {
-        **{name: getattr(measure, name) for name in counts},
+        "asked": measure.requested,
+        **{name: getattr(measure, name) for name in ("answered", *SICK_COUNTS)},
         "seconds": round(measure.seconds, 2),
     }

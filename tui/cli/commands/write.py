@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..shared.completion import complete_setting
-from ..shared.errors import DONE, REFUSED_HERE, told
+from ..shared.errors import DONE, REFUSED_HERE, reported
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -31,7 +31,7 @@ from ..shared.sets import (
     say_afterwards,
     status_of_results,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
+from .orders import arm_option, close_journal, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edits
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 @read_only_option
 @json_option
 @settings_options
-@told
+@reported
 def write(
     target: Target,
     wanted: tuple[str, ...],
@@ -136,7 +136,7 @@ async def _staged(
         edits, retrying = await stage_typed(session, pairs, rounded=rounded)
     except WouldRound as loss:
         raise ValueRefused(f"{loss} Use --round to write it anyway.") from loss
-    for edit in edits.asked:
+    for edit in edits.requested:
         if edit.remark:
             messages.tell(edit.remark)
     for text in consequences(profile, edits, retrying.raws, retrying.lacking):
@@ -187,7 +187,7 @@ async def _write(
     messages = telling.messages
     if not len(edits):
         messages.tell("The drive holds these values already.")
-    journal, permit = told_journal(), permit_of(session)
+    journal, permit = journal_document(), permit_of(session)
     try:
         done = await apply_edits(
             session, journal, edits, permit=permit, confirmed=confirmed, progress=telling

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from .parts import PartTold
+from .parts import DocumentPart
 
 
-class TurnaroundTold(PartTold):
+class TurnaroundField(DocumentPart):
     """Replies with a turnaround up to so many ms and beyond the one before; null: any longer."""
 
     up_to_ms: int | None
     count: int
 
 
-class OurCountersTold(PartTold):
+class OurCountersField(DocumentPart):
     """What was counted here; `exceptions` by their code, `turnarounds` as a histogram."""
 
     frames: int
@@ -25,10 +25,10 @@ class OurCountersTold(PartTold):
     bytes_out: int
     bytes_in: int
     busy_seconds: float
-    turnarounds: list[TurnaroundTold]
+    turnarounds: list[TurnaroundField]
 
 
-class LastMinuteField(PartTold):
+class LastMinuteField(DocumentPart):
     """Replies of the last minute, and the share of good ones, 0 to 1; null without a reply.
 
     `silent` are those missed by a drive that has not answered since, not part of a line's share.
@@ -43,21 +43,21 @@ class LastMinuteField(PartTold):
     strays: int
 
 
-class LastMinutesField(PartTold):
+class LastMinutesField(DocumentPart):
     """The last minute of the line, and of the drive."""
 
     line: LastMinuteField
     device: LastMinuteField
 
 
-class LoadTold(PartTold):
+class LoadField(DocumentPart):
     """Shares of the time, 0 to 1, in which the line was busy: at all, and with this drive."""
 
     line: float | None
     device: float | None
 
 
-class DriveCountersTold(PartTold):
+class DriveCountersField(DocumentPart):
     """A pair of the drive's counters as it tells them, and what it counted since the first look."""
 
     name: str
@@ -69,7 +69,7 @@ class DriveCountersTold(PartTold):
     counts_this_line: bool | None
 
 
-class DifferenceTold(PartTold):
+class DifferenceField(DocumentPart):
     """Something that the counters show; `count` frames at least."""
 
     kind: str
@@ -77,7 +77,7 @@ class DifferenceTold(PartTold):
     text: str
 
 
-class CountingTestTold(PartTold):
+class CountingTestField(DocumentPart):
     """Frames that were sent to be counted."""
 
     frames: int

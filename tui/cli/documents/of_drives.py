@@ -10,45 +10,45 @@ from msgspec import UNSET, UnsetType
 from tui.bus.api import Contact
 
 from .counter_parts import (
-    CountingTestTold,
-    DifferenceTold,
-    DriveCountersTold,
+    CountingTestField,
+    DifferenceField,
+    DriveCountersField,
     LastMinutesField,
-    LoadTold,
-    OurCountersTold,
+    LoadField,
+    OurCountersField,
 )
 from .parts import (
-    AlarmTold,
-    ControlTold,
-    FaultTold,
-    FirstWordTold,
+    AlarmField,
+    ControlField,
+    FaultField,
+    FirstWordField,
     LeftBehindDocument,
-    ModelTold,
-    OldTimeoutTold,
-    StateTold,
-    TimeoutTold,
-    ValueTold,
-    WatchedValueTold,
+    ModelField,
+    OldTimeoutField,
+    StateField,
+    TimeoutField,
+    ValueField,
+    WatchedValueField,
 )
 
 
-class DocumentTold(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+class Document(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """What every document begins with."""
 
     schema: Literal[1]
     command: str | None
 
 
-class OfDriveTold(DocumentTold, kw_only=True):
+class DriveDocument(Document, kw_only=True):
     """A document about one drive on the LINE as it was typed."""
 
     line: str
     device: int
     profile: str | None
-    timeout: TimeoutTold | UnsetType | None = UNSET
+    timeout: TimeoutField | UnsetType | None = UNSET
 
 
-class ErrorTold(DocumentTold, kw_only=True):
+class ErrorDocument(Document, kw_only=True):
     """An error that ended the command, or that of one of several drives."""
 
     error: str
@@ -57,11 +57,11 @@ class ErrorTold(DocumentTold, kw_only=True):
     device: int | UnsetType = UNSET
 
 
-class ReadTold(OfDriveTold, kw_only=True):
+class ReadDocument(DriveDocument, kw_only=True):
     """`read`: values by code."""
 
     command: Literal["read"]
-    values: dict[str, ValueTold]
+    values: dict[str, ValueField]
 
 
 class CycleTime(msgspec.Struct, forbid_unknown_fields=True):
@@ -73,12 +73,12 @@ class CycleTime(msgspec.Struct, forbid_unknown_fields=True):
     """As `--every` asks for them."""
 
 
-class CycleTold(OfDriveTold, kw_only=True):
+class CycleDocument(DriveDocument, kw_only=True):
     """`watch`: one cycle."""
 
     command: Literal["watch"]
     time: str
-    values: dict[str, WatchedValueTold]
+    values: dict[str, WatchedValueField]
     state: str | None
     direction: str | None
     error: str | None
@@ -86,7 +86,7 @@ class CycleTold(OfDriveTold, kw_only=True):
     cycle: CycleTime
 
 
-class IdentityTold(OfDriveTold, kw_only=True):
+class IdentityDocument(DriveDocument, kw_only=True):
     """`identify`: who a drive says it is."""
 
     command: Literal["identify"]
@@ -94,31 +94,31 @@ class IdentityTold(OfDriveTold, kw_only=True):
     reference: str
     version: str
     name: str
-    model: ModelTold | None
+    model: ModelField | None
 
 
-class StatusTold(OfDriveTold, kw_only=True):
+class StatusDocument(DriveDocument, kw_only=True):
     """`status`: what a drive does and who commands it."""
 
     command: Literal["status"]
-    state: StateTold
+    state: StateField
     direction: str | None
-    fault: FaultTold | None
+    fault: FaultField | None
     alarms: list[str]
-    alarm: AlarmTold | None
+    alarm: AlarmField | None
     commanded_by: str | None
     reference_from: str | None
     switched_by: list[str]
     commandable: bool
     why_not: str | None
-    control: ControlTold | None
-    watch: OldTimeoutTold | None
+    control: ControlField | None
+    watch: OldTimeoutField | None
     left_behind: LeftBehindDocument | None
-    values: dict[str, ValueTold | None]
+    values: dict[str, ValueField | None]
     unread: list[str]
 
 
-class RunTold(DocumentTold, kw_only=True):
+class RunDocument(Document, kw_only=True):
     """`run`: one event."""
 
     command: Literal["run"]
@@ -131,12 +131,12 @@ class RunTold(DocumentTold, kw_only=True):
     state: str | UnsetType | None = UNSET
     direction: str | UnsetType | None = UNSET
     fault: str | UnsetType | None = UNSET
-    values: dict[str, ValueTold | None] | UnsetType = UNSET
+    values: dict[str, ValueField | None] | UnsetType = UNSET
     error: str | UnsetType | None = UNSET
-    timeout: TimeoutTold | UnsetType | None = UNSET
+    timeout: TimeoutField | UnsetType | None = UNSET
 
 
-class HoldTold(DocumentTold, kw_only=True):
+class HoldDocument(Document, kw_only=True):
     """`hold`: one event."""
 
     command: Literal["hold"]
@@ -145,10 +145,10 @@ class HoldTold(DocumentTold, kw_only=True):
     device: int
     event: Literal["holding", "lost", "back", "fault"]
     text: str
-    timeout: TimeoutTold | UnsetType | None = UNSET
+    timeout: TimeoutField | UnsetType | None = UNSET
 
 
-class WatchingFamilyTold(msgspec.Struct, forbid_unknown_fields=True):
+class WatchingFamilyField(msgspec.Struct, forbid_unknown_fields=True):
     """A family that acts when it was asked once and is asked no more."""
 
     profile: str
@@ -159,24 +159,24 @@ class WatchingFamilyTold(msgspec.Struct, forbid_unknown_fields=True):
     """Whether a document says so."""
 
 
-class LineSettingTold(msgspec.Struct, forbid_unknown_fields=True):
+class LineSettingField(msgspec.Struct, forbid_unknown_fields=True):
     """Baud and format of a line."""
 
     baud: int
     format: str
 
 
-class ScanFamiliesTold(DocumentTold, kw_only=True):
+class ScanFamiliesDocument(Document, kw_only=True):
     """`scan`: who may be there and watches the line, before the first request."""
 
     command: Literal["scan"]
     line: str
     event: Literal["families"]
-    families: list[WatchingFamilyTold]
+    families: list[WatchingFamilyField]
     text: str
 
 
-class ScanHitTold(DocumentTold, kw_only=True):
+class ScanHitDocument(Document, kw_only=True):
     """`scan`: a drive that answered; baud and format are null over a network."""
 
     command: Literal["scan"]
@@ -197,7 +197,7 @@ class ScanHitTold(DocumentTold, kw_only=True):
     """What told who it is: a function, or a read; null where nothing did."""
 
 
-class ScanUnclearTold(DocumentTold, kw_only=True):
+class ScanUnclearDocument(Document, kw_only=True):
     """`scan`: what came from an address is no answer; it may be taken twice."""
 
     command: Literal["scan"]
@@ -209,18 +209,18 @@ class ScanUnclearTold(DocumentTold, kw_only=True):
     text: str
 
 
-class ScanSlowTold(DocumentTold, kw_only=True):
+class ScanSlowDocument(Document, kw_only=True):
     """`scan`: the likely settings are through; those that are left take so many seconds."""
 
     command: Literal["scan"]
     line: str
     event: Literal["slow"]
-    settings: list[LineSettingTold]
+    settings: list[LineSettingField]
     seconds: float
     text: str
 
 
-class ScanEndTold(DocumentTold, kw_only=True):
+class ScanEndDocument(Document, kw_only=True):
     """`scan`: the end; `done` is false where it was ended before."""
 
     command: Literal["scan"]
@@ -229,7 +229,7 @@ class ScanEndTold(DocumentTold, kw_only=True):
     done: bool
     found: int
     addresses: str
-    settings: list[LineSettingTold]
+    settings: list[LineSettingField]
     """Those that were tried, in this order."""
     not_tried: int
     held_back: str | None
@@ -239,7 +239,7 @@ class ScanEndTold(DocumentTold, kw_only=True):
     text: str
 
 
-class ProveTold(OfDriveTold, kw_only=True):
+class ProveDocument(DriveDocument, kw_only=True):
     """`prove`: the silences between which the drive has reacted, and what is set; times in ms."""
 
     command: Literal["prove"]
@@ -257,25 +257,25 @@ class ProveTold(OfDriveTold, kw_only=True):
     reset: bool
 
 
-class CountersTold(OfDriveTold, kw_only=True):
+class CountersDocument(DriveDocument, kw_only=True):
     """`counters`: what was exchanged with a drive, as counted here and by the drive."""
 
     command: Literal["counters"]
     counted_by: str | None
     seconds: float
-    ours: OurCountersTold
-    since_opened: OurCountersTold
+    ours: OurCountersField
+    since_opened: OurCountersField
     last_minute: LastMinutesField
-    load: LoadTold
-    drive: list[DriveCountersTold]
-    differences: list[DifferenceTold]
+    load: LoadField
+    drive: list[DriveCountersField]
+    differences: list[DifferenceField]
     agree: bool
     trouble: str | None
-    test: CountingTestTold
+    test: CountingTestField
     reset: bool
 
 
-class CommandTold(OfDriveTold, kw_only=True):
+class CommandDocument(DriveDocument, kw_only=True):
     """`reference`, `reset`: what the command came to."""
 
     command: Literal["reference", "reset"]
@@ -283,12 +283,12 @@ class CommandTold(OfDriveTold, kw_only=True):
     messages: list[str]
 
 
-class StopTold(OfDriveTold, kw_only=True):
+class StopDocument(DriveDocument, kw_only=True):
     """`stop`: what became of one drive; a list with --all or several -d."""
 
     command: Literal["stop"]
     stopped: bool
     text: str
     status: int
-    first: list[FirstWordTold] | UnsetType = UNSET
+    first: list[FirstWordField] | UnsetType = UNSET
     given_back: str | UnsetType = UNSET

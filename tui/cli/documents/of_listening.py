@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from .of_drives import DocumentTold
-from .parts import PartTold
+from .of_drives import Document
+from .parts import DocumentPart
 
-HowTold = Literal["named", "identified", "remembered", "likely"]
+HowIdentified = Literal["named", "identified", "remembered", "likely"]
 
 
-class HeardValueTold(PartTold):
+class HeardValueField(DocumentPart):
     """One value that was read, or written (`written`)."""
 
     address: int
@@ -21,7 +21,7 @@ class HeardValueTold(PartTold):
     written: bool
 
 
-class HeardExchangeTold(DocumentTold, kw_only=True):
+class HeardExchangeDocument(Document, kw_only=True):
     """`listen`: one request with what became of it; `request` and `reply` are hexadecimal."""
 
     command: Literal["listen"]
@@ -31,7 +31,7 @@ class HeardExchangeTold(DocumentTold, kw_only=True):
     device: int
     """0 for all devices at once."""
     profile: str | None
-    how: HowTold | None
+    how: HowIdentified | None
     """Why it is taken for that."""
     others: list[str]
     """Profiles that are as likely."""
@@ -42,20 +42,20 @@ class HeardExchangeTold(DocumentTold, kw_only=True):
     meaning: str | None
     turnaround_ms: float | None
     asked: list[str]
-    values: dict[str, HeardValueTold]
+    values: dict[str, HeardValueField]
     request: str
     reply: str
     text: str
 
 
-class NoiseTold(PartTold):
+class NoiseField(DocumentPart):
     """Bytes that form no frame."""
 
     places: int
     bytes: int
 
 
-class SilencesTold(PartTold):
+class SilencesField(DocumentPart):
     """How the silences between frames are kept, where that can be judged."""
 
     judged: bool
@@ -66,7 +66,7 @@ class SilencesTold(PartTold):
     """Frames that came in one reading with the one before: nothing is known of their silence."""
 
 
-class HeardWriteTold(PartTold):
+class HeardWriteField(DocumentPart):
     """One parameter that the master writes; `every` is in seconds, null of a single time."""
 
     commands: bool
@@ -77,7 +77,7 @@ class HeardWriteTold(PartTold):
     text: str
 
 
-class HeardReadTold(PartTold):
+class HeardReadField(DocumentPart):
     """One read of the master."""
 
     function: int
@@ -87,7 +87,7 @@ class HeardReadTold(PartTold):
     every: float | None
 
 
-class PlannedReadTold(PartTold):
+class PlannedReadField(DocumentPart):
     """One read of a shorter plan."""
 
     function: int
@@ -95,7 +95,7 @@ class PlannedReadTold(PartTold):
     words: int
 
 
-class FeedingTold(PartTold):
+class FeedingField(DocumentPart):
     """A communication timeout against the longest pause; seconds, null where it is off."""
 
     code: str
@@ -107,22 +107,22 @@ class FeedingTold(PartTold):
     margin: float | None
 
 
-class ShorterTold(PartTold):
+class ShorterField(DocumentPart):
     """Reads that bring the same values as those of the master's cycle, in less time."""
 
     codes: list[str]
     requests_now: int
     ms_now: float
-    requests: list[PlannedReadTold]
+    requests: list[PlannedReadField]
     ms: float
 
 
-class HeardDriveTold(PartTold):
+class HeardDriveField(DocumentPart):
     """What was heard of one drive."""
 
     device: int
     profile: str | None
-    how: HowTold | None
+    how: HowIdentified | None
     others: list[str]
     requests: int
     per_second: float | None
@@ -134,13 +134,13 @@ class HeardDriveTold(PartTold):
     exceptions: dict[str, int]
     turnaround_ms: float | None
     commanded: bool
-    writes: dict[str, HeardWriteTold]
-    reads: list[HeardReadTold]
-    timeout: FeedingTold | None
-    shorter: ShorterTold | None
+    writes: dict[str, HeardWriteField]
+    reads: list[HeardReadField]
+    timeout: FeedingField | None
+    shorter: ShorterField | None
 
 
-class HeardSummaryTold(DocumentTold, kw_only=True):
+class HeardSummaryDocument(Document, kw_only=True):
     """`listen`: what it came to by now."""
 
     command: Literal["listen"]
@@ -154,7 +154,7 @@ class HeardSummaryTold(DocumentTold, kw_only=True):
     load: float | None
     crossed: int
     """Requests that began while another waited for its answer: a second master."""
-    noise: NoiseTold
-    silences: SilencesTold
-    drives: list[HeardDriveTold]
+    noise: NoiseField
+    silences: SilencesField
+    drives: list[HeardDriveField]
     text: list[str]

@@ -7,11 +7,11 @@ from typing import Any, Literal
 import msgspec
 
 from .counter_parts import LastMinuteField
-from .of_drives import DocumentTold
+from .of_drives import Document
 from .parts import LeftBehindDocument
 
 
-class PortTold(DocumentTold, kw_only=True):
+class PortDocument(Document, kw_only=True):
     """`ports`: one port of the list."""
 
     command: Literal["ports"]
@@ -24,7 +24,7 @@ class PortTold(DocumentTold, kw_only=True):
     """USB vendor, product and serial number; null for a port that is not on USB."""
 
 
-class NamedLineTold(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class NamedLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """A line that the settings file names."""
 
     name: str
@@ -33,7 +33,7 @@ class NamedLineTold(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     profile: str | None
 
 
-class KnownDriveTold(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class KnownDriveField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """A drive that answered at an address when its line was used last."""
 
     device: int
@@ -44,12 +44,12 @@ class KnownDriveTold(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     profile: str | None
 
 
-class KnownLineTold(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class KnownLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """What is remembered of a line."""
 
     line: str
     adapter: str | None
-    drives: list[KnownDriveTold]
+    drives: list[KnownDriveField]
 
 
 class LeftOnLineDocument(LeftBehindDocument, kw_only=True):
@@ -80,19 +80,19 @@ class OpenLineDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True)
     """Its health; null without an answer, or from a holder of an older version."""
 
 
-class LinesTold(DocumentTold, kw_only=True):
+class LinesDocument(Document, kw_only=True):
     """`lines`: the names, what is wrong with the settings file, and what is remembered."""
 
     command: Literal["lines"]
     settings: str
     faults: list[str]
-    lines: list[NamedLineTold]
-    known: list[KnownLineTold]
+    lines: list[NamedLineField]
+    known: list[KnownLineField]
     open: list[OpenLineDocument]
     left_behind: list[LeftOnLineDocument]
 
 
-class ProfileTold(DocumentTold, kw_only=True):
+class ProfileDocument(Document, kw_only=True):
     """`profiles`: one of the list."""
 
     command: Literal["profiles"]
@@ -114,7 +114,7 @@ class ProfileShown(msgspec.Struct, kw_only=True):
     parameters: list[dict[str, Any]]
 
 
-class WiringTold(DocumentTold, kw_only=True):
+class WiringDocument(Document, kw_only=True):
     """`profiles ID --wiring`."""
 
     command: Literal["profiles"]
@@ -123,7 +123,7 @@ class WiringTold(DocumentTold, kw_only=True):
     sections: list[dict[str, Any]]
 
 
-class CheckTold(DocumentTold, kw_only=True):
+class CheckDocument(Document, kw_only=True):
     """`profiles --check`: one file of the list."""
 
     command: Literal["profiles"]
@@ -131,7 +131,7 @@ class CheckTold(DocumentTold, kw_only=True):
     faults: list[str]
 
 
-class ProfileBegun(DocumentTold, kw_only=True):
+class ProfileBegun(Document, kw_only=True):
     """`profiles new`."""
 
     command: Literal["profiles"]
@@ -140,14 +140,14 @@ class ProfileBegun(DocumentTold, kw_only=True):
     file: str
 
 
-class ProfileFolder(DocumentTold, kw_only=True):
+class ProfileFolder(Document, kw_only=True):
     """`profiles path`."""
 
     command: Literal["profiles"]
     folder: str
 
 
-class SimulationReady(DocumentTold, kw_only=True):
+class SimulationReady(Document, kw_only=True):
     """`simulate`: the line is served."""
 
     command: Literal["simulate"]
@@ -156,7 +156,7 @@ class SimulationReady(DocumentTold, kw_only=True):
     drives: list[dict[str, str | int]]
 
 
-class ServeReady(DocumentTold, kw_only=True):
+class ServeReady(Document, kw_only=True):
     """`serve`: the lines are open; `tcp` is the LINE by which others reach them, null without.
 
     `metrics` is the URL of the metrics, `mqtt` that of the broker with the topic.
@@ -172,7 +172,7 @@ class ServeReady(DocumentTold, kw_only=True):
     commands: bool
 
 
-class PublishReady(DocumentTold, kw_only=True):
+class PublishReady(Document, kw_only=True):
     """`publish`: publishing has begun; `mqtt` is the URL of the broker with the topic."""
 
     command: Literal["publish"]
@@ -180,7 +180,7 @@ class PublishReady(DocumentTold, kw_only=True):
     mqtt: str
 
 
-class InputsTold(DocumentTold, kw_only=True):
+class InputsDocument(Document, kw_only=True):
     """`simulate`: inputs of a drive were set or asked for."""
 
     command: Literal["simulate"]
@@ -188,7 +188,7 @@ class InputsTold(DocumentTold, kw_only=True):
     text: str
 
 
-class JournalEntryTold(msgspec.Struct, kw_only=True):
+class JournalEntryField(msgspec.Struct, kw_only=True):
     """A write, a trip that was seen, or a proof; `read_back` is what the drive held in the end."""
 
     time: str
@@ -208,7 +208,7 @@ class JournalEntryTold(msgspec.Struct, kw_only=True):
     of: str
 
 
-class DamagedLineTold(msgspec.Struct, kw_only=True):
+class DamagedLineField(msgspec.Struct, kw_only=True):
     """A line of the journal that is no entry, with its beginning."""
 
     file: str
@@ -216,16 +216,16 @@ class DamagedLineTold(msgspec.Struct, kw_only=True):
     text: str
 
 
-class JournalTold(DocumentTold, kw_only=True):
+class JournalDocument(Document, kw_only=True):
     """`journal`: what was written to drives from here, oldest first."""
 
     command: Literal["journal"]
     journal: str
-    entries: list[JournalEntryTold]
-    damaged: list[DamagedLineTold]
+    entries: list[JournalEntryField]
+    damaged: list[DamagedLineField]
 
 
-class BundleDocument(DocumentTold, kw_only=True):
+class BundleDocument(Document, kw_only=True):
     """`bundle`: the file, what is in it, and why other files are not."""
 
     command: Literal["bundle"]

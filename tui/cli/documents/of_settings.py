@@ -6,38 +6,38 @@ from typing import Any, Literal
 
 from msgspec import UNSET, UnsetType
 
-from .of_drives import DocumentTold, OfDriveTold
-from .parts import ComparedSettingTold, EditTold, PlanItemTold
+from .of_drives import Document, DriveDocument
+from .parts import ComparedSettingField, EditField, PlanItemField
 
 
-class WriteTold(OfDriveTold, kw_only=True):
+class WriteDocument(DriveDocument, kw_only=True):
     """`write`: what became of each setting."""
 
     command: Literal["write"]
     dry_run: bool
-    results: list[EditTold]
+    results: list[EditField]
     saved: bool
     after_reset: list[str]
     unsaved: list[str]
     messages: list[str]
 
 
-class RestoreTold(OfDriveTold, kw_only=True):
+class RestoreDocument(DriveDocument, kw_only=True):
     """`restore`: the plan, and what became of each setting."""
 
     command: Literal["restore"]
     dry_run: bool
-    plan: list[PlanItemTold]
+    plan: list[PlanItemField]
     same_rating: bool | None
     needs_stop: bool
     across: bool
-    results: list[EditTold]
+    results: list[EditField]
     saved: bool
     left: list[str]
     messages: list[str]
 
 
-class BackupTold(OfDriveTold, kw_only=True):
+class BackupDocument(DriveDocument, kw_only=True):
     """`backup`: the file, and what could not be read."""
 
     command: Literal["backup"]
@@ -48,7 +48,7 @@ class BackupTold(OfDriveTold, kw_only=True):
     messages: list[str]
 
 
-class ReportTold(OfDriveTold, kw_only=True):
+class ReportDocument(DriveDocument, kw_only=True):
     """`report`: the file."""
 
     command: Literal["report"]
@@ -58,7 +58,7 @@ class ReportTold(OfDriveTold, kw_only=True):
     messages: list[str]
 
 
-class CompareTold(DocumentTold, kw_only=True):
+class CompareDocument(Document, kw_only=True):
     """`compare`: rows that differ, all with --all."""
 
     command: Literal["compare"]
@@ -66,10 +66,10 @@ class CompareTold(DocumentTold, kw_only=True):
     b: str
     profile: str
     equal: bool
-    rows: list[ComparedSettingTold]
+    rows: list[ComparedSettingField]
 
 
-class BlocksTold(OfDriveTold, kw_only=True):
+class BlocksDocument(DriveDocument, kw_only=True):
     """`block`: slots and what they bring, or why there are none."""
 
     command: Literal["block"]
@@ -79,7 +79,7 @@ class BlocksTold(OfDriveTold, kw_only=True):
     reads: list[dict[str, Any]] | UnsetType = UNSET
 
 
-class BlockChangeTold(OfDriveTold, kw_only=True):
+class BlockChangeDocument(DriveDocument, kw_only=True):
     """`block` with --dry-run: what would be written."""
 
     command: Literal["block"]
@@ -87,7 +87,7 @@ class BlockChangeTold(OfDriveTold, kw_only=True):
     changes: list[dict[str, str]]
 
 
-class BlockFileTold(OfDriveTold, kw_only=True):
+class BlockFileDocument(DriveDocument, kw_only=True):
     """`block save`: the file."""
 
     command: Literal["block"]
@@ -95,7 +95,7 @@ class BlockFileTold(OfDriveTold, kw_only=True):
     slots: int
 
 
-class LessonTold(OfDriveTold, kw_only=True):
+class LessonDocument(DriveDocument, kw_only=True):
     """`teach` with a VALUE: what the look came to."""
 
     command: Literal["teach"]
@@ -105,7 +105,7 @@ class LessonTold(OfDriveTold, kw_only=True):
     taught: dict[str, Any] | None
 
 
-class TaughtTold(OfDriveTold, kw_only=True):
+class TaughtDocument(DriveDocument, kw_only=True):
     """`teach`: what is taught."""
 
     command: Literal["teach"]
@@ -113,7 +113,7 @@ class TaughtTold(OfDriveTold, kw_only=True):
     reference: str | None
 
 
-class TeachChangeTold(OfDriveTold, kw_only=True):
+class TeachChangeDocument(DriveDocument, kw_only=True):
     """`teach` with --forget, --reference or --no-reference."""
 
     command: Literal["teach"]

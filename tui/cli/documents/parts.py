@@ -10,11 +10,11 @@ from msgspec import UNSET, UnsetType
 QualityTold = Literal["good", "stale", "bad"]
 
 
-class PartTold(msgspec.Struct, forbid_unknown_fields=True):
+class DocumentPart(msgspec.Struct, forbid_unknown_fields=True):
     """Something whose every field is told here."""
 
 
-class LeftBehindDocument(PartTold):
+class LeftBehindDocument(DocumentPart):
     """A motor whose program has exited, or does not answer, and that no program commands."""
 
     program: str
@@ -25,7 +25,7 @@ class LeftBehindDocument(PartTold):
     text: str
 
 
-class ValueTold(PartTold):
+class ValueField(DocumentPart):
     """One value; `raw` and `value` are null where there is none."""
 
     address: int
@@ -38,7 +38,7 @@ class ValueTold(PartTold):
     unsure: bool | UnsetType = UNSET
 
 
-class WatchedValueTold(PartTold):
+class WatchedValueField(DocumentPart):
     """One value of a cycle; `time` is when it was read, null where it never was."""
 
     address: int
@@ -53,7 +53,7 @@ class WatchedValueTold(PartTold):
     unsure: bool | UnsetType = UNSET
 
 
-class TimeoutTold(PartTold):
+class TimeoutField(DocumentPart):
     """The communication timeout of a drive; all null where the drive does not tell it."""
 
     seconds: float | None
@@ -62,7 +62,7 @@ class TimeoutTold(PartTold):
     begun: bool | None
 
 
-class HeardTold(PartTold):
+class HeardField(DocumentPart):
     """What was seen while a drive was asked; counts are of requests unless told otherwise."""
 
     asked: int
@@ -84,7 +84,7 @@ class HeardTold(PartTold):
     """Of the adapter; null where it does not tell one."""
 
 
-class FirstWordTold(PartTold):
+class FirstWordField(DocumentPart):
     """A word that a stop sent before the drive had said what it is."""
 
     address: int
@@ -93,7 +93,7 @@ class FirstWordTold(PartTold):
     answer: str
 
 
-class ModelTold(PartTold):
+class ModelField(DocumentPart):
     """A drive's model by its own code word."""
 
     code: int | None
@@ -105,7 +105,7 @@ class ModelTold(PartTold):
     class_b: bool | None
 
 
-class StateTold(PartTold):
+class StateField(DocumentPart):
     """The state of a drive's chart."""
 
     id: str
@@ -113,7 +113,7 @@ class StateTold(PartTold):
     kind: str
 
 
-class EditTold(PartTold):
+class EditField(DocumentPart):
     """What became of one setting."""
 
     code: str
@@ -131,7 +131,7 @@ class EditTold(PartTold):
     text: str
 
 
-class PlanItemTold(PartTold):
+class PlanItemField(DocumentPart):
     """One parameter of a set, and what becomes of it."""
 
     code: str
@@ -142,7 +142,7 @@ class PlanItemTold(PartTold):
     new: str | None
 
 
-class ComparedSettingTold(PartTold):
+class ComparedSettingField(DocumentPart):
     """One parameter on both sides."""
 
     code: str
@@ -156,7 +156,7 @@ class ComparedSettingTold(PartTold):
     remark: str | None
 
 
-class FaultTold(PartTold):
+class FaultField(DocumentPart):
     """The fault that a drive is in, with what it points at."""
 
     raw: int | None
@@ -165,25 +165,25 @@ class FaultTold(PartTold):
     causes: list[str]
     checks: list[str]
     ruled_out: list[ExcludedPart]
-    look_at: list[LookTold]
+    look_at: list[LookField]
     confidence: str | None
     source: str | None
-    reset: ResetTold | None
+    reset: ResetField | None
 
 
-class AlarmTold(PartTold):
+class AlarmField(DocumentPart):
     """The first alarm of a drive without a fault, with what it points at."""
 
     name: str
     causes: list[str]
     checks: list[str]
     ruled_out: list[ExcludedPart]
-    look_at: list[LookTold]
+    look_at: list[LookField]
     confidence: str | None
     source: str | None
 
 
-class ExcludedPart(PartTold):
+class ExcludedPart(DocumentPart):
     """A cause or a check that the value of a parameter rules out."""
 
     text: str
@@ -191,16 +191,16 @@ class ExcludedPart(PartTold):
     reason: str
 
 
-class LookTold(PartTold):
+class LookField(DocumentPart):
     """A parameter that a fault points at."""
 
     code: str
     name: str
     why: str
-    value: ValueTold | None
+    value: ValueField | None
 
 
-class ResetTold(PartTold):
+class ResetField(DocumentPart):
     """How a fault is reset."""
 
     way: str | None
@@ -210,7 +210,7 @@ class ResetTold(PartTold):
     follows: str
 
 
-class ControlTold(PartTold):
+class ControlField(DocumentPart):
     """Who has the control, and the commands that change that."""
 
     taken: bool | None
@@ -218,7 +218,7 @@ class ControlTold(PartTold):
     give_back: str | None
 
 
-class OldTimeoutTold(PartTold):
+class OldTimeoutField(DocumentPart):
     """The communication timeout as `status` has told it; `timeout` takes its place."""
 
     timeout_s: float

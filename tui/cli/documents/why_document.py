@@ -6,8 +6,8 @@ from typing import Literal
 
 import msgspec
 
-from .of_drives import OfDriveTold
-from .parts import HeardTold
+from .of_drives import DriveDocument
+from .parts import HeardField
 
 
 class MeasuredReads(msgspec.Struct, forbid_unknown_fields=True):
@@ -28,7 +28,7 @@ class MeasuredReads(msgspec.Struct, forbid_unknown_fields=True):
     seconds: float
 
 
-class WhyTold(OfDriveTold, kw_only=True):
+class WhyDocument(DriveDocument, kw_only=True):
     """`why`: the rung that fails, `answers` where none does, in a sentence; what to do next."""
 
     command: Literal["why"]
@@ -40,5 +40,5 @@ class WhyTold(OfDriveTold, kw_only=True):
     """What else it could be; empty if it is certain."""
     text: str
     next: list[str]
-    seen: HeardTold
+    seen: HeardField
     measured: MeasuredReads | None

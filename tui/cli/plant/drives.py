@@ -159,13 +159,13 @@ class PlantDrive:
             async with search.turn:
                 if self.looked_for.is_set():
                     await asyncio.sleep(FIND_AGAIN)
-                session = await self._asked()
+                session = await self._requested()
                 self.looked_for.set()
                 if session is not None:
                     return session
             await search.retry.wait()
 
-    async def _asked(self) -> DriveSession | None:
+    async def _requested(self) -> DriveSession | None:
         """The drive, or None with why not, which is said when it changes."""
         from tui.bus.api import contact_of
 

@@ -216,8 +216,8 @@ def _of_drive(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSa
         yield MetricSample("drive_contact", {**where, "contact": contact}, contact == drive.contact)
     if drive.session is None:
         return
-    said = drive.session.known_identity.reference
-    info = {**where, "profile": drive.session.profile.id, "reference": said}
+    stated = drive.session.known_identity.reference
+    info = {**where, "profile": drive.session.profile.id, "reference": stated}
     yield MetricSample("drive_info", info, 1)
     if drive.cycle is None:
         return

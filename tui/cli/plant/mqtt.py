@@ -127,14 +127,14 @@ class MqttPublisher:
         """Publish what has changed; raises what ended the connection."""
         sent: dict[str, str] = {}
         loop = asyncio.get_running_loop()
-        told = float("-inf")
+        reported = float("-inf")
         states: list[object] = []
         while not self._ended and not lost.done():
             self._news.clear()
             sights = self._sights()
             seen: list[object] = [(one.state.status, one.state.reason) for one in sights]
-            if states != seen or loop.time() - told > LINES_EVERY:
-                states, told = seen, loop.time()
+            if states != seen or loop.time() - reported > LINES_EVERY:
+                states, reported = seen, loop.time()
                 await self._status(client, ONLINE)
                 await _send(client, line_messages(self._broker.root, sights), sent)
             await _send(client, drive_messages(self._broker.root, sights), sent)

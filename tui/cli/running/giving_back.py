@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..commands.orders import carried_out, close_journal, told_journal
+from ..commands.orders import carried_out, close_journal, journal_document
 from ..shared.control import GIVE_BACK_OPTION, taking_of
 from ..shared.errors import REFUSED_HERE, Failure
 
@@ -30,7 +30,7 @@ async def give_control_back(session: DriveSession, *, arm: bool) -> str:
     found = taking_of(session)
     if found is None or not found.can_give_back:
         raise Failure(f"{session.profile.name} has no control to give back.", REFUSED_HERE)
-    journal = told_journal()
+    journal = journal_document()
     try:
         session.arming.arm(seconds=math.inf)
         commander = Commander(session, journal)

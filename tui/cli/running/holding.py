@@ -98,7 +98,7 @@ async def hold_lines_on(
     with ending.by_signals(), ExitStack() as stack:
         held = []
         for name, opened, sessions in lines:
-            holding = stack.enter_context(_asked_by(opened, partial(_complain, name)))
+            holding = stack.enter_context(_polling(opened, partial(_complain, name)))
             for session in sessions:
                 holding.take(session)
             held.append(holding.until(ending, seconds))
@@ -107,19 +107,19 @@ async def hold_lines_on(
 
 
 @asynccontextmanager
-async def kept_asked(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Holding, Ending]]:
+async def keep_polling(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Holding, Ending]]:
     """Whoever asks drives on, and its end by a signal.
 
     Raises Exit with 128 and the number of the signal, once the block has ended.
     """
     ending = Ending()
-    with ending.by_signals(), _asked_by(opened, tell) as holding:
+    with ending.by_signals(), _polling(opened, tell) as holding:
         yield holding, ending
     _exit_by_signal(ending)
 
 
 @contextmanager
-def _asked_by(opened: OpenLine, tell: Tell) -> Iterator[Holding]:
+def _polling(opened: OpenLine, tell: Tell) -> Iterator[Holding]:
     """Whoever asks the drives of a line on, until the block ends."""
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal

@@ -225,19 +225,19 @@ class Run:
 
     async def _line_was_bad(self, since: float) -> bool:
         """Wait until the drive answers; whether it failed to at any time since."""
-        asked, bad, told = time.monotonic(), False, False
+        requested, bad, reported = time.monotonic(), False, False
         while True:
             latest = latest_of(self.console)
             if latest.error and latest.time > since:
                 bad = True
-                if not told:
-                    told = True
+                if not reported:
+                    reported = True
                     alone = self._left_alone()
                     complain(
                         f"NOT STOPPED yet: {latest.error}\n{alone} It is stopped as soon as it"
                         " answers; until then stop it at the machine."
                     )
-            elif not latest.error and latest.time > asked:
+            elif not latest.error and latest.time > requested:
                 return bad
             await asyncio.sleep(RUN_POLL_INTERVAL)
 

@@ -43,7 +43,7 @@ class Progress:
     """How far a search is."""
 
     setting: LineSetting | None
-    asked: int
+    requested: int
     of: int
     found: int
     left: float
@@ -56,7 +56,9 @@ class Progress:
         where = f"{self.setting}: " if self.setting else ""
         more = f", {self.settings_left} more settings" if self.settings_left else ""
         left = max(1, round(self.left))
-        return f"{where}{self.asked} of {self.of} asked, {self.found} found{more}, {left} s left"
+        return (
+            f"{where}{self.requested} of {self.of} asked, {self.found} found{more}, {left} s left"
+        )
 
 
 class ScanTelling:
@@ -74,13 +76,13 @@ class ScanTelling:
         text = watching_text(found)
         if not text:
             return
-        told = f"{text} Drives found are polled until this command ends."
+        reported = f"{text} Drives found are polled until this command ends."
         if self._as_json:
             rows = [
                 {"profile": f.id, "name": f.name, "timeout": f.code, "sure": f.sure} for f in found
             ]
-            self._print({"event": "families", "families": rows, "text": told})
-        self.note(told)
+            self._print({"event": "families", "families": rows, "text": reported})
+        self.note(reported)
 
     def slow(self, settings: Sequence[LineSetting], seconds: float, text: str) -> None:
         """The likely settings are through; those that are left take long."""
@@ -106,8 +108,8 @@ class ScanTelling:
         """Something came from an address that is no answer."""
         if self._as_json:
             where = _setting_json(setting)
-            told = {"event": "unclear", "device": result.device, **where, "text": result.error}
-            self._print(told)
+            reported = {"event": "unclear", "device": result.device, **where, "text": result.error}
+            self._print(reported)
         twice = "" if result.by == LEFT_ALONE else ", perhaps twice"
         self.note(f"{result.error} The address is taken{twice}.")
 
@@ -125,11 +127,11 @@ class ScanTelling:
         self._clear()
         say(f"drivepanel: {text}", err=True)
 
-    def ended(self, told: dict[str, Any]) -> None:
+    def ended(self, reported: dict[str, Any]) -> None:
         """The end; its text is said by the one who ends."""
         self._clear()
         if self._as_json:
-            self._print({"event": "ended", **told})
+            self._print({"event": "ended", **reported})
 
     def _clear(self) -> None:
         """Take the line of progress away."""
@@ -138,11 +140,11 @@ class ScanTelling:
             say_over("", last=False)
             self._drawn = ""
 
-    def _print(self, told: dict[str, Any]) -> None:
+    def _print(self, reported: dict[str, Any]) -> None:
         from ..shared.output import print_json
 
         self._clear()
-        print_json({"line": self._line, **told}, compact=True)
+        print_json({"line": self._line, **reported}, compact=True)
 
 
 def hit_json(hit: Hit) -> dict[str, Any]:
@@ -183,6 +185,6 @@ def hit_text(hit: Hit) -> str:
         *first, last = (name for name, _ in fits)
         families = f"{', '.join(first)} or {last}" if first else last
         return plain(f"likely {vendors}: {families}")
-    if said := " ".join(part for part in (who.vendor, who.reference, who.version_text) if part):
-        return plain(f"{said}: no profile fits")
+    if stated := " ".join(part for part in (who.vendor, who.reference, who.version_text) if part):
+        return plain(f"{stated}: no profile fits")
     return "answers, but does not say what it is"

@@ -182,7 +182,7 @@ class Scan:
             slow = self.setting is not None and self.setting.slow
             later = [one for one in later if slow or not one.slow]
             left += self.costs.seconds(later)
-        return Progress(self.setting, search.asked, search.of, found, left, len(later))
+        return Progress(self.setting, search.requested, search.of, found, left, len(later))
 
     async def _take(self, fleet: Fleet, result: ScanResult) -> None:
         """An address is not silent: tell it at once, then ask the drive on."""
@@ -229,11 +229,11 @@ class Scan:
                    self.unknown]  # fmt: skip
         if not acting:
             return ""
-        told = "\n".join(acting)
+        reported = "\n".join(acting)
         if not (self.yes or may_ask()):
             why = "polling of these drives would stop. Use --yes to try anyway."
-            return f"{NONE_TRIED}: {why}\n{told}"
-        self.tell.note(f"At other settings these drives are not polled.\n{told}")
+            return f"{NONE_TRIED}: {why}\n{reported}"
+        self.tell.note(f"At other settings these drives are not polled.\n{reported}")
         if self.yes or await says_yes("Try the other settings?"):
             return ""
         return f"{NONE_TRIED}."

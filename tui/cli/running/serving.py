@@ -8,7 +8,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ..commands.orders import close_journal, told_journal
+from ..commands.orders import close_journal, journal_document
 from ..plant.wish import PlantWish, is_loopback
 from ..shared.errors import LINE_TROUBLE, Failure
 from ..shared.host_port import why_not_served, written_host_port
@@ -73,7 +73,7 @@ async def served_until_signal(
     ready: Ready,
 ) -> int:
     """Serve until a signal comes; its number."""
-    ending, journal = Ending(), told_journal()
+    ending, journal = Ending(), journal_document()
     pulses = [LinePulse(one.opened.line) for one in lines]
     with ending.by_signals():
         watch = asyncio.create_task(service.watch(lambda: all(one.alive for one in pulses)))
@@ -168,8 +168,11 @@ async def _gateway(gates: Sequence[GatewayLine], wish: GatewayWish) -> AsyncIter
         yield f"tcp:{written_host_port(host, port)}"
     finally:
         await server.close()
-        for told in await gateway.close():
-            say(f"drivepanel: {told.head if told.failed else 'Stopped:'} {told.text}", err=True)
+        for reported in await gateway.close():
+            say(
+                f"drivepanel: {reported.head if reported.failed else 'Stopped:'} {reported.text}",
+                err=True,
+            )
 
 
 def _noting(opened: OpenLine) -> Note:

@@ -106,7 +106,7 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
     if found is None:
         raise unidentified(identity)
     # what was sent first was a command, too
-    found.session.told_by_line = bool(first.sent)
+    found.session.reported_by_line = bool(first.sent)
     return found
 
 
@@ -186,7 +186,7 @@ async def found_at(
 
     line = wish.opened.line
     # nothing else goes past an owner that is frozen, or to a drive that is left alone
-    past = line.state.status is LineStatus.LOST or device in line.facts.hushed
+    past = line.state.status is LineStatus.LOST or device in line.facts.paused
     try:
         priority = Priority.STOP if past else patience
         identity = await identify_drive(line, device, priority=priority)

@@ -74,7 +74,7 @@ class StopTelling:
         self.documents[-1]["given_back"] = text
 
     def _keep(self, device: int, profile: str | None, text: str, status: int) -> None:
-        told: dict[str, Any] = {"line": self._line_text, "device": device, "profile": profile}
+        reported: dict[str, Any] = {"line": self._line_text, "device": device, "profile": profile}
         if (sent := self._first.get(device)) is not None:
-            told["first"] = sent
-        self.documents.append({**told, "stopped": not status, "text": text, "status": status})
+            reported["first"] = sent
+        self.documents.append({**reported, "stopped": not status, "text": text, "status": status})

@@ -27,7 +27,7 @@ class RunTelling:
         self._as_json = as_json
         self._trouble = 0.0
         """When the last cycle failed, time.monotonic()."""
-        self._told = 0.0
+        self._reported = 0.0
 
     def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
         """A line about the motor once a second; trouble on the line when it begins and ends.
@@ -41,9 +41,9 @@ class RunTelling:
         elif self._trouble:
             complain("The drive answers again.")
             self._trouble = 0.0
-        if latest.time - self._told < TOLD_EVERY * 0.9:
+        if latest.time - self._reported < TOLD_EVERY * 0.9:
             return
-        self._told = latest.time
+        self._reported = latest.time
         self.tell("state", self._state_line(latest), latest)
 
     def _state_line(self, latest: Snapshot) -> str:

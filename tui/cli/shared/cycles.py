@@ -29,8 +29,8 @@ class Cycles:
 
     def take(self, snapshot: Snapshot) -> None:
         """Hand a snapshot over; for the line's thread."""
-        told = self.as_read(snapshot)
-        self._loop.call_soon_threadsafe(self._put, told)
+        reported = self.as_read(snapshot)
+        self._loop.call_soon_threadsafe(self._put, reported)
 
     def _put(self, snapshot: Snapshot) -> None:
         if self._waiting.full():

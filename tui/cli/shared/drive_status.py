@@ -190,7 +190,7 @@ def _channels(
 def _refused(session: DriveSession) -> str:
     from tui.drive.held_back import held_back, state_refusal
     from tui.drive.orders import chart_in_force
-    from tui.session.command.way_out import told_anywhere
+    from tui.session.command.way_out import block_reason_text
 
     raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
@@ -202,7 +202,7 @@ def _refused(session: DriveSession) -> str:
         return "The line is read-only: nothing is written."
     held = held_back(session.profile, chart, "forward", raws)
     if held is not None:
-        return told_anywhere(held)
+        return block_reason_text(held)
     return state_refusal(session.profile, chart, "forward", raws)
 
 

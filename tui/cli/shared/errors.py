@@ -149,7 +149,7 @@ def _with_writes(error: ClickError) -> ClickError:
     return click.exceptions.Exit(ENDED_AFTER_WRITING)
 
 
-def told(command: Callable[P, R]) -> Callable[P, R]:
+def reported(command: Callable[P, R]) -> Callable[P, R]:
     """Turn what a command raises into a message and an exit status; never a traceback."""
 
     @functools.wraps(command)

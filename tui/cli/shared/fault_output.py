@@ -89,14 +89,14 @@ def fault_json(state: DriveState, found: FaultFinding | None) -> dict[str, Any] 
     fault = state.fault
     if fault is None and state.kind != "fault":
         return None
-    told: dict[str, Any] = {
+    reported: dict[str, Any] = {
         "raw": fault.raw if fault else None,
         "code": fault.code if fault else None,
         "name": fault.name if fault else None,
     }
     hint = found.hint if found is not None and not found.alarm else None
     return {
-        **told,
+        **reported,
         **_advice_json(found if hint else None),
         "look_at": _look_at_json(found) if found and hint else [],
         "confidence": hint.confidence if hint else None,
@@ -178,7 +178,7 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         rows.append(("  probably", found.profile.guide.trouble))
     if not found.alarm:
         reset = found.reset()
-        said = "" if reset.told_by_drive else f" ({TRUST['practice']})"
+        message = "" if reset.by_drive else f" ({TRUST['practice']})"
         wait = f"; {reset.wait}" if reset.wait else ""
-        rows.append(("  reset", f"{reset.text}{wait}{said}"))
+        rows.append(("  reset", f"{reset.text}{wait}{message}"))
     return rows

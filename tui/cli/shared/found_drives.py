@@ -73,9 +73,9 @@ class _Finding:
             self.worst = max(self.worst, failure.status)
             text = failure.message + silence_hint(error, opened, wish.drives[0])
             for drive in drives:
-                told = failed(drive, text, failure.status, wish.name if self._several else "")
+                reported = failed(drive, text, failure.status, wish.name if self._several else "")
                 if self._as_json:
-                    print_json(told, compact=True)
+                    print_json(reported, compact=True)
             return None
 
 

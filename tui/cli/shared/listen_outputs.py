@@ -22,7 +22,7 @@ FURTHER = 24
 class HeardOutput(Protocol):
     """Takes exchanges and summaries; `wall` is a time in seconds since 1970."""
 
-    def exchange(self, told: ToldExchange, wall: float) -> None:
+    def exchange(self, reported: ToldExchange, wall: float) -> None:
         """Put one exchange out, at once."""
 
     def summary(self, summary: ListeningSummary, wall: float) -> None:
@@ -36,16 +36,16 @@ class HeardLines:
         self._families = families
         self._taken: dict[int, str] = {}
 
-    def exchange(self, told: ToldExchange, wall: float) -> None:
+    def exchange(self, reported: ToldExchange, wall: float) -> None:
         """Print one exchange, and before it what its drive is taken for where that is new."""
         from tui.session.listening.summary import family_text
         from tui.session.listening.telling import exchange_text
 
-        device = told.exchange.device
-        if told.family is not None and self._taken.get(device) != told.family.profile.id:
-            self._taken[device] = told.family.profile.id
-            say(f"Device {device}: {family_text(told.family)}")
-        say(f"{iso_time(wall)[11:23]} {exchange_text(told, self._families)}", indent=FURTHER)
+        device = reported.exchange.device
+        if reported.family is not None and self._taken.get(device) != reported.family.profile.id:
+            self._taken[device] = reported.family.profile.id
+            say(f"Device {device}: {family_text(reported.family)}")
+        say(f"{iso_time(wall)[11:23]} {exchange_text(reported, self._families)}", indent=FURTHER)
 
     def summary(self, summary: ListeningSummary, wall: float) -> None:
         """Print a summary, apart from the lines around it."""
@@ -64,9 +64,9 @@ class HeardJson:
         self._line_text = line_text
         self._families = families
 
-    def exchange(self, told: ToldExchange, wall: float) -> None:
+    def exchange(self, reported: ToldExchange, wall: float) -> None:
         """Print one exchange as an object."""
-        print_json(exchange_json(self._line_text, told, self._families, wall), compact=True)
+        print_json(exchange_json(self._line_text, reported, self._families, wall), compact=True)
 
     def summary(self, summary: ListeningSummary, wall: float) -> None:
         """Print a summary as an object."""
@@ -74,30 +74,30 @@ class HeardJson:
 
 
 def exchange_json(
-    line_text: str, told: ToldExchange, families: Families, wall: float
+    line_text: str, reported: ToldExchange, families: Families, wall: float
 ) -> dict[str, Any]:
     """The object of one exchange."""
     from tui.session.listening.summary import exception_meaning
-    from tui.session.listening.telling import exchange_text, function_name, names_asked
+    from tui.session.listening.telling import exchange_text, function_name, requested_names
 
-    one, code = told.exchange, told.exchange.exception
+    one, code = reported.exchange, reported.exchange.exception
     return {
         "event": "exchange",
         "time": iso_time(wall),
         "line": line_text,
         "device": one.device,
-        **_family_json(told.family),
+        **_family_json(reported.family),
         "function": one.function,
         "name": function_name(one.function),
         "answer": one.answer,
         "exception": code,
-        "meaning": None if code is None else exception_meaning(code, told.profile),
+        "meaning": None if code is None else exception_meaning(code, reported.profile),
         "turnaround_ms": _milliseconds(one.turnaround),
-        "asked": names_asked(told),
-        "values": {value.code: heard_value_json(value) for value in told.values},
+        "asked": requested_names(reported),
+        "values": {value.code: heard_value_json(value) for value in reported.values},
         "request": one.request.hex(),
         "reply": one.reply.hex(),
-        "text": exchange_text(told, families).strip(),
+        "text": exchange_text(reported, families).strip(),
     }
 
 
@@ -133,7 +133,7 @@ def summary_json(line_text: str, summary: ListeningSummary, wall: float) -> dict
         "crossed": tally.crossed,
         "noise": {"places": tally.noises, "bytes": tally.noise_bytes},
         "silences": {
-            "judged": summary.silences_told,
+            "judged": summary.reports_silences,
             "broken_frames": tally.cut,
             "longest_ms": _milliseconds(tally.longest_cut) or 0.0,
             "too_soon": tally.hasty,

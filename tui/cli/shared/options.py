@@ -224,16 +224,16 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
 
     if target.profile_id is not None:
         profile = library.load(target.profile_id)
-        told = await own_words(opened.line, target.device, profile)
+        reported = await own_words(opened.line, target.device, profile)
     else:
-        told = await identify_drive(opened.line, target.device)
-        if told.profile is None:
-            raise unidentified(told)
-        profile = library.load(told.profile)
-    session = DriveSession(opened.line, target.device, profile, told)
+        reported = await identify_drive(opened.line, target.device)
+        if reported.profile is None:
+            raise unidentified(reported)
+        profile = library.load(reported.profile)
+    session = DriveSession(opened.line, target.device, profile, reported)
     if session.contradiction:
         _believe_the_person(session, target)
-    mind_the_drive(opened, target.device, told, "" if session.contradiction else profile.id)
+    mind_the_drive(opened, target.device, reported, "" if session.contradiction else profile.id)
     await _check_byte_order(session)
     await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
@@ -257,9 +257,13 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
     """Go by a profile that the drive contradicts, if that was asked for; else raise."""
     from tui.session.connect.contradiction import Contradiction
 
-    told = session.known_identity.profile
+    reported = session.known_identity.profile
     if not target.force_profile:
-        way = f"Name -p {told}, or leave -p away." if told else "Name the profile of that drive."
+        way = (
+            f"Name -p {reported}, or leave -p away."
+            if reported
+            else "Name the profile of that drive."
+        )
         raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
     session.arming.barred = ""
     say(

@@ -53,8 +53,8 @@ PIPE_WIDTH = 200
 
 def print_json(data: JsonObject | Sequence[JsonObject], *, compact: bool = False) -> None:
     """Print one document, or a list of them, on standard output, at once."""
-    told = document(data) if isinstance(data, Mapping) else [document(one) for one in data]
-    sys.stdout.write(json_text(told, compact=compact) + "\n")
+    reported = document(data) if isinstance(data, Mapping) else [document(one) for one in data]
+    sys.stdout.write(json_text(reported, compact=compact) + "\n")
     sys.stdout.flush()
 
 

@@ -27,8 +27,8 @@ def say_beside(text: str, *, err: bool = False, as_it_is: bool = False) -> None:
     program that ends meanwhile is aborted. Text that `as_it_is` goes out is for machines.
     """
     stream = sys.stderr if err else sys.stdout
-    told = text if as_it_is else _laid_out(text, err=err)
-    line = f"{told}{os.linesep}".encode(stream.encoding or "utf-8", "replace")
+    reported = text if as_it_is else _laid_out(text, err=err)
+    line = f"{reported}{os.linesep}".encode(stream.encoding or "utf-8", "replace")
     with suppress(OSError):
         while line:
             line = line[os.write(stream.fileno(), line) :]
@@ -37,8 +37,8 @@ def say_beside(text: str, *, err: bool = False, as_it_is: bool = False) -> None:
 def _laid_out(text: str, *, err: bool, indent: int = 0, to_copy: bool = False) -> str:
     stream = sys.stderr if err else sys.stdout
     width = get_terminal_size().columns if stream.isatty() and not to_copy else 0
-    told = printable(text, stream.encoding)
-    return "\n".join(_broken(line, width, indent) for line in told.split("\n"))
+    reported = printable(text, stream.encoding)
+    return "\n".join(_broken(line, width, indent) for line in reported.split("\n"))
 
 
 def say_row(title: str, text: str, width: int) -> None:

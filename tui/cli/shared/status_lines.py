@@ -51,7 +51,7 @@ class StatusWish:
 
 
 @dataclass(slots=True)
-class LineTold:
+class LineField:
     """What is told of one line."""
 
     found: list[Status] = field(default_factory=list)
@@ -107,9 +107,9 @@ def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:
         say_status(status)
 
 
-async def _of_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> LineTold:
+async def _of_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> LineField:
     """The drives of one line."""
-    told = LineTold()
+    reported = LineField()
     try:
         await connected(opened, wish.name)
         drives: Sequence[Target] = wish.on(opened)
@@ -117,29 +117,31 @@ async def _of_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> Line
             drives = (await every_drive(opened, wish.drives[0], wanted.where(wish))).each()
     except Exception as error:
         failure = failure_of(error)
-        told.worst = failure.status
+        reported.worst = failure.status
         if wanted.every:  # which drives it has is not known
-            told.documents = [failed_line(wish.text, wish.name, failure.message, failure.status)]
+            reported.documents = [
+                failed_line(wish.text, wish.name, failure.message, failure.status)
+            ]
         else:
-            told.documents = [
+            reported.documents = [
                 failed(drive, failure.message, failure.status, wish.name) for drive in wish.drives
             ]
-        return told
+        return reported
     for drive in drives:
-        await _of_drive(opened, wish, drive, told)
-    return told
+        await _of_drive(opened, wish, drive, reported)
+    return reported
 
 
-async def _of_drive(opened: OpenLine, wish: LineWish, drive: Target, told: LineTold) -> None:
+async def _of_drive(opened: OpenLine, wish: LineWish, drive: Target, reported: LineField) -> None:
     try:
         session = await connect_drive(opened, drive)
         status = await status_of_drive(session, opened)
     except Exception as error:
         failure = failure_of(error)
         text = failure.message + silence_hint(error, opened, drive)
-        told.documents.append(failed(drive, text, failure.status, wish.name))
-        told.worst = max(told.worst, failure.status)
+        reported.documents.append(failed(drive, text, failure.status, wish.name))
+        reported.worst = max(reported.worst, failure.status)
         return
-    told.found.append(status)
-    told.worst = max(told.worst, status.status)
-    told.documents.append(status_json(wish.text, status))
+    reported.found.append(status)
+    reported.worst = max(reported.worst, status.status)
+    reported.documents.append(status_json(wish.text, status))

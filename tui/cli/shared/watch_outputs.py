@@ -167,8 +167,8 @@ class CsvOutput:
         """Write one cycle as a row."""
         cells = [self._cell(code, snapshot.readings.get(code)) for code in self._units]
         state = snapshot.state
-        told = [snapshot.error, known_state(state) or "", state.direction or ""]
-        self._file.write([iso_time(snapshot.wall), *self._several.cells(one), *cells, *told])
+        reported = [snapshot.error, known_state(state) or "", state.direction or ""]
+        self._file.write([iso_time(snapshot.wall), *self._several.cells(one), *cells, *reported])
 
     def _cell(self, code: str, reading: Reading | None) -> str:
         if reading is None or reading.quality != "good":

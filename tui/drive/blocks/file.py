@@ -147,8 +147,8 @@ def _check_end(
             f"{file}:{last}: the file is cut short: its [{END_OF_BLOCKS}] is missing."
         )
     if end.get("slots") != count:
-        told = f"[{END_OF_BLOCKS}] tells {end.get('slots')} slots, the file has {count}."
-        raise _fault(file, lines, END_OF_BLOCKS, "slots", told)
+        reported = f"[{END_OF_BLOCKS}] tells {end.get('slots')} slots, the file has {count}."
+        raise _fault(file, lines, END_OF_BLOCKS, "slots", reported)
 
 
 def _syntax(text: str, file: str, error: Exception) -> MappingError:

@@ -60,17 +60,17 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
 def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
     """Faults of form, and those of the rest as far as that can be told."""
     form, mended = form_faults(sources.tables)
-    told = [
+    reported = [
         (path, f"{place_label(sources.tables, path)}: {text.rstrip('.')}.")
         for path, text in form.found
     ]
     try:
         data: ProfileData = converted(mended, ProfileData)
     except msgspec.ValidationError as error:
-        told = told or [((), f"the file: {error}.")]
+        reported = reported or [((), f"the file: {error}.")]
     else:
-        told += [one for one in _broken_rules(data) if not _invented(one[0], form.invented)]
-    return _in_order(_placed(sources, told))
+        reported += [one for one in _broken_rules(data) if not _invented(one[0], form.invented)]
+    return _in_order(_placed(sources, reported))
 
 
 def _invented(path: TomlPath, invented: list[TomlPath]) -> bool:

@@ -107,20 +107,20 @@ def _list(shape: shapes.ListType, value: list[Any], path: TomlPath, faults: Form
 
 
 def _scalar_fault(shape: shapes.Type, value: Any) -> str:
-    told = type(value).__name__
+    reported = type(value).__name__
     match shape:
         case shapes.BoolType():
-            return "" if isinstance(value, bool) else f"must be true or false, not {told}"
+            return "" if isinstance(value, bool) else f"must be true or false, not {reported}"
         case shapes.IntType(ge=low, le=high):
             if isinstance(value, bool) or not isinstance(value, int):
-                return f"must be of type int, not {told}{_between(low, high)}"
+                return f"must be of type int, not {reported}{_between(low, high)}"
             if low is not None and value < low:
                 return f"must be >= {low}, not {value}{_between(low, high)}"
             if high is not None and value > high:
                 return f"must be <= {high}, not {value}{_between(low, high)}"
         case shapes.StrType(pattern=pattern):
             if not isinstance(value, str):
-                return f"must be of type str (a text in quotes), not {told}"
+                return f"must be of type str (a text in quotes), not {reported}"
             if pattern and not re.search(pattern, value):
                 form = TEXT_FORMS.get(pattern, pattern)
                 return f"{value!r} has the wrong form; allowed is {form}"
@@ -128,7 +128,7 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
             if value not in values or isinstance(value, bool):
                 return f"{value!r} is none of the values allowed here{_instead(value, values)}"
         case _:
-            return f"must be {_kind(shape)}, not {told}"
+            return f"must be {_kind(shape)}, not {reported}"
     return ""
 
 

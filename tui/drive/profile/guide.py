@@ -28,11 +28,13 @@ class FaultGuide:
     def _found(self) -> tuple[dict[int | None, FaultHelp], dict[tuple[str, int], AlarmHelp]]:
         """Help by raw fault, and by word and bit; a file that is wrong hinders nobody at work."""
         try:
-            told = self.data
+            reported = self.data
         except ProfileError as error:
             self.trouble = str(error).partition("\n")[0]
-            told = self._rows
-        return {one.raw: one for one in told.faults}, {(a.word, a.bit): a for a in told.alarms}
+            reported = self._rows
+        return {one.raw: one for one in reported.faults}, {
+            (a.word, a.bit): a for a in reported.alarms
+        }
 
     def fault(self, raw: int | None) -> FaultHelp | None:
         """What a fault points at, by its raw code; None where nothing is known.

@@ -71,18 +71,18 @@ def quick_head(path: Path) -> ProfileFileHead:
     return ProfileFileHead(section(text, "profile") or {})
 
 
-def asked_of(path: Path, own: bool, packaged: Path) -> AskedOf:
+def request_prefixes(path: Path, own: bool, packaged: Path) -> AskedOf:
     """How a drive of a file's family is found; empty for a broken file."""
-    return _asked(path, own, packaged, _stamp(path))
+    return _requested(path, own, packaged, _stamp(path))
 
 
 def _stamp(path: Path) -> tuple[int, int]:
     """Changes whenever the file does."""
     try:
-        told = os.stat(path)
+        reported = os.stat(path)
     except OSError:
         return 0, 0
-    return told.st_mtime_ns, told.st_size
+    return reported.st_mtime_ns, reported.st_size
 
 
 @lru_cache(maxsize=256)
@@ -128,9 +128,9 @@ def shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
 
 
 @lru_cache(maxsize=256)
-def _asked(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> AskedOf:
+def _requested(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> AskedOf:
     try:
-        tables = _told(path, own, packaged)
+        tables = _read_tables(path, own, packaged)
     except (OSError, UnicodeDecodeError, ProfileError):
         return AskedOf()
     named, functions = tables.get("identification"), tables.get("functions")
@@ -144,7 +144,7 @@ def _asked(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> As
     )
 
 
-def _told(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
+def _read_tables(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
     """The tables identification and functions, among others."""
     if own:
         return _whole(path, packaged)

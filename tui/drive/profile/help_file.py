@@ -31,8 +31,8 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
     if found is None:
         return HelpData(faults=list(data.faults.help))
     source = source_text(found)
-    told = decode_tables(source, HelpData)
-    findings = list(help_findings(data, told))
+    reported = decode_tables(source, HelpData)
+    findings = list(help_findings(data, reported))
     if findings and found.parent.parent == folders[0]:
         lines = [f"{found}:{line_of(source, place)}: {fault}" for place, fault in findings]
         raise ProfileError("\n".join(lines))
@@ -40,17 +40,17 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
     own = {one.raw for one in data.faults.help}
     faults = [
         one
-        for index, one in enumerate(told.faults)
+        for index, one in enumerate(reported.faults)
         if one.raw not in own and ("faults", index) not in wrong
     ]
-    alarms = [one for index, one in enumerate(told.alarms) if ("alarms", index) not in wrong]
+    alarms = [one for index, one in enumerate(reported.alarms) if ("alarms", index) not in wrong]
     return HelpData(faults=[*data.faults.help, *faults], alarms=alarms)
 
 
-def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
+def help_findings(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     """Places of a help file that do not fit the profile, each with what is wrong."""
     codes = {parameter.code for parameter in data.parameters}
-    for place, label, hint in _hints(told):
+    for place, label, hint in _hints(reported):
         for look in hint.look_at:
             if look.code not in codes:
                 yield place, f"{label}: there is no parameter {look.code!r} to look at."
@@ -60,15 +60,15 @@ def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace
             for code in (row.parameter, *(when.parameter for when in row.when)):
                 if code not in codes:
                     yield place, f"{label}: there is no parameter {code!r} to rule out by."
-    yield from _faults(data, told)
-    yield from _alarms(data, told)
+    yield from _faults(data, reported)
+    yield from _alarms(data, reported)
 
 
-def _hints(told: HelpData) -> Iterator[tuple[HelpPlace, str, Hint]]:
+def _hints(reported: HelpData) -> Iterator[tuple[HelpPlace, str, Hint]]:
     """Everything a help file tells, with its place and its name."""
-    for index, fault in enumerate(told.faults):
+    for index, fault in enumerate(reported.faults):
         yield ("faults", index), _label(fault), fault
-    for index, alarm in enumerate(told.alarms):
+    for index, alarm in enumerate(reported.alarms):
         yield ("alarms", index), _label(alarm), alarm
 
 
@@ -78,10 +78,10 @@ def _label(hint: FaultHelp | AlarmHelp) -> str:
     return f"help of fault {hint.raw} {hint.code}".rstrip()
 
 
-def _faults(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
+def _faults(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     known = {fault.raw: fault.code for fault in data.faults.codes}
     seen: set[int | None] = set()
-    for index, fault in enumerate(told.faults):
+    for index, fault in enumerate(reported.faults):
         place: HelpPlace = ("faults", index)
         if fault.raw in seen:
             yield place, f"{_label(fault)}: there are two."
@@ -95,10 +95,10 @@ def _faults(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]
             yield place, f"{_label(fault)}: the profile calls it {code}."
 
 
-def _alarms(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
+def _alarms(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     bits = {p.code: {bit.bit for bit in p.bits} for p in data.parameters}
     seen: set[tuple[str, int]] = set()
-    for index, alarm in enumerate(told.alarms):
+    for index, alarm in enumerate(reported.alarms):
         place: HelpPlace = ("alarms", index)
         if (alarm.word, alarm.bit) in seen:
             yield place, f"{_label(alarm)}: there are two."

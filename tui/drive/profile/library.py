@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ProfileError, UnknownProfile
-from .heads import asked_of, file_head, quick_head
+from .heads import file_head, quick_head, request_prefixes
 
 if TYPE_CHECKING:
     from .profile import Profile
@@ -150,13 +150,13 @@ def all_faults_of(path: Path) -> list[str]:
         data, faults = examined(path, packaged_folder())
     except ProfileError as error:
         return [str(error)]
-    told = [str(fault) for fault in faults]
+    reported = [str(fault) for fault in faults]
     try:
         if data is not None:
             read_help(data, (path.resolve().parent, packaged_folder()))
     except ProfileError as error:
-        told += str(error).splitlines()
-    return told
+        reported += str(error).splitlines()
+    return reported
 
 
 def faults_of(path: Path) -> list[str]:
@@ -174,7 +174,7 @@ def matching_profiles(reference: str) -> list[str]:
     wanted = reference.strip().upper()
     fits: list[tuple[int, str]] = []
     for listing in listings():
-        prefixes = asked_of(listing.path, listing.own, packaged_folder()).prefixes
+        prefixes = request_prefixes(listing.path, listing.own, packaged_folder()).prefixes
         longest = max((len(p) for p in prefixes if wanted.startswith(p.upper())), default=0)
         if longest:
             fits.append((longest, listing.id))
@@ -183,7 +183,7 @@ def matching_profiles(reference: str) -> list[str]:
 
 def mentions_function(listing: Listing, code: int) -> bool:
     """Whether a profile declares a Modbus function, without decoding the file."""
-    return code in asked_of(listing.path, listing.own, packaged_folder()).functions
+    return code in request_prefixes(listing.path, listing.own, packaged_folder()).functions
 
 
 @lru_cache(maxsize=64)
@@ -192,8 +192,8 @@ def version_shown(profile_id: str | None, version: str) -> str:
     listing = next((one for one in listings() if one.id == profile_id), None)
     if listing is None or len(version) != 4 or not version.isdecimal():
         return version
-    told = asked_of(listing.path, listing.own, packaged_folder())
-    if told.version_digits != "two-and-two":
+    reported = request_prefixes(listing.path, listing.own, packaged_folder())
+    if reported.version_digits != "two-and-two":
         return version
     return f"{int(version[:2])}.{int(version[2:])}"
 

@@ -192,13 +192,13 @@ class Profile:
 
     def unit(self, parameter: Parameter, raws: Mapping[str, int]) -> str:
         """The unit of a parameter, given raw values by code; `raw` where it is not known."""
-        told = parameter.unit_by
-        if told is None:
+        reported = parameter.unit_by
+        if reported is None:
             return parameter.unit
-        word = raws.get(told.parameter)
+        word = raws.get(reported.parameter)
         if word is None:
             return "raw"
-        return told.units.get(str(word >> told.shift & told.mask), "raw")
+        return reported.units.get(str(word >> reported.shift & reported.mask), "raw")
 
 
 def mark_of(profile: Profile, parameter: Parameter) -> str:
@@ -210,14 +210,14 @@ def mark_of(profile: Profile, parameter: Parameter) -> str:
 
 # a profile stays as it was loaded, and every row of a table asks
 @lru_cache(maxsize=32)
-def told_groups(profile: Profile) -> Mapping[str, ParameterGroup]:
+def group_by_id(profile: Profile) -> Mapping[str, ParameterGroup]:
     """By name, the groups of which the profile says what they hold."""
     return {group.name: group for group in profile.data.groups}
 
 
 def group_holds(profile: Profile, parameter: Parameter) -> str:
     """What the parameter's group holds: settings, commands or measurements."""
-    group = told_groups(profile).get(parameter.group)
+    group = group_by_id(profile).get(parameter.group)
     return group.holds if group is not None else "settings"
 
 

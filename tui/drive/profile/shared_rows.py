@@ -145,7 +145,7 @@ def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
     return tables
 
 
-def _told(row: Mapping[str, Any], key: str) -> object:
+def _key_of(row: Mapping[str, Any], key: str) -> object:
     """What tells a row apart; a list or a table, which is a fault to be told later, by its text."""
     value = row.get(key)
     return repr(value) if isinstance(value, list | dict) else value
@@ -189,12 +189,12 @@ class _Merging:
     ) -> None:
         key = ROW_KEYS[at]
         # rows of one file do not change each other: two of one key are a fault to be told
-        index = {_told(row, key): n for n, row in enumerate(rows) if isinstance(row, dict)}
+        index = {_key_of(row, key): n for n, row in enumerate(rows) if isinstance(row, dict)}
         order = list(range(len(rows)))
         above = -1
         for number, row in enumerate(value):
-            known = isinstance(row, dict) and _told(row, key) in index
-            place = index[_told(row, key)] if known else len(rows)
+            known = isinstance(row, dict) and _key_of(row, key) in index
+            place = index[_key_of(row, key)] if known else len(rows)
             if not known:
                 rows.append({} if isinstance(row, dict) else row)
                 order.insert(order.index(above) + 1 if above in order else len(order), place)

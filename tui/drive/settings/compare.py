@@ -202,6 +202,6 @@ def _csv(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
     writer.writerow(plain_cells(head))
     for row in rows:
         differs = "yes" if row.differs else "no"
-        told = (row.code, row.name, row.group, row.a, row.b, row.a_raw, row.b_raw)
-        writer.writerow(plain_cells((*told, differs, row.note)))
+        reported = (row.code, row.name, row.group, row.a, row.b, row.a_raw, row.b_raw)
+        writer.writerow(plain_cells((*reported, differs, row.note)))
     return text.getvalue()

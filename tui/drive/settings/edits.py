@@ -51,13 +51,13 @@ class Edit:
 class Edits:
     """Edits in the order in which they were staged; each change gives a new object."""
 
-    asked: tuple[Edit, ...] = ()
+    requested: tuple[Edit, ...] = ()
     """All that was staged, also what the drive holds as it is: under another scale it may not."""
 
     @property
     def items(self) -> tuple[Edit, ...]:
         """Those that change something."""
-        return tuple(edit for edit in self.asked if edit.new != edit.old)
+        return tuple(edit for edit in self.requested if edit.new != edit.old)
 
     def __iter__(self) -> Iterator[Edit]:
         return iter(self.items)
@@ -119,12 +119,12 @@ class Edits:
         absent: Collection[str] = (),
     ) -> Edits:
         """Without the edit of one parameter; those that follow its scale are encoded anew."""
-        left = [edit for edit in self.asked if edit.code != code]
+        left = [edit for edit in self.requested if edit.code != code]
         return Edits(_resolve(left, profile, raws, absent))
 
     def now(self, profile: Profile, raws: Mapping[str, int], absent: Collection[str] = ()) -> Edits:
         """The same edits against other held values; those that the drive holds are no edits."""
-        fresh = [replace(edit, old=raws.get(edit.code, edit.old)) for edit in self.asked]
+        fresh = [replace(edit, old=raws.get(edit.code, edit.old)) for edit in self.requested]
         return Edits(_resolve(fresh, profile, raws, absent))
 
     def after(self, raws: Mapping[str, int]) -> dict[str, int]:
@@ -138,7 +138,7 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str],
     ) -> Edits:
-        merged = {edit.code: edit for edit in (*self.asked, *edits)}
+        merged = {edit.code: edit for edit in (*self.requested, *edits)}
         return Edits(_resolve(list(merged.values()), profile, raws, absent))
 
 
@@ -191,7 +191,7 @@ def consequences(
 ) -> list[str]:
     """What changes its engineering value though nobody edits it, because its scale changes."""
     after = edits.after(raws)
-    told: list[str] = []
+    reported: list[str] = []
     for parameter in profile.parameters:
         follows = parameter.scale_by
         raw = raws.get(parameter.code)
@@ -202,8 +202,8 @@ def consequences(
         before = shown(profile, parameter, raw, raws, absent)
         later = shown(profile, parameter, raw, after, absent)
         if before.number != later.number and raw:
-            told.append(
+            reported.append(
                 f"{parameter.code} keeps its raw value {raw}: {before.display} becomes"
                 f" {later.display}."
             )
-    return told
+    return reported

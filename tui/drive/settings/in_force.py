@@ -84,5 +84,5 @@ def limits_in_force(
 def limit_passed(profile: Profile, before: Edits, after: Edits, raws: Mapping[str, int]) -> str:
     """Which limit the newest edit would pass, in a sentence that names it; empty where none."""
     known = edit_problems(profile, before, raws)
-    told = edit_problems(profile, after, raws)
-    return next((text for code, text in told.items() if known.get(code) != text), "")
+    reported = edit_problems(profile, after, raws)
+    return next((text for code, text in reported.items() if known.get(code) != text), "")

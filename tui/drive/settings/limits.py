@@ -97,10 +97,10 @@ def _past_multiples(
         if (side := passed_side(parameter, of, number, limit)) == "":
             continue
         held = shown(profile, parameter, after[code], after).display
-        told = f"{code} = {held} would be {side} {limit:f} {parameter.unit}".rstrip()
+        reported = f"{code} = {held} would be {side} {limit:f} {parameter.unit}".rstrip()
         sure = limits_are_sure(parameter)
         doubt = "" if sure else ", a limit that no document of this family tells"
-        yield code if code in edits else of.parameter, f"{told} ({formula_of(of)}{doubt})."
+        yield code if code in edits else of.parameter, f"{reported} ({formula_of(of)}{doubt})."
 
 
 def passed_side(parameter: Parameter, of: Multiple, number: Decimal, limit: Decimal) -> str:

@@ -34,9 +34,9 @@ def same_rating(
     """Whether set and drive are of one rating; None where one of them does not tell."""
     if across:
         return False
-    told = source.head.identity.get("reference", "")
-    if told and held.reference:
-        return told == held.reference
+    reported = source.head.identity.get("reference", "")
+    if reported and held.reference:
+        return reported == held.reference
     codes = [c for c in rating_codes(profile) if c in held.raws and c in source.raws]
     return all(held.raws[c] == source.raws[c] for c in codes) if codes else None
 

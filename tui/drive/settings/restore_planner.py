@@ -226,7 +226,7 @@ class _Planner:
                 edit = self._wanted.pop(code)
                 reason: SkipReason = "rounding" if code in lossy else "range"
                 self._skip(code, reason, text, edit.typed or edit.text)
-        self._tell(self.edits.asked)
+        self._tell(self.edits.requested)
         order = {p.code: place for place, p in enumerate(self.profile.parameters)}
         self.items = dict(
             sorted(self.items.items(), key=lambda pair: order.get(pair[0], len(order)))
@@ -245,8 +245,10 @@ class _Planner:
         for edit in edits:
             kind: ItemKind = "equal" if edit.new == edit.old else "write"
             note = "" if self._across else self.source.notes.get(edit.code, "")
-            told = f"{note} {edit.remark}".strip()
-            self.items[edit.code] = RestoreItem(edit.code, kind, "", told, edit.old_text, edit.text)
+            reported = f"{note} {edit.remark}".strip()
+            self.items[edit.code] = RestoreItem(
+                edit.code, kind, "", reported, edit.old_text, edit.text
+            )
 
     def _skip(self, code: str, reason: SkipReason, text: str, new: str = "") -> None:
         raw = self.held.raws.get(code)

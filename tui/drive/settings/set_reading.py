@@ -129,11 +129,12 @@ def _check_whole(tables: Mapping[str, Any], text: str, count: int, fault: _Fault
             last, f"the file is cut short: its [{END_OF_SET}] is missing after {count} parameters."
         )
     for name in (SET_HEADER, END_OF_SET):
-        told = _table(tables, name).get("parameters")
-        if told != count:
+        reported = _table(tables, name).get("parameters")
+        if reported != count:
             raise fault(
                 _line_of(text, name),
-                f"[{name}] tells of {told} parameters, and {count} are here. If lines were taken"
+                f"[{name}] tells of {reported} parameters, and {count} are here. If lines were"
+                " taken"
                 f" out on purpose, write parameters = {count} in [{SET_HEADER}] and in"
                 f" [{END_OF_SET}].",
             )
@@ -212,12 +213,12 @@ class _Resolver:
     lossy: set[str] = field(default_factory=set)
 
     def raws(self, entries: list[_Entry]) -> dict[str, int]:
-        told = {entry.code: entry.raw for entry in entries if entry.raw is not None}
+        reported = {entry.code: entry.raw for entry in entries if entry.raw is not None}
         for follows in (False, True):
             for entry in entries:
                 parameter = self.profile[entry.code]
                 if (parameter.scale_by is not None) is follows:
-                    self.found[entry.code] = self._raw(parameter, entry, {**told, **self.found})
+                    self.found[entry.code] = self._raw(parameter, entry, {**reported, **self.found})
         return {entry.code: self.found[entry.code] for entry in entries}
 
     def _raw(self, parameter: Parameter, entry: _Entry, raws: Mapping[str, int]) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from ..profile.profile import Profile, group_holds, is_verified, told_groups
+from ..profile.profile import Profile, group_by_id, group_holds, is_verified
 from ..profile.schema import Block, LinkSetting, Parameter, Quantity, StateKind
 
 RefusalReason = Literal["read-only", "forbidden", "order", "unverified", "running"]
@@ -124,7 +124,7 @@ _STORAGE = {
 
 def option_code(profile: Profile, parameter: Parameter) -> Parameter | None:
     """The word that must hold its factory value before the parameter may be written, or None."""
-    group = told_groups(profile).get(parameter.group)
+    group = group_by_id(profile).get(parameter.group)
     code = group.needs_factory if group is not None else ""
     return profile.get(code) if code != parameter.code else None
 

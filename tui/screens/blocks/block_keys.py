@@ -24,7 +24,7 @@ class BlockKeys(ArmingKeys):
         return self.console.blocks
 
     def _try(self, work: Callable[[], None]) -> None:
-        self.passed = self.block_editor.said
+        self.passed = self.block_editor.message
         try:
             work()
         except DriveError as refused:
@@ -40,7 +40,7 @@ class BlockKeys(ArmingKeys):
         from ..dialogs.ask import Ask
 
         block_editor = self.block_editor
-        if not self._armed_or_told():
+        if not self._require_armed():
             return
 
         try:
@@ -53,7 +53,7 @@ class BlockKeys(ArmingKeys):
 
         def wrong(text: str) -> str:
             try:
-                block_editor.meant(text)
+                block_editor.intended(text)
             except DriveError as refused:
                 return str(refused)
             return ""
@@ -62,7 +62,7 @@ class BlockKeys(ArmingKeys):
             if not text:
                 return
             try:
-                agreed = block_editor.meant(text)
+                agreed = block_editor.intended(text)
             except DriveError as refused:
                 self._refuse(str(refused))
                 return
@@ -71,8 +71,10 @@ class BlockKeys(ArmingKeys):
             work = partial(block_editor.exchange, agreed)
             self._ask(question, agreed.follows, "writes, read back", "writes nothing", work)
 
-        asked = Ask("Write through the outputs", wrong, about=about, takes="goes on to a question")
-        self.app.push_screen(asked, given)
+        requested = Ask(
+            "Write through the outputs", wrong, about=about, takes="goes on to a question"
+        )
+        self.app.push_screen(requested, given)
 
     # Files and user words
 
@@ -92,8 +94,8 @@ class BlockKeys(ArmingKeys):
         proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
         about = "The assignment shown, proposals included; one slot a line (TOML)."
         text = str(Path.cwd() / proposed)
-        asked = Ask("Save to", fault_of_new, text=text, about=about, takes="writes the file")
-        self.app.push_screen(asked, given)
+        requested = Ask("Save to", fault_of_new, text=text, about=about, takes="writes the file")
+        self.app.push_screen(requested, given)
 
     def _save(self, path: Path) -> None:
         from tui.drive.blocks.file import dump_blocks

@@ -160,12 +160,12 @@ class BlocksScreen(BlockKeys):
             self._refuse(no_blocks(self.session.profile))
             return
 
-        def told(code: str | None) -> None:
+        def reported(code: str | None) -> None:
             if code is not None:
                 self._try(lambda: self.block_editor.proposals.pick(block, place, code))
 
         slot = block.slots[place]
-        self.app.push_screen(PickParameter(self.session.profile, block, slot), told)
+        self.app.push_screen(PickParameter(self.session.profile, block, slot), reported)
 
     def action_shift(self, step: int) -> None:
         """Move the slot's content."""
@@ -230,7 +230,7 @@ class BlocksScreen(BlockKeys):
         if wrong:
             self._refuse(wrong[0])
             return
-        if not self._armed_or_told():
+        if not self._require_armed():
             return
 
         yes, no = "writes, each slot read back", "writes nothing"
@@ -245,7 +245,7 @@ class BlocksScreen(BlockKeys):
 
     def _follows(self) -> str:
         """What would be written, and what that means for others."""
-        profile, lines, told = self.session.profile, [], []
+        profile, lines, reported = self.session.profile, [], []
         for block in self.block_editor.proposals.blocks:
             found = self.block_editor.proposals.changes(block)
             lines += [
@@ -253,12 +253,14 @@ class BlocksScreen(BlockKeys):
                 for c in found
             ]
             if found and block.effective == "after-reset":
-                told.append("It counts after the drive's next reset or switch-on.")
+                reported.append("It counts after the drive's next reset or switch-on.")
             if found and any(profile[s].storage == "ram-until-saved" for s in block.slots):
-                told.append("Lost at power-off until saved (S).")
+                reported.append("Lost at power-off until saved (S).")
             if found and block.direction == "write":
-                told.append("What a master writes to these outputs goes elsewhere from then on.")
-        told.append(
+                reported.append(
+                    "What a master writes to these outputs goes elsewhere from then on."
+                )
+        reported.append(
             "Another master on this line may rely on today's assignment: its program must follow."
         )
-        return "\n".join([*lines[:8], *([" …"] if len(lines) > 8 else []), "", *told])
+        return "\n".join([*lines[:8], *([" …"] if len(lines) > 8 else []), "", *reported])

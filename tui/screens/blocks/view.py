@@ -182,7 +182,7 @@ def _remarks(
         found.append((f"Compared with direct reads: {slot.verdict}.", VERDICT_STYLES[slot.verdict]))
     if view.trouble:
         found.append((view.trouble, ALARM if view.block.direction == "read" else FAINT))
-    text = [(line, style) for told, style in found for line in wrapped(told, width - 2, 2)]
+    text = [(line, style) for reported, style in found for line in wrapped(reported, width - 2, 2)]
     return [Text(f" {line}", style) for line, style in text[:2]]
 
 
@@ -220,9 +220,9 @@ def cost_lines(
             text.append(f" in {saving.after.requests}", FAINT)
             text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
         whole = microseconds(profile, wire_timing(block_editor.session), inputs, outputs)
-        told = f"   one exchange {_ms(whole)}"
-        if whole and text.cell_len + len(told) <= width:
-            text.append(told, FAINT)
+        reported = f"   one exchange {_ms(whole)}"
+        if whole and text.cell_len + len(reported) <= width:
+            text.append(reported, FAINT)
     text.truncate(width, overflow="ellipsis")
     sent = block_request(
         profile, block_editor.session.device, inputs, outputs, _output_words(block_editor)

@@ -67,7 +67,7 @@ class ArmingKeys(PanelScreen):
 
         stamp = self.session.work.stops
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             try:
                 if sure:
                     work(stamp)
@@ -78,14 +78,16 @@ class ArmingKeys(PanelScreen):
             self.look()
 
         now = self.motor_now()
-        asked = Confirm(question, follows, yes=yes, no=no, loses=True, now=now, by_itself=by_itself)
-        self.app.push_screen(asked, told)
-        return asked
+        requested = Confirm(
+            question, follows, yes=yes, no=no, loses=True, now=now, by_itself=by_itself
+        )
+        self.app.push_screen(requested, reported)
+        return requested
 
     def _armed(self) -> bool:
         return self.commander.armed_for is not None
 
-    def _armed_or_told(self) -> bool:
+    def _require_armed(self) -> bool:
         """Whether the drive is armed; where it is not, that is told."""
         if not self._armed():
             self._refuse(self.session.arming.hindrance or self._how_to_arm())

@@ -38,7 +38,7 @@ STOPS_THAT_ASK = {
 class OrderKeys(TeachKeys):
     """The actions of the keys; everything else is the commander's."""
 
-    _asked: Outcome | None = None
+    _requested: Outcome | None = None
     """The refusal that a person was asked about last."""
 
     def control(self, now: float) -> Control:
@@ -73,12 +73,12 @@ class OrderKeys(TeachKeys):
         from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 
         outcome, starts = self.commander.outcome, self.session.starts
-        if outcome is None or outcome is self._asked or starts is None:
+        if outcome is None or outcome is self._requested or starts is None:
             return
         refused = isinstance(outcome.error, StartNotRecorded)
         if not refused or isinstance(outcome.error, StartOvertaken):
             return
-        self._asked = outcome
+        self._requested = outcome
         if (last := self.commander.last_run) is None:
             return
         order, reference = last
@@ -103,7 +103,7 @@ class OrderKeys(TeachKeys):
             if nothing := no_fault(chart, state.id, state.kind, state.name):
                 self._refuse(nothing)
                 return
-        if not self._armed_or_told():
+        if not self._require_armed():
             return
         follows = f"The cause must be gone. {reset_follows(profile, raws, {})}"
         work = partial(self.commander.order, "reset")
@@ -122,7 +122,7 @@ class OrderKeys(TeachKeys):
 
     def action_take_control(self) -> None:
         """Take the control from the terminals, after saying what that means."""
-        if self._armed_or_told():
+        if self._require_armed():
             follows = (
                 "The terminals and the keypad command the drive no longer, their stop included;"
                 " the drive must be locked."
@@ -138,7 +138,7 @@ class OrderKeys(TeachKeys):
 
     def action_hand_back(self) -> None:
         """Give the control back, after saying what may start then."""
-        if self._armed_or_told():
+        if self._require_armed():
             follows = (
                 "This is no stop. Command and reference go back to the terminals or the keypad:"
                 " a run command that waits there starts the motor."
@@ -194,7 +194,7 @@ class OrderKeys(TeachKeys):
         """Choose a ramp, a preset speed, a motor, an output."""
         from .options import OptionsScreen
 
-        if not self._armed_or_told():
+        if not self._require_armed():
             return
         raws = self.session.image.raws
         chart = chart_in_force(self.session.profile, raws)

@@ -17,15 +17,15 @@ NEWS_FOR = {OutcomeKind.WORKING: 60.0, OutcomeKind.DONE: 15.0, OutcomeKind.REFUS
 
 
 def news(
-    said: Outcome | None, now: float, *, busy: bool, passed: Outcome | None = None
+    message: Outcome | None, now: float, *, busy: bool, passed: Outcome | None = None
 ) -> tuple[str, Style] | None:
     """The sentence and its style while the work goes on and for some time after it, else None.
 
     `passed` is the outcome that a key has led on from: it is no longer news.
     """
-    if said is None or said is passed:
+    if message is None or message is passed:
         return None
-    kind = said.kind
-    if not busy and now - said.time >= NEWS_FOR[kind]:
+    kind = message.kind
+    if not busy and now - message.time >= NEWS_FOR[kind]:
         return None
-    return said.text, OUTCOME_STYLES[kind]
+    return message.text, OUTCOME_STYLES[kind]

@@ -55,8 +55,8 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
 
     def on_option_list_option_selected(self) -> None:
         """Enter writes nothing: say which key does."""
-        told = Text("Enter is no answer here.   ", ALARM)
-        self.tell_keys(told.append_text(OPTION_HINT))
+        reported = Text("Enter is no answer here.   ", ALARM)
+        self.tell_keys(reported.append_text(OPTION_HINT))
 
     def action_yes(self) -> None:
         """Give the choice back."""

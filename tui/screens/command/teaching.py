@@ -51,7 +51,7 @@ class TeachKeys(ArmingKeys):
             self._refuse(why)
             return
         name = self.session.family[code].name
-        asked = Ask(
+        requested = Ask(
             f"What does the drive's display show for {code}, {name}?",
             fault_of_look,
             about=f"{_known(self.console, code)} {HOW}",
@@ -60,11 +60,11 @@ class TeachKeys(ArmingKeys):
             now=self.motor_now(),
         )
 
-        def told(text: str | None) -> None:
+        def reported(text: str | None) -> None:
             if text:
                 self.run_worker(self._look_at(code, text), group="teach")
 
-        self.app.push_screen(asked, told)
+        self.app.push_screen(requested, reported)
 
     async def _look_at(self, code: str, text: str) -> None:
         work, teacher = self.session.work, self.teacher

@@ -43,7 +43,7 @@ class LineForm(Vertical):
             "addresses": NumberInput(ADDRESSES, id="addresses"),
         }
         self._picture: Lines | None = Lines(fit=self._drawn)
-        self._asked: Input | None = None
+        self._requested: Input | None = None
         """The field that was asked for before it was there."""
 
     def compose(self) -> ComposeResult:
@@ -80,8 +80,8 @@ class LineForm(Vertical):
             await self.mount(*rows)
             await picture.remove()
         self._there = True
-        if self._asked is not None:
-            self.screen.set_focus(self._asked)
+        if self._requested is not None:
+            self.screen.set_focus(self._requested)
 
     def line_at(self, path: str) -> str:
         """The LINE of a serial port with these settings."""
@@ -126,9 +126,9 @@ class LineForm(Vertical):
         self._enter("profile")
 
     def _enter(self, name: str) -> None:
-        self._asked = self._fields[name]
+        self._requested = self._fields[name]
         if self._there:
-            self.screen.set_focus(self._asked)
+            self.screen.set_focus(self._requested)
 
     def offer_settings(self, port: bool) -> None:
         """Only a serial port has settings that are chosen here."""

@@ -204,11 +204,11 @@ class LineKeys(Scanning):
         """The addresses that were asked here last, or those that a simulated line has."""
         from tui.session.connect.addresses import addresses_text
         from tui.session.connect.line_key import line_key
-        from tui.session.paths import addresses_asked
+        from tui.session.paths import address_text
 
         opened = self.app.opened
         known = addresses_text(opened.devices) if opened else ""
-        return addresses_asked(line_key(self.app.line_text)) or known or ADDRESSES
+        return address_text(line_key(self.app.line_text)) or known or ADDRESSES
 
     def _point_at(self, text: str) -> None:
         """The cursor on a line; it stays where that is meant already, however it is spelled."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ..frame_source import said_state, said_value
+from ..frame_source import state_cell, value_cell
 from .found import profile_text
 from .wall import WallRow
 
@@ -51,7 +51,7 @@ def _row(
         return WallRow(identity.device, who, identity.name, words="no profile")
     state, readings, age, old, contact = _seen(console, look, *at)
     report = fleet.stopper.reports.get(identity.device)
-    kind, words = said_state(console, state, report, at[0], readings)
+    kind, words = state_cell(console, state, report, at[0], readings)
     if kind not in ("stop", "stop failed"):
         words = _called(state, words)
     if kind == "running" and fleet.left_behind(console):
@@ -107,7 +107,7 @@ def _figure(
     """Text and unit of a value; with a sign where nobody has confirmed it for this family."""
     from tui.drive.profile.profile import is_verified  # the first picture needs none of it
 
-    text, unit = said_value(console, readings, quantity)
+    text, unit = value_cell(console, readings, quantity)
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
     sign = "?" if text and parameter is not None and not is_verified(parameter) else ""
     return text + sign, unit

@@ -221,9 +221,9 @@ class Scanning(LineView):
             )
         known = self.app.opened.known if self.app.opened else None
         if known is not None:
-            told = (identity, identity.device, "" if guessed else console.session.profile.id)
+            reported = (identity, identity.device, "" if guessed else console.session.profile.id)
             # reads files: in a thread that nobody waits for
-            threading.Thread(target=known.note, args=told, daemon=True).start()
+            threading.Thread(target=known.note, args=reported, daemon=True).start()
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:

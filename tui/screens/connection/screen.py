@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.widgets import Input, OptionList
 
 from ..keys.table import CONNECTION, bindings
+from .diagnosis_target import DiagnosisTarget
 from .other_settings import OtherSettings
-from .why_meant import WhyMeant
 
 if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
 
-class ConnectionScreen(WhyMeant, OtherSettings):
+class ConnectionScreen(DiagnosisTarget, OtherSettings):
     """What the cursor and Enter do in the two lists."""
 
     CSS_PATH = "connection.tcss"

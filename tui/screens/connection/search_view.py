@@ -24,6 +24,6 @@ def far_text(search: Search, later: float, room: int) -> str:
     left = left_text(search, later)
     if not left:
         return search.text
-    asked = search.text.partition(",")[0]
-    forms = (f"{search.text}, {left} left", f"{asked}, {left} left", f"{asked}, {left}")
+    requested = search.text.partition(",")[0]
+    forms = (f"{search.text}, {left} left", f"{requested}, {left} left", f"{requested}, {left}")
     return next((form for form in forms if len(form) <= room), forms[-1])

@@ -189,8 +189,8 @@ class LineView(PanelScreen):
         self.show_about()
 
     def _drives_title(self, width: int, rows: Mapping[int, WallRow] = NOBODY) -> list[Text]:
-        asked = len({*rows, *(self.search.devices if self.search else ())})
-        return [heading(self.app.line_label or "No line", list(rows.values()), asked, width)]
+        requested = len({*rows, *(self.search.devices if self.search else ())})
+        return [heading(self.app.line_label or "No line", list(rows.values()), requested, width)]
 
     def show_about(self) -> None:
         """All that the drive under the cursor says of itself, and what to do about one that not."""

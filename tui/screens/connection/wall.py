@@ -104,7 +104,7 @@ def in_order(devices: Iterable[int], faults: Sequence[int]) -> list[int]:
     return sorted(devices, key=lambda device: (first.get(device, len(first)), device))
 
 
-def heading(label: str, rows: Sequence[WallRow], asked: int, width: int) -> Text:
+def heading(label: str, rows: Sequence[WallRow], requested: int, width: int) -> Text:
     """The title of the table: which line, how many are in fault or lost, how many answered."""
     if not rows:
         return rule(short(label, max(4, width - 2)), width)
@@ -112,7 +112,7 @@ def heading(label: str, rows: Sequence[WallRow], asked: int, width: int) -> Text
     lost = sum(row.words == "lost" for row in rows)
     parts = [(f"{faults} in fault", FAULT)] if faults else []
     parts += [(f"{lost} lost", ALARM)] if lost else []
-    parts.append((f"{len(rows)} of {max(asked, len(rows))}", PLAIN))
+    parts.append((f"{len(rows)} of {max(requested, len(rows))}", PLAIN))
     tail = Text(no_wrap=True)
     for number, (words, style) in enumerate(parts):
         tail.append(" · " if number else " ", FAINT)
@@ -147,9 +147,9 @@ def wall_line(row: WallRow, columns: WallColumns) -> Text:
     text.append(" ")
     state = f"{WALL_SIGNS.get(row.kind, '□')} {short(row.words, columns.state - 2)}"
     block = row.kind in ("fault", "stop failed")
-    said = f"{state:<{columns.state}}" if block else state
-    text.append(said, STATE_STYLE.get(row.kind, PLAIN))
-    text.append(" " * (columns.state - len(said)))
+    message = f"{state:<{columns.state}}" if block else state
+    text.append(message, STATE_STYLE.get(row.kind, PLAIN))
+    text.append(" " * (columns.state - len(message)))
     turning = row.kind in ("running", "stop", "stopping", "stop failed") and not row.old
     text.append(f"{short(row.frequency, HERTZ - 1):>{HERTZ}}", STRONG if turning else FAINT)
     current = row.current + ("" if row.current_unit == "A" else row.current_unit[:1])

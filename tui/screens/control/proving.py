@@ -40,21 +40,21 @@ def silence_line(
 ) -> Text:
     """What the drive does on a silent line, whether that was proved, how the drive is reached."""
     rules, link = session.profile.data.communication_fault, session.line.link
-    told = Text("  On silence    ", FAINT, no_wrap=True)
+    reported = Text("  On silence    ", FAINT, no_wrap=True)
     if rules is None:
-        told.append("no communication timeout is known", PLAIN)
+        reported.append("no communication timeout is known", PLAIN)
     elif watch is None:
-        told.append(f"{rules.timeout or 'timeout'} off, or not read yet", ALARM)
+        reported.append(f"{rules.timeout or 'timeout'} off, or not read yet", ALARM)
     else:
         does = watch.reaction.name if watch.reaction else "its own reaction"
-        told.append(f"{rules.timeout} {watch.timeout:g} s, ", STRONG)
-        told.append(does, STRONG if watch.trips else ALARM)
-        told.append(f" · {proved or 'not proved'}", PLAIN if proved else FAINT)
-    told.append(f" · address {session.device}", FAINT)
+        reported.append(f"{rules.timeout} {watch.timeout:g} s, ", STRONG)
+        reported.append(does, STRONG if watch.trips else ALARM)
+        reported.append(f" · {proved or 'not proved'}", PLAIN if proved else FAINT)
+    reported.append(f" · address {session.device}", FAINT)
     if isinstance(link, SerialLink):
-        told.append(f" · {link.baud} {link.format}", FAINT)
-    told.truncate(width, overflow="ellipsis")
-    return told
+        reported.append(f" · {link.baud} {link.format}", FAINT)
+    reported.truncate(width, overflow="ellipsis")
+    return reported
 
 
 def warning_lines(session: DriveSession, width: int) -> list[Text]:

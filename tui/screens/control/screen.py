@@ -140,7 +140,7 @@ class ControlSourceScreen(OrderKeys):
     def action_prove(self) -> None:
         """Ask, then prove the communication timeout of the drive."""
         latest = self.console.latest
-        if not self._armed_or_told() or latest is None:
+        if not self._require_armed() or latest is None:
             return
         turning, watch = latest.state.motion in ENABLED_KINDS, self._watch()
         if not turning and watch is not None and (why := hidden_at_rest(watch.reaction)):
@@ -162,7 +162,7 @@ class ControlSourceScreen(OrderKeys):
             self._refuse("How the drive is set up was not read yet.")
         elif not found:
             self._refuse("Nothing to write: the drive is set up so.")
-        elif self._armed_or_told():
+        elif self._require_armed():
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
                 f"Writes {codes}, each read back. A run command that waits at the new source"

@@ -44,12 +44,12 @@ def now_lines(
     else:
         text.append(f"   set up: {today.name}", FAINT)
     text.truncate(width, overflow="ellipsis")
-    told = (
+    reported = (
         "; ".join(one.partition(":")[0] for one in switches)
         if len(switches) > 1
         else "".join(switches)
     )
-    return [*lines, text, Text(cut(f"  {told}", width).rstrip(), ATTENTION, no_wrap=True)]
+    return [*lines, text, Text(cut(f"  {reported}", width).rstrip(), ATTENTION, no_wrap=True)]
 
 
 def left_lines(left: str, width: int) -> list[Text]:

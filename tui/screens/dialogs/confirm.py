@@ -83,5 +83,5 @@ class Confirm(KeyQuestion[bool]):
         if not self._loses:
             self.answer(True)
             return
-        told = Text("Enter is no answer here.   ", ALARM)
-        self.tell_keys(told.append_text(self._keys))
+        reported = Text("Enter is no answer here.   ", ALARM)
+        self.tell_keys(reported.append_text(self._keys))

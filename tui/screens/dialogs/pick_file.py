@@ -35,7 +35,7 @@ class FileAbout:
     """What a file is, found by reading it."""
 
     drive: str = ""
-    told: str = ""
+    reported: str = ""
     """How it compares with what is open, in two or three words."""
     alarm: bool = False
     """Whether it is of another family, or no file of the kind."""
@@ -70,7 +70,7 @@ class PickFile(KeyQuestion[str | None]):
 
     def dialog(self) -> ComposeResult:
         """The list and its keys."""
-        waiting = FileAbout(told="...") if self._about is not None else FileAbout()
+        waiting = FileAbout(reported="...") if self._about is not None else FileAbout()
         lines = [*self._others, *(file_line(path, waiting) for path in self._found)]
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
@@ -89,9 +89,9 @@ class PickFile(KeyQuestion[str | None]):
 
     async def _tell_files(self, about: FileReader) -> None:
         for at, path in enumerate(self._found, start=len(self._others)):
-            told = await asyncio.to_thread(about, path)
+            reported = await asyncio.to_thread(about, path)
             for options in self.query("#choices").results(OptionList):
-                options.replace_option_prompt_at_index(at, file_line(path, told))
+                options.replace_option_prompt_at_index(at, file_line(path, reported))
 
     def on_option_list_option_selected(self) -> None:
         """Enter in the list."""
@@ -127,5 +127,5 @@ def file_line(path: Path, about: FileAbout) -> Text:
     text.append(f"{when:<16} ", FAINT)
     style: Style = ALARM if about.alarm else PLAIN
     text.append(f"{cut(about.drive, DRIVE_WIDTH)} ", FAINT)
-    text.append(cut(about.told, TOLD_WIDTH), style)
+    text.append(cut(about.reported, TOLD_WIDTH), style)
     return text

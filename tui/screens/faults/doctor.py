@@ -62,10 +62,10 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
         _checks(view, width),
         _reset(view, width),
     ]
-    least = min(3, max(1, _told(view)))
+    least = min(3, max(1, _shown_count(view)))
     _shorten(parts, sum(map(len, parts)) + least - height)
     parts = [part for part in parts if part]
-    spare = height - sum(len(part) for part in parts) - max(least, _told(view))
+    spare = height - sum(len(part) for part in parts) - max(least, _shown_count(view))
     lines: list[Text] = [Text("")] if spare > len(parts) else []
     spare -= len(lines)
     for part in parts:
@@ -88,7 +88,7 @@ def _shorten(parts: list[list[Text]], lines: int) -> None:
         lines -= away
 
 
-def _told(view: DoctorView) -> int:
+def _shown_count(view: DoctorView) -> int:
     """How many faults of the history are worth a line: those behind the last one are none."""
     raws = [r.raw if (r := view.readings.get(code)) else None for code in view.history]
     some = [n for n, raw in enumerate(raws) if raw not in (None, view.profile.data.faults.none)]
@@ -118,8 +118,8 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
     else:
         text.append(f"{fault.code}  {fault.name}", FAULT)
     room = width - text.cell_len - 4
-    told = _tripped(view) if view.present or view.record else "not in it now"
-    text.append(f"   {cut_at_word(told, max(1, room))}", PLAIN)
+    reported = _tripped(view) if view.present or view.record else "not in it now"
+    text.append(f"   {cut_at_word(reported, max(1, room))}", PLAIN)
     return [text]
 
 
@@ -154,7 +154,7 @@ def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
     ]
 
 
-def _told_in(texts: Sequence[str], width: int) -> list[Text]:
+def _wrapped(texts: Sequence[str], width: int) -> list[Text]:
     """A text a line, the first with room behind it for how surely it is known."""
     rooms = [max(10, width - LABEL - (TRUST_WIDTH if not n else 1)) for n in range(len(texts))]
     return [Text(cut(text, room), PLAIN) for text, room in zip(texts, rooms, strict=True)]
@@ -181,7 +181,7 @@ def _probable(view: DoctorView, width: int) -> list[Text]:
         return _labelled("Probably", [Text(part, PLAIN) for part in wrapped(cause, room, 3)])
     left = view.advice
     assert left is not None
-    lines = _told_in(left.probable, width)
+    lines = _wrapped(left.probable, width)
     if lines:
         lines[0].append(f" {TRUST_MARKS[left.confidence]:>8}", FAINT)
     lines += _excluded(left, help_.probable, width)
@@ -239,7 +239,7 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
     if help_ is not None and help_.check:
         left = view.advice
         assert left is not None
-        lines = _told_in(left.check, width)
+        lines = _wrapped(left.check, width)
         if lines and help_.confidence != "practice":  # checks are practice whatever the cause is
             lines[0].append(f" {TRUST_MARKS['practice']:>8}", FAINT)
         return _labelled("Check", lines + _excluded(left, help_.check, width))
@@ -251,13 +251,13 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
 def _reset(view: DoctorView, width: int) -> list[Text]:
     if not view.present:
         return []
-    said = reset_text(view.help, view.ready, "x", view.follows)
+    message = reset_text(view.help, view.ready, "x", view.follows)
     room = max(10, width - LABEL - TRUST_WIDTH)
     # in as many lines as it takes: what may start the motor is never cut off
-    lines = [Text(cut(part, room), PLAIN) for part in wrapped(said.text, room, RESET_LINES)]
+    lines = [Text(cut(part, room), PLAIN) for part in wrapped(message.text, room, RESET_LINES)]
     if lines[0].plain.startswith("x "):
         lines[0].stylize(KEY, 0, 1)
-    lines[0].append("" if said.told_by_drive else f" {TRUST_MARKS['practice']:>8}", FAINT)
+    lines[0].append("" if message.by_drive else f" {TRUST_MARKS['practice']:>8}", FAINT)
     return _labelled("Reset", lines)
 
 
@@ -267,8 +267,8 @@ def _history(view: DoctorView, width: int, height: int) -> list[Text]:
         return []
     if not view.history:
         return _labelled("History", [Text("not known on this drive", FAINT)])
-    told = view.history[: max(_told(view), 1)]
-    rows = [_past(view, number, code, width) for number, code in enumerate(told)]
+    reported = view.history[: max(_shown_count(view), 1)]
+    rows = [_past(view, number, code, width) for number, code in enumerate(reported)]
     chosen = view.at - len(view.look_at)
     top = max(0, min(chosen - height + 1, len(rows) - height)) if chosen >= 0 else 0
     return _labelled("History", rows[top : top + height])

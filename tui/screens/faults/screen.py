@@ -238,15 +238,15 @@ class FaultsScreen(OrderKeys):
             return
         proposed = str(state_folder() / record_name(self.session, record))
 
-        def told(name: str | None) -> None:
+        def reported(name: str | None) -> None:
             if name:
                 self._write(Path(name).expanduser(), record)
 
         about = "Markdown, with the values, what the drive stored, and what was written."
-        asked = Ask(
+        requested = Ask(
             "Save the trip as", fault_of_new, text=proposed, about=about, takes="writes the file"
         )
-        self.app.push_screen(asked, told)
+        self.app.push_screen(requested, reported)
 
     def _write(self, path: Path, record: FaultRecord) -> None:
         stored = self.session.profile.data.faults.stored

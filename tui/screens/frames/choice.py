@@ -106,16 +106,16 @@ def went_wrong(group: Sequence[Frame], *, tcp: bool, last: bool) -> bool:
             return True
         if frame.direction == "in" and pdu.function & EXCEPTION_BIT:
             return True
-    asked = pdu_of(group[0].data, tcp=tcp)
+    requested = pdu_of(group[0].data, tcp=tcp)
     unanswered = len(group) == 1 and group[0].direction == "out" and not last
-    return unanswered and asked is not None and asked.device != BROADCAST_DEVICE
+    return unanswered and requested is not None and requested.device != BROADCAST_DEVICE
 
 
 def _says(group: Sequence[Frame], wanted: FrameChoice, tell: TellFrames) -> bool:
     if not wanted.words:
         return True
-    said = [
+    message = [
         f"{sentence} {frame.note} {frame.data.hex(' ')} {frame.data.hex()}".casefold()
         for sentence, frame in zip(tell(group), group, strict=True)
     ]
-    return all(any(word in one for one in said) for word in wanted.words)
+    return all(any(word in one for one in message) for word in wanted.words)

@@ -66,7 +66,7 @@ class CounterKeys(PanelScreen):
 
     def action_reset_counters(self) -> None:
         """Count from now on; only what this panel shows."""
-        if self._shown_or_told():
+        if self._require_shown():
             self.console.counters.reset_ours()
             self.app.tell("Counted from now on. What was counted since the line was opened stays.")
             self.look()
@@ -74,7 +74,7 @@ class CounterKeys(PanelScreen):
     def action_reset_drive_counters(self) -> None:
         """Armed, ask; then set the drive's own counters to 0."""
         watch, device = self.console.counters, self.session.device
-        if not self._shown_or_told():
+        if not self._require_shown():
             return
         if not watch.can_reset_drive:
             read_only = self.session.line.read_only
@@ -89,7 +89,7 @@ class CounterKeys(PanelScreen):
 
         stamp = self.session.work.stops
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if not sure:
                 return
             try:
@@ -97,7 +97,7 @@ class CounterKeys(PanelScreen):
             except OrderRefused as refused:  # it is not armed any more, or was stopped since
                 self.app.events.add("refused", f"Counters not reset: {refused}", device)
 
-        asked = Confirm(
+        requested = Confirm(
             f"Reset the counters of drive {device}?",
             RESETS_NOTHING_ELSE,
             yes="resets them",
@@ -105,7 +105,7 @@ class CounterKeys(PanelScreen):
             loses=True,
             now=MotorsNow(self.app, [self.session]),
         )
-        self.app.push_screen(asked, told)
+        self.app.push_screen(requested, reported)
 
     async def _reset_drive(self, _: Permit) -> str:
         try:
@@ -114,7 +114,7 @@ class CounterKeys(PanelScreen):
             raise OrderRefused(f"Counters not reset: {error}") from error
         return "The drive's counters are reset."
 
-    def _shown_or_told(self) -> bool:
+    def _require_shown(self) -> bool:
         if not self.shows_counters:
             self.app.tell("Tab shows the counters first.")
         return self.shows_counters

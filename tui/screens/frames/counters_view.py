@@ -36,7 +36,7 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
     tall = TALL_BARS if height >= TALL else LOW_BARS
     lines += bar_lines(bars(found.total.turnarounds), tall)
     lines.append(rule("What differs", width, RESET_KEYS))
-    lines += said(found, width, max(1, height - len(lines)))
+    lines += message(found, width, max(1, height - len(lines)))
     return lines[:height]
 
 
@@ -77,8 +77,8 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
     refused = ", ".join(f"{code}: {n}" for code, n in sorted(found.total.exceptions.items()))
     codes = [Text(f"Refused, by code  {refused}", FAINT)] if refused else []
     if found.trouble:
-        told = wrapped(found.trouble, width - 2, 3)
-        return [Text("The drive's own", FAINT), *(Text(line, ALARM) for line in told), *codes]
+        reported = wrapped(found.trouble, width - 2, 3)
+        return [Text("The drive's own", FAINT), *(Text(line, ALARM) for line in reported), *codes]
     if not found.drive:
         none = Text("None is told, or none was read yet.", FAINT)
         return [Text("The drive's own", FAINT), none, *codes]
@@ -143,7 +143,7 @@ def bar_lines(shown: Sequence[TurnaroundBar], rows: int) -> list[Text]:
     return [*lines, counts, Text("".join(f"{end:>{BAR_WIDTH}}" for end in ends), FAINT)]
 
 
-def said(found: CountersNow, width: int, room: int) -> list[Text]:
+def message(found: CountersNow, width: int, room: int) -> list[Text]:
     """What the counters show, a sentence each; the worst first."""
     if found.agree:
         text = Text(no_wrap=True).append(" ● ", RUNNING)
@@ -154,9 +154,9 @@ def said(found: CountersNow, width: int, room: int) -> list[Text]:
         # what differs of all goes before what to look at of the first
         parts = [[cut_at_word(one.text, width - 5)] for one in worst]
     lines: list[Text] = []
-    for one, told in zip(worst, parts, strict=True):
+    for one, reported in zip(worst, parts, strict=True):
         sign = FAULT if one.kind in BAD else ALARM
-        for at, part in enumerate(told):
+        for at, part in enumerate(reported):
             text = Text(no_wrap=True).append("   " if at else " ■ ", sign)
             lines.append(text.append(part, PLAIN))
     return lines

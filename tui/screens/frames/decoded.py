@@ -36,7 +36,7 @@ def decoded(
     frames: Sequence[Frame], profile_of: ProfileOf, raws_of: RawsOf, *, tcp: bool
 ) -> list[str]:
     """A sentence for each frame; empty where it is none. A reply is told by its request."""
-    asked: Asked | None = None
+    requested: Asked | None = None
     found = []
     for frame in frames:
         pdu = pdu_of(frame.data, tcp=tcp)
@@ -47,16 +47,16 @@ def decoded(
         words = _Words(pdu.device, profile_of(pdu.device), raws_of(pdu.device), space)
         try:
             if frame.direction == "out":
-                asked = _asked(pdu)
+                requested = _requested(pdu)
                 found.append(_request(pdu, words))
             else:
-                found.append(_reply(pdu, asked, words))
+                found.append(_reply(pdu, requested, words))
         except (struct.error, IndexError):
             found.append("")  # cut short: its bytes tell all that there is
     return found
 
 
-def _asked(pdu: Pdu) -> Asked | None:
+def _requested(pdu: Pdu) -> Asked | None:
     if pdu.function not in (READ, READ_INPUT, READ_WRITE):
         return None
     address, count = struct.unpack_from(">HH", pdu.body)
@@ -84,15 +84,18 @@ def _request(pdu: Pdu, words: _Words) -> str:
     return head
 
 
-def _reply(pdu: Pdu, asked: Asked | None, words: _Words) -> str:
+def _reply(pdu: Pdu, requested: Asked | None, words: _Words) -> str:
     if pdu.function & EXCEPTION_BIT:
         name = FUNCTION_NAMES.get(pdu.function & ~EXCEPTION_BIT, "")
         return f"{pdu.device} refuses to {name or 'do it'}: exception {pdu.body[0]}"
     if pdu.function in (READ, READ_INPUT, READ_WRITE):
         raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
-        if asked is None or (asked.device, asked.function) != (pdu.device, pdu.function):
+        if requested is None or (requested.device, requested.function) != (
+            pdu.device,
+            pdu.function,
+        ):
             return f"{pdu.device} {len(raws)} words"
-        return f"{pdu.device} {words.values(asked.address, raws)}"
+        return f"{pdu.device} {words.values(requested.address, raws)}"
     if pdu.function == WRITE_ONE:
         return f"{pdu.device} wrote {words.values(*_one(pdu))}"
     if pdu.function == WRITE_MANY:

@@ -133,17 +133,20 @@ class FrameListScreen(PanelScreen):
 
     def _places(self, frames: Sequence[Frame]) -> list[int]:
         """Places of the frames that are wanted."""
-        return chosen(frames, choice_of(self._filter), self._told, tcp=self._is_tcp)
+        return chosen(frames, choice_of(self._filter), self._texts_of, tcp=self._is_tcp)
 
     def _lines(self, frames: Sequence[Frame], places: Sequence[int], width: int) -> list[Text]:
-        between, told = gaps(frames), dict(zip(places, self._words(frames, places), strict=True))
+        between, reported = (
+            gaps(frames),
+            dict(zip(places, self._words(frames, places), strict=True)),
+        )
         return [
             frame_line(
                 frames[at],
                 self._since_epoch + frames[at].time,
                 between[at],
                 width,
-                told[at] if self._page == "words" else "",
+                reported[at] if self._page == "words" else "",
                 found=frames[at] is self._found,
             )
             for at in places
@@ -154,10 +157,10 @@ class FrameListScreen(PanelScreen):
         if not places:
             return []
         first = places[0] - 1 if places[0] else 0
-        told = self._told(frames[first : places[-1] + 1])
-        return [told[at - first] for at in places]
+        reported = self._texts_of(frames[first : places[-1] + 1])
+        return [reported[at - first] for at in places]
 
-    def _told(self, frames: Sequence[Frame]) -> list[str]:
+    def _texts_of(self, frames: Sequence[Frame]) -> list[str]:
         return decoded(frames, self._source.profile, self._source.raws, tcp=self._is_tcp)
 
     @property
@@ -246,7 +249,7 @@ class FrameListScreen(PanelScreen):
         frames = self._held
         places = self._places(frames)
         shown = [frames[at] for at in places]
-        fits = chosen(shown, choice_of(text), self._told, tcp=self._is_tcp)
+        fits = chosen(shown, choice_of(text), self._texts_of, tcp=self._is_tcp)
         before = next((at for at, one in enumerate(shown) if one is self._found), len(shown))
         older = [at for at in fits if at < before]
         if not older:
@@ -287,5 +290,5 @@ class FrameListScreen(PanelScreen):
         ask_where(self.app, KeptFrames(shown, text, line, self._is_tcp, self._since_epoch))
 
     def _all_words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
-        told = self._told(frames)
-        return [told[at] for at in places]
+        reported = self._texts_of(frames)
+        return [reported[at] for at in places]

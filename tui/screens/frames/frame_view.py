@@ -31,10 +31,10 @@ def gap_text(seconds: float | None) -> str:
     """The time since the frame before, in nine columns: ms up to 1 s."""
     if seconds is None:
         return " " * 9
-    told = f"{1000 * seconds:.1f} ms" if seconds < 0.9999 else f"{seconds:.2f} s"
+    reported = f"{1000 * seconds:.1f} ms" if seconds < 0.9999 else f"{seconds:.2f} s"
     if seconds >= 100:
-        told = f"{seconds:.0f} s"
-    return f"{'+' + told:>9}"
+        reported = f"{seconds:.0f} s"
+    return f"{'+' + reported:>9}"
 
 
 def gaps(frames: Sequence[Frame]) -> list[float | None]:
@@ -83,24 +83,24 @@ def frame_line(
 def frames_text(
     frames: Sequence[Frame],
     places: Sequence[int],
-    told: Sequence[str],
+    reported: Sequence[str],
     since_epoch: float,
     heading: Sequence[str],
 ) -> str:
     """Frames as a text to keep: a line each, tabs between time, gap, direction, words and bytes.
 
-    `since_epoch` is added to the line's times for the time of day; `told` goes with the `places`.
+    `since_epoch` is added to the line's times for the time of day; `reported` goes with the `places`.
     """
     between = gaps(frames)
     lines = [f"# {line}" for line in heading]
     lines.append("# date time\tgap ms\tdirection\tsays\tnote\tbytes")
-    for at, words in zip(places, told, strict=True):
+    for at, words in zip(places, reported, strict=True):
         frame, gap = frames[at], between[at]
         wall = since_epoch + frame.time
         day = time.strftime("%Y-%m-%d", time.localtime(wall))
         ms = "" if gap is None else f"{1000 * gap:.1f}"
         way = "request" if frame.direction == "out" else "reply"
-        said = plain(words), plain(frame.note)
-        parts = (f"{day} {frame_time(wall)}", ms, way, *said, hex_text(frame.data))
+        message = plain(words), plain(frame.note)
+        parts = (f"{day} {frame_time(wall)}", ms, way, *message, hex_text(frame.data))
         lines.append("\t".join(parts))
     return "\n".join(lines) + "\n"

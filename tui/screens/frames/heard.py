@@ -26,7 +26,7 @@ class HeardScreen(FrameListScreen):
         self._heard = self._source = heard
         self._heading = "Listening, nothing is sent"
         self._top = 0
-        self._told_trouble = False
+        self._trouble_shown = False
 
     def sum_lines(self, width: int, height: int) -> list[Text]:
         """Each drive: who commands it, how often it is asked, whether its timeout is fed."""
@@ -40,8 +40,8 @@ class HeardScreen(FrameListScreen):
 
     def draw(self, width: int) -> None:
         """Say once that the line is gone."""
-        if self._heard.trouble and not self._told_trouble:
-            self._told_trouble, self._heading = True, "Listening has ended"
+        if self._heard.trouble and not self._trouble_shown:
+            self._trouble_shown, self._heading = True, "Listening has ended"
             self.app.notify(f"{self._heard.trouble} Esc leaves.", severity="error")
         super().draw(width)
 

@@ -44,18 +44,18 @@ def ask_where(app: Panel, kept: KeptFrames) -> None:
         return
     name = time.strftime("frames-%Y%m%d-%H%M%S.pcapng", time.localtime(app.clock.wall()))
 
-    def told(answer: str | None) -> None:
+    def reported(answer: str | None) -> None:
         if answer:
             _save(app, Path(answer).expanduser(), kept)
 
-    asked = Ask(
+    requested = Ask(
         "Save the frames as",
         fault_of_new,
         text=str(state_folder() / name),
         about=SAVED_AS,
         takes="writes the file",
     )
-    app.push_screen(asked, told)
+    app.push_screen(requested, reported)
 
 
 def _save(app: Panel, path: Path, kept: KeptFrames) -> None:

@@ -91,10 +91,10 @@ def _mark(action: Action, screen: str, word: str, *, here: bool) -> int:
     if here and word in (action.shown, *action.keys.split(",")):
         return 6
     typed = word.casefold()
-    said = _words(action.help)
-    name = {*said[:NAME_WORDS], *_words(action.label), *_words(action.id)}
+    message = _words(action.help)
+    name = {*message[:NAME_WORDS], *_words(action.label), *_words(action.id)}
     places = () if here else _words(action.screens[0])
-    every = {*said, *name, *places}
+    every = {*message, *name, *places}
     if typed in every:
         mark = 4
     elif any(one.startswith(typed) for one in every):

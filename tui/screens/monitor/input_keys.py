@@ -30,11 +30,11 @@ class InputKeys(RunKeys):
                 return str(error)
             return ""
 
-        def told(text: str | None) -> None:
+        def reported(text: str | None) -> None:
             if text is not None:
                 self.app.notify(f"Simulated inputs, {set_inputs(simulation, f'{device}: {text}')}")
 
         question = f"Inputs of the simulated drive {device}"
-        about = f"{simulation.drive(device).terminals.told()}\n{LOOKS_LIKE}"
-        asked = Ask(question, fault, about=about, takes="sets them", number=True)
-        self.app.push_screen(asked, told)
+        about = f"{simulation.drive(device).terminals.reported()}\n{LOOKS_LIKE}"
+        requested = Ask(question, fault, about=about, takes="sets them", number=True)
+        self.app.push_screen(requested, reported)

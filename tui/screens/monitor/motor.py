@@ -109,8 +109,8 @@ def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text
     own = reading.physical or reading.value
     shown, unit = (own.text, own.unit) if own is not None else (reading.text, reading.unit)
     text.append(f"{short(shown, NUMBER_CELLS):>{NUMBER_CELLS}}", STRONG if good else FAINT)
-    told = unit or "raw" if good else age_text(reading.age(view.now))
-    text.append(f" {short(told, UNIT_CELLS):<{UNIT_CELLS}}", FAINT if good else STALE)
+    reported = unit or "raw" if good else age_text(reading.age(view.now))
+    text.append(f" {short(reported, UNIT_CELLS):<{UNIT_CELLS}}", FAINT if good else STALE)
     high = end_of(view, value.high)
     if cells >= columns + 2 + BAR_CELLS + END_CELLS and high is not None and good:
         low = end_of(view, value.low) or 0.0

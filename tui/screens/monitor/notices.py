@@ -20,14 +20,14 @@ def notice_lines(view: View, width: int) -> list[Text]:
         return []
     control = view.control
     no_effect = f"No effect from here: {control.hindrance.sentence}" if control.hindrance else ""
-    for said, style in (
+    for message, style in (
         (control.offer, ATTENTION),
         (control.lost, ALARM),
         (control.why_disarmed, ATTENTION),
         (no_effect, PLAIN),
     ):
-        if said:
-            return [Text(f"  {line}", style) for line in wrapped(said, width - 4, NOTICE_ROWS)]
+        if message:
+            return [Text(f"  {line}", style) for line in wrapped(message, width - 4, NOTICE_ROWS)]
     return []
 
 

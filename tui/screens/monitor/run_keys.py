@@ -37,7 +37,7 @@ class RunKeys(OrderKeys):
 
     def action_run_line(self, purpose: Purpose) -> None:
         """Open the line, where the drive is armed and a command can have an effect."""
-        if not self._armed_or_told():
+        if not self._require_armed():
             return
         profile, image = self.session.profile, self.session.image
         wanted = self.commander.given.wanted
@@ -82,9 +82,9 @@ class RunKeys(OrderKeys):
             self._line = None  # a stop, or the end of arming, has closed it
             return None
         found = hindrance(self.session.profile, self.session.image.raws)
-        told = f"{found.text} {_after_esc(found.way)}" if found else ""
+        reported = f"{found.text} {_after_esc(found.way)}" if found else ""
         around, output = self._around or {}, self._output()
-        return run_lines(line, self.session.profile, around, now, width, told, output)
+        return run_lines(line, self.session.profile, around, now, width, reported, output)
 
     def run_line_keys(self, now: float) -> Text:
         """The keys that mean something while the line is open."""
@@ -95,7 +95,7 @@ class RunKeys(OrderKeys):
         def styles(action: str) -> tuple[Style, Style]:
             return (FAINT, FAINT) if action == "enter" and not counts else key_styles(action)
 
-        keys = [("stop_by_space", "Space", self.app.stops_whom), ("enter", "Enter", does)]
+        keys = [("stop_by_space", "Space", self.app.stop_target_text), ("enter", "Enter", does)]
         return key_line([*keys, ("close", "Esc", "no")], styles)
 
     def on_key(self, event: Key) -> None:

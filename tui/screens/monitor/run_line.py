@@ -190,8 +190,8 @@ def run_lines(
     `hindrance` says why a run command would have no effect now, and what opens the way; `output`
     is the frequency of the motor now, below 0 in reverse, None where it is not known.
     """
-    told = [Text(f" {part}", style) for part, style in _told(line, hindrance, width - 2)]
-    lines = [*(told or [Text("")]), _first(line, profile, readings, output), _second(line, now)]
+    reported = [Text(f" {part}", style) for part, style in _parts_of(line, hindrance, width - 2)]
+    lines = [*(reported or [Text("")]), _first(line, profile, readings, output), _second(line, now)]
     for one in lines:
         one.no_wrap = True
         one.truncate(width, overflow="ellipsis")
@@ -200,17 +200,17 @@ def run_lines(
     return lines
 
 
-def _told(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
+def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
     """What is wrong with the reference, why the command has no effect, or that it is 0."""
     if line.fault:
-        said, style = line.fault, ALARM
+        message, style = line.fault, ALARM
     elif hindrance and line.purpose != "reference":
-        said, style = f"No effect: {hindrance}", ALARM
+        message, style = f"No effect: {hindrance}", ALARM
     elif line.is_zero and line.purpose != "reference":
-        said, style = "The reference is 0: type the one to run at.", ATTENTION
+        message, style = "The reference is 0: type the one to run at.", ATTENTION
     else:
         return []
-    return [(part, style) for part in wrapped(said, width, 2)]
+    return [(part, style) for part in wrapped(message, width, 2)]
 
 
 def _first(

@@ -58,7 +58,7 @@ class MonitorScreen(InputKeys):
         self._span = SPANS.index(USUAL_SPAN)
         self._timer: Timer | None = None
         self._still: Timer | None = None
-        self._told: object = None
+        self._reported: object = None
         """What of the latest snapshot is shown at once, as it was shown last."""
         self._looked_at = -math.inf
         self._run_rows = 0
@@ -86,18 +86,18 @@ class MonitorScreen(InputKeys):
     def _look_in_time(self) -> None:
         """On a slow link figures seldom; a state, a fault and values that are new at once."""
         snapshot, now = self.console.monitor.latest, self.app.clock.monotonic()
-        told = snapshot and (
+        reported = snapshot and (
             snapshot.state.kind,
             snapshot.state.headline,
             snapshot.state.fault,
             bool(snapshot.error),
             len(snapshot.readings),
         )
-        if told != self._told:
+        if reported != self._reported:
             self.app.hurry()
         elif self.app.low_bandwidth and now < self._looked_at + SELDOM:
             return
-        self._told, self._looked_at = told, now
+        self._reported, self._looked_at = reported, now
         self.look()
 
     def on_unmount(self) -> None:
@@ -147,7 +147,7 @@ class MonitorScreen(InputKeys):
     def _place(self, room: Arrangement) -> None:
         """Give each part its rows; only where they change is anything laid out anew."""
         bottom = max(room.bottom, self._run_rows)
-        placed = (room, bottom, self.said_rows)
+        placed = (room, bottom, self.message_rows)
         if placed == self._placed:
             return
         there = {part.id for part in self.query("Lines, Horizontal, Vertical")}
@@ -186,7 +186,7 @@ class MonitorScreen(InputKeys):
     def _keys_of(self, view: View, width: int) -> list[Text]:
         if self.line_is_open:
             return [self.run_line_keys(view.now)]
-        return [order_keys(view, keys_line(MONITOR, width, self.app.stops_whom))]
+        return [order_keys(view, keys_line(MONITOR, width, self.app.stop_target_text))]
 
     def _view(self) -> View:
         if self._source is None:
@@ -226,7 +226,7 @@ class MonitorScreen(InputKeys):
             self.app.notify("This drive gives its current in A.", timeout=3)
             return
 
-        def told(text: str | None) -> None:
+        def reported(text: str | None) -> None:
             if text:
                 rated = Rating(Decimal(text.replace(",", ".")), "A")
                 self.session.ratings[current.code] = rated
@@ -235,8 +235,8 @@ class MonitorScreen(InputKeys):
         about = f"100 % of {current.code}, from the nameplate of the drive; base: " + (
             current.base or "not confirmed by a manual"
         )
-        asked = Ask("Rated current in A", fault_of_rating, about=about, number=True)
-        self.app.push_screen(asked, told)
+        requested = Ask("Rated current in A", fault_of_rating, about=about, number=True)
+        self.app.push_screen(requested, reported)
 
 
 def fault_of_rating(text: str) -> str:

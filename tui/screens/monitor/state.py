@@ -92,8 +92,8 @@ def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
     age = age_text(view.age or 0.0)
     was = view.was or (view.snapshot.state.headline if view.snapshot else "")
     known = f"NOT KNOWN NOW for {age}"
-    told = f"{known}, {SAYS_WHY}"
-    lines = [Text(short(told if len(told) <= width else known, width), ALARM)]
+    reported = f"{known}, {SAYS_WHY}"
+    lines = [Text(short(reported if len(reported) <= width else known, width), ALARM)]
     lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
     lines += [Text(line, ALARM) for line in wrapped(countdown(view), width, 2)]
     return Text(f" {words} ", FAULT_BLOCK), lines
@@ -166,15 +166,15 @@ def _pair(label: str, text: str, style: Style, width: int) -> Text:
 def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
     """Who gives the command or the reference."""
     state = view.snapshot.state if view.snapshot and not view.lost else None
-    told = (
+    reported = (
         ""
         if state is None
         else state.channel
         if quantity == "command_channel"
         else (state.reference)
     )
-    if told:
-        return _pair(label, told, PLAIN, width)
+    if reported:
+        return _pair(label, reported, PLAIN, width)
     parameter = view.profile.quantity(quantity)
     if parameter is None:
         return _pair(label, NOT_AVAILABLE, FAINT, width)

@@ -47,8 +47,8 @@ def one_trend(view: View, quantity: Quantity, width: int, height: int) -> list[T
     """Rows and the axis of time, each of exactly so many cells."""
     parameter = view.profile.quantity(quantity)
     if parameter is None:
-        said = f"  No trend: no manual confirms where the {TREND_NAMES[quantity]} is."
-        nothing = Text(cut(said, width), FAINT)
+        message = f"  No trend: no manual confirms where the {TREND_NAMES[quantity]} is."
+        nothing = Text(cut(message, width), FAINT)
         return [nothing, *[Text(" " * width, no_wrap=True) for _ in range(height - 1)]]
     columns = width - LABEL_CELLS - 1 - LEGEND_CELLS - 1
     step = view.span / columns

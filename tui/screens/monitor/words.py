@@ -90,10 +90,10 @@ def word_line(view: View, parameter: Parameter, width: int) -> Text:
     mark = "" if is_verified(parameter) else " ?"
     text = Text(f"  {cut(parameter.code + mark, CODE_CELLS)}", FAINT, no_wrap=True)
     text.append(f"{shown:<{RAW_CELLS}}", FAINT)
-    told = [] if raw is None else list(_true_words(parameter, raw))
-    for at, (name, alarm) in enumerate(told):
+    reported = [] if raw is None else list(_true_words(parameter, raw))
+    for at, (name, alarm) in enumerate(reported):
         link = " · " if at else " "
-        more = len(told) - at
+        more = len(reported) - at
         if text.cell_len + len(link) + len(name) + (5 if more > 1 else 0) > width:
             text.append(f" … {more}", FAINT)
             break
@@ -113,9 +113,9 @@ def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
 def alarm_line(view: View, width: int, *, tab: bool) -> Text:
     """The alarms of now; at the right the key that shows all bits."""
     text = Text(f"  {'Alarms':<{CODE_CELLS + RAW_CELLS}} ", FAINT, no_wrap=True)
-    said, style = _alarms(view)
+    message, style = _alarms(view)
     room = width - text.cell_len - (ALL_BITS_CELLS if tab else 1)
-    text.append(cut(said, max(1, room)), style)
+    text.append(cut(message, max(1, room)), style)
     if tab:
         text.append_text(Text.assemble(*ALL_BITS))
     return text
@@ -136,12 +136,12 @@ def _alarms(view: View) -> tuple[str, Style]:
 
 def short_bit(bit: Bit, *, on: bool) -> str:
     """What a bit says, in a word or two; empty where that is so while all is well."""
-    said = bit.name if on and bit.on.casefold() in GENERIC else _bit_words(bit, on, 60)
-    for words in (said.casefold(), *([bit.name.casefold()] if on else [])):
+    message = bit.name if on and bit.on.casefold() in GENERIC else _bit_words(bit, on, 60)
+    for words in (message.casefold(), *([bit.name.casefold()] if on else [])):
         if words in SHORT_NAMES:
             return SHORT_NAMES[words]
-    first, rest = said[:1], said[1:]
-    return said if rest[:1].isupper() or not rest else first.lower() + rest
+    first, rest = message[:1], message[1:]
+    return message if rest[:1].isupper() or not rest else first.lower() + rest
 
 
 def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
@@ -245,17 +245,17 @@ def _denied_at_1(bit: Bit) -> bool:
 
 def _bit_words(bit: Bit, on: bool, room: int) -> str:
     """The name of a bit; what it says as well, where that is more than yes or no and fits."""
-    said = bit.on if on else bit.off
-    plain = said.casefold() in PLAIN_ANSWERS
-    if not _denied_at_1(bit) and (plain or (on and said.casefold() in bit.name.casefold())):
+    message = bit.on if on else bit.off
+    plain = message.casefold() in PLAIN_ANSWERS
+    if not _denied_at_1(bit) and (plain or (on and message.casefold() in bit.name.casefold())):
         return bit.name
-    alone = said[:1].upper() + said[1:]
-    if bit.name.casefold() in said.casefold():
+    alone = message[:1].upper() + message[1:]
+    if bit.name.casefold() in message.casefold():
         return alone
-    both = f"{bit.name}: {said}"
+    both = f"{bit.name}: {message}"
     if len(both) <= room:
         return both
-    left = room - len(said) - 3
-    if " " in said or left < SHORTEST_NAME:
+    left = room - len(message) - 3
+    if " " in message or left < SHORTEST_NAME:
         return alone
-    return f"{bit.name[:left].rstrip()}…: {said}"
+    return f"{bit.name[:left].rstrip()}…: {message}"

@@ -42,18 +42,18 @@ def parameter_lines(
     news = _news(editor, parameter)
     # what warns is told whole, at the cost of help
     most = 3 if height > SHORT else 1 if news.style == PLAIN else 2
-    told = wrapped(news.plain, max(20, width - 3), most)
-    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)), step)
+    reported = wrapped(news.plain, max(20, width - 3), most)
+    lines = _help(editor, parameter, width, height - 2 - max(1, len(reported)), step)
     lines += [_limits(editor, parameter, width), _place(editor, parameter, width)]
-    lines += [Text(f" {line}", news.style, no_wrap=True) for line in told]
+    lines += [Text(f" {line}", news.style, no_wrap=True) for line in reported]
     return [*lines, *([Text("")] * (height - len(lines)))]
 
 
 def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str) -> list[Text]:
     """Code, whole name, what it does; as many lines as there is room for."""
     head = f"{parameter.code}  {parameter.name}"
-    told = [*([step] if step else []), *_help_parts(editor, parameter)]
-    words = " ".join(part if part.endswith(".") else f"{part}." for part in told)
+    reported = [*([step] if step else []), *_help_parts(editor, parameter)]
+    words = " ".join(part if part.endswith(".") else f"{part}." for part in reported)
     parts = wrapped(f"{head}. {words}" if words else head, max(20, width - 3), room)
     lines = [Text(f" {part}", FAINT, no_wrap=True) for part in parts]
     # the name may reach into the second line where the terminal is narrow
@@ -159,8 +159,8 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
     if code in editor.staging.changed_elsewhere:
         before = text_of(editor, parameter, editor.staging.changed_elsewhere[code])
-        said = f"Changed by somebody else: it was {before}. Delete drops your edit, y keeps it."
-        return Text(said, ALARM)
+        message = f"Changed by somebody else: it was {before}. Delete drops your edit, y keeps it."
+        return Text(message, ALARM)
     if result is not None and not result.done:
         return Text(result.text, ALARM)
     refused = editor.refusal(code)
@@ -169,15 +169,15 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         return Text(f"→ {edit.text} is staged. {locked}", ALARM)
     if edit is not None:
         keys = _keys_to_write(editor, "it")
-        said = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; {keys}."
-        return Text(f"{said} {edit.remark}".strip(), ALARM if edit.remark else ATTENTION)
+        message = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; {keys}."
+        return Text(f"{message} {edit.remark}".strip(), ALARM if edit.remark else ATTENTION)
     if code in editor.waits_for_reset:
         return Text("In force only after a reset of the drive.", ALARM)
     if old := old_text(editor, code):
-        said = f"Now {value_text(editor, code)}, was {old}"
+        message = f"Now {value_text(editor, code)}, was {old}"
         # u takes back what is staged first
         u = "" if len(editor.staging.edits) else ": u stages the old value"
-        return Text(f"{said}{u}.", PLAIN)
+        return Text(f"{message}{u}.", PLAIN)
     if code not in editor.values.raws:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
     if refused is not None and refused.reason != "read-only":
@@ -197,11 +197,11 @@ def _keys_to_write(editor: Editor, what: str) -> str:
 
 def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
     """What a changed setting was, and how surely that is known."""
-    said = f"Not the factory value, {factory_text(editor, parameter)}"
+    message = f"Not the factory value, {factory_text(editor, parameter)}"
     grounds = parameter.factory_grounds
     if grounds is None or factory_is_sure(parameter):
-        return f"{said}."
-    return f"{said}: from {CONFIDENCE_WORDS[grounds.confidence]}, unverified."
+        return f"{message}."
+    return f"{message}: from {CONFIDENCE_WORDS[grounds.confidence]}, unverified."
 
 
 def status_line(editor: Editor, where: str, width: int) -> Text:

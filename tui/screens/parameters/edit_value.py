@@ -88,11 +88,11 @@ class EditNumber(Question[str | None]):
             return False
         edit = edits.get(parameter.code)
         if edit is None:
-            same = next(one for one in edits.asked if one.code == parameter.code)
-            told = Text("as it is held now", FAINT)
+            same = next(one for one in edits.requested if one.code == parameter.code)
+            reported = Text("as it is held now", FAINT)
             if same.rounded:
-                told.append(f": {same.text}   {ROUNDED}", ALARM)
-            held.update(told)
+                reported.append(f": {same.text}   {ROUNDED}", ALARM)
+            held.update(reported)
             return True
         shown = Text(f"→ {edit.text}", STRONG)
         shown.append(f"   raw {edit.new} = 16#{edit.new & 0xFFFF:04X}", FAINT)
@@ -128,12 +128,12 @@ def about_number(editor: Editor, parameter: Parameter) -> str:
     """What a number may be: held, staged, as it left the factory; limits in force, the step."""
     now = f"drive holds {value_text(editor, parameter.code)}"
     edit, factory = editor.staging.edits.get(parameter.code), factory_text(editor, parameter)
-    told = [now, *([f"staged {edit.text}"] if edit else [])]
-    told += [f"factory {factory}"] if factory else []
+    reported = [now, *([f"staged {edit.text}"] if edit else [])]
+    reported += [f"factory {factory}"] if factory else []
     limits = limits_now(editor, parameter, staged=True)
     bounds = f"limits {limits.text}" if limits and limits.text else "limits not documented"
     step = step_text(editor, parameter)
-    return f"{'   '.join(told)}\n{bounds}{f'   one step {step}' if step else ''}"
+    return f"{'   '.join(reported)}\n{bounds}{f'   one step {step}' if step else ''}"
 
 
 class PickValue(KeyQuestion[int | None]):

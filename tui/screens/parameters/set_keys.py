@@ -70,14 +70,14 @@ class SetKeys(ParameterKeys):
         when = time.strftime("%Y%m%d-%H%M")
         name = f"{self.session.profile.id}-{self.session.device}-{when}.{suffix}"
 
-        def told(name: str | None) -> None:
+        def reported(name: str | None) -> None:
             if name:
                 work = self._read_to_file(Path(name).expanduser(), text, codes)
                 self.run_worker(work, exclusive=True, group="sets")
 
         proposed = str(Path.cwd() / name)
-        asked = Ask(question, fault_of_new, text=proposed, about=about, takes="writes the file")
-        self.app.push_screen(asked, told)
+        requested = Ask(question, fault_of_new, text=proposed, about=about, takes="writes the file")
+        self.app.push_screen(requested, reported)
 
     async def _read_to_file(
         self, path: Path, text: Callable[[ParameterSet], str], codes: list[str]
@@ -115,7 +115,7 @@ class SetKeys(ParameterKeys):
 
         from ..dialogs.pick_file import PickFile
 
-        def told(text: str | None) -> None:
+        def reported(text: str | None) -> None:
             if text:
                 self.run_worker(self._compare(text), exclusive=True, group="sets")
 
@@ -135,7 +135,7 @@ class SetKeys(ParameterKeys):
 
             return about_set(path, profile, raws)
 
-        self.app.push_screen(PickFile(question, others, folders, about), told)
+        self.app.push_screen(PickFile(question, others, folders, about), reported)
 
     async def _compare(self, text: str) -> None:
         editor = self.editor

@@ -27,14 +27,14 @@ class StageKeys(ParameterKeys):
         if not code or not self._may_edit(code):
             return
 
-        def told(answer: str | int | None) -> None:
+        def reported(answer: str | int | None) -> None:
             if answer is not None:
                 self._stage(code, answer)
 
         # a stop of the drive ends the dialog too: it is about its motor, whatever it stages
         now = self.motor_now()
         dialog = dialog_for(self.editor, self.session.profile[code], now)()
-        self.app.push_screen(dialog, told)
+        self.app.push_screen(dialog, reported)
 
     def _only_teaches(self, code: str) -> bool:
         """Whether all that can be done to a parameter is to teach its scale."""
@@ -123,7 +123,7 @@ class StageKeys(ParameterKeys):
             return
         parameter = self.session.profile[code]
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if sure:
                 self.editor.confirm(code)
                 self.look()
@@ -133,7 +133,7 @@ class StageKeys(ParameterKeys):
             " Read it at the keypad: only if both show the same, confirm it."
             f" Here it reads {self.editor.values.raws.get(code, 'nothing')}."
         )
-        asked = Confirm(
+        requested = Confirm(
             f"Confirm {code}?",
             follows,
             yes="the keypad shows the same",
@@ -141,7 +141,7 @@ class StageKeys(ParameterKeys):
             loses=True,
             now=self.motor_now(),
         )
-        self.app.push_screen(asked, told)
+        self.app.push_screen(requested, reported)
 
     def action_undo(self) -> None:
         """Take the last edit back; where nothing is staged, stage what was held before a write."""
@@ -176,14 +176,14 @@ class StageKeys(ParameterKeys):
             self.note("Nothing is staged.")
             return
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if sure:
                 self.editor.staging.undo_all()
                 self.list_again()
 
         edits = "edit is" if count == 1 else "edits are"
         follows = f"{count} staged {edits} dropped; the drive is not touched."
-        asked = Confirm(
+        requested = Confirm(
             "Undo all edits?",
             follows,
             yes="drops them",
@@ -191,7 +191,7 @@ class StageKeys(ParameterKeys):
             loses=True,
             now=self.motor_now(),
         )
-        self.app.push_screen(asked, told)
+        self.app.push_screen(requested, reported)
 
     def action_favourite(self) -> None:
         """Mark or unmark the parameter."""

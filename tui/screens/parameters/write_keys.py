@@ -25,7 +25,7 @@ class WriteKeys(ParameterKeys):
         if not edits:
             self.note("Nothing is staged.", "Press Enter to edit the parameter under the cursor.")
             return
-        if not self._armed_or_told():
+        if not self._require_armed():
             return
 
         def work(stamp: int) -> None:
@@ -63,7 +63,7 @@ class WriteKeys(ParameterKeys):
         except DriveError as refused:
             self._refuse(str(refused))
             return
-        if self._armed_or_told():
+        if self._require_armed():
             self._ask(question, order.does, "does it", "leaves all as it is", work)
 
     def show_results(self) -> None:
@@ -85,14 +85,14 @@ class WriteKeys(ParameterKeys):
             self.app.push_screen(results, lambda save: self.action_save_eeprom() if save else None)
             return
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if sure:
                 self.editor.apply(applied.waits, stamp)
             else:
                 self.note(f"{len(applied.waits)} not written; they stay staged.")
             self.look()
 
-        self.app.push_screen(RestQuestion(applied, self.motor_now()), told)
+        self.app.push_screen(RestQuestion(applied, self.motor_now()), reported)
 
     def offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""
@@ -106,12 +106,12 @@ class WriteKeys(ParameterKeys):
             self.note(moved.text)
             return
 
-        def told(sure: bool | None) -> None:
+        def reported(sure: bool | None) -> None:
             if sure:
                 self.app.follow(moved.line, moved.device)
 
         # the line is opened anew as this drive wants it: others on it are not asked meanwhile
-        asked = Confirm(
+        requested = Confirm(
             "Follow the drive?",
             moved.text,
             yes="follows it",
@@ -120,4 +120,4 @@ class WriteKeys(ParameterKeys):
             now=self.motor_now(),
             by_itself=True,
         )
-        self.app.push_screen(asked, told)
+        self.app.push_screen(requested, reported)

@@ -28,13 +28,13 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     ]
     if len(order) > EDITS_NAMED:
         lines.append(f"and {len(order) - EDITS_NAMED} more")
-    told = list(edit_problems(profile, chosen, raws).values())
-    told += [r.text for e in order if (r := editor.refusal(e.code)) is not None]
-    told += [edit.warning for edit in order if edit.warning]
-    told += consequences(profile, chosen, raws, editor.values.lacking)
-    told += [
+    reported = list(edit_problems(profile, chosen, raws).values())
+    reported += [r.text for e in order if (r := editor.refusal(e.code)) is not None]
+    reported += [edit.warning for edit in order if edit.warning]
+    reported += consequences(profile, chosen, raws, editor.values.lacking)
+    reported += [
         f"{e.code} changes the line itself: the drive answers at its new settings only."
         for e in order
         if cuts_line(profile, profile[e.code])
     ]
-    return "\n".join([*lines, *([""] if told else []), *dict.fromkeys(told)])
+    return "\n".join([*lines, *([""] if reported else []), *dict.fromkeys(reported)])

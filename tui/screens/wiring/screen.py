@@ -9,7 +9,7 @@ from textual.events import ScreenResume
 
 from tui.bus.errors import LineError
 from tui.drive.family_page import PageLine, family_page, page_lines
-from tui.drive.model import model_codes, model_told
+from tui.drive.model import model_codes, model_read
 from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
@@ -62,7 +62,7 @@ class WiringScreen(PanelScreen):
         except LineError:
             return  # the strip tells of a line that is lost; the page stands without
         raws = {code: reading.raw for code, reading in found.items() if reading.raw is not None}
-        self._model = model_told(self._profile, raws)
+        self._model = model_read(self._profile, raws)
         self.look()
 
     def draw(self, width: int) -> None:

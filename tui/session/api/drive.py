@@ -23,7 +23,7 @@ from ..settings.apply import apply_edits
 from ..settings.eeprom import save_to_eeprom
 from ..settings.typed import stage_typed
 from ..work import Permit
-from .values import DriveValue, NotStopped, NotWritten, Sample, told_value
+from .values import DriveValue, NotStopped, NotWritten, Sample, value_from
 from .work import LOOK_WHETHER_OPEN, waited
 
 STANDS_WITHIN = 120.0
@@ -60,7 +60,7 @@ class Drive:
         """Values of now, by code as asked for; one that the drive refuses has no value."""
         named = self._named(codes)
         found = waited(self._session.line, lambda: Reader(self._session).read(list(named.values())))
-        return {asked: self._value(found[code]) for asked, code in named.items()}
+        return {requested: self._value(found[code]) for requested, code in named.items()}
 
     def watch(self, *codes: str, every: float = 1.0) -> Iterator[Sample]:
         """Cycle after cycle, `every` so many seconds, until the script takes no more.
@@ -155,9 +155,9 @@ class Drive:
     def _sample(self, named: Mapping[str, str], snapshot: Snapshot, since: float) -> Sample:
         profile = self._session.profile
         now = as_read(profile, list(dict.fromkeys(named.values())), snapshot, since)
-        values = {asked: self._value(now.readings[code]) for asked, code in named.items()}
+        values = {requested: self._value(now.readings[code]) for requested, code in named.items()}
         time = datetime.fromtimestamp(snapshot.wall, UTC)
         return Sample(time, values, now.state.headline, snapshot.error)
 
     def _value(self, reading: Reading) -> DriveValue:
-        return told_value(reading, self._session.clock)
+        return value_from(reading, self._session.clock)

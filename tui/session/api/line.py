@@ -75,9 +75,9 @@ class DriveLine:
 
     async def _session(self, address: int, profile: str | None) -> DriveSession:
         line = self._opened.line
-        told: DriveIdentity | None
+        reported: DriveIdentity | None
         if profile is None:
-            told = identity = await identify_drive(line, address)
+            reported = identity = await identify_drive(line, address)
             if identity.profile is None:
                 fits = ", ".join(identity.candidates) or "any"
                 raise DriveError(
@@ -86,13 +86,13 @@ class DriveLine:
             found = library.load(identity.profile)
         else:
             found = library.load(profile)
-            told = await own_words(line, address, found)
-        session = DriveSession(line, address, found, told)
+            reported = await own_words(line, address, found)
+        session = DriveSession(line, address, found, reported)
         if session.contradiction:
             raise Contradiction(session.contradiction)
         await check_byte_order(Reader(session), Priority.OPERATOR_READ)
         if self._opened.known is not None:
-            self._opened.known.note(told, address, found.id)
+            self._opened.known.note(reported, address, found.id)
         return session
 
     def close(self) -> None:

@@ -57,7 +57,7 @@ class Sample:
     """Why this cycle brought nothing; empty where it did."""
 
 
-def told_value(reading: Reading, clock: Clock) -> DriveValue:
+def value_from(reading: Reading, clock: Clock) -> DriveValue:
     """A reading as a script has it."""
     return DriveValue(
         reading.parameter.code,

@@ -29,7 +29,7 @@ from ..read.verdict import SlotMatch
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .exchange import exchange
 from .mapping import BlockView, Force, Mapper
-from .outputs import Meant, example, meant, refuse_pending, values_text
+from .outputs import ConfirmedWrite, example, intended, refuse_pending, values_text
 from .proposals import Proposals
 from .user_words import load_words, read_words, save_words
 from .write import at_rest_only, write_assignment
@@ -69,7 +69,7 @@ class BlockEditor:
         return self.session.work.busy_for(self)
 
     @property
-    def said(self) -> Outcome | None:
+    def message(self) -> Outcome | None:
         """What the last work on the drive has come to."""
         return self.session.work.outcome
 
@@ -173,7 +173,7 @@ class BlockEditor:
         """What may be typed to write through the outputs. Raises MappingError."""
         return example(self.session.profile, self._outputs(), self.session.image.raws)
 
-    def meant(self, text: str) -> Meant:
+    def intended(self, text: str) -> ConfirmedWrite:
         """What `LFRD=1500 ACC=5.0` would write through the outputs of now, and what follows.
 
         Raises ValueRefused, UnknownParameter and MappingError with what is wrong.
@@ -183,9 +183,9 @@ class BlockEditor:
         read = next((b for b in self.proposals.blocks if b.direction == "read"), None)
         inputs = self.proposals.today(read) if read else None
         raws = session.image.raws
-        return meant(session.profile, session.device, outputs, inputs, raws, text)
+        return intended(session.profile, session.device, outputs, inputs, raws, text)
 
-    def exchange(self, agreed: Meant, stamp: int | None = None) -> None:
+    def exchange(self, agreed: ConfirmedWrite, stamp: int | None = None) -> None:
         """Write through the outputs what a person has agreed to; returns at once."""
         session = self.session
 

@@ -233,11 +233,11 @@ class Mapper:
         if raw is None or parameter is None:
             return Slot(slot, raw, word=word, verdict=SlotMatch.NONE)
         force, brings = self._force(proof, slot, raw)
-        told = replace(now, direct=direct.get(parameter.code), force=force, brings=brings)
+        reported = replace(now, direct=direct.get(parameter.code), force=force, brings=brings)
         if word is None or word_count(parameter) != 1:
-            return replace(told, word=None)
+            return replace(reported, word=None)
         if word == self.session.profile.data.reading.unknown_word:
-            return replace(told, verdict=SlotMatch.NONE)
+            return replace(reported, verdict=SlotMatch.NONE)
         verdict, through = proof.verdict(slot, parameter.code), from_words(parameter, [word])
         if (
             verdict is SlotMatch.MOVING
@@ -250,7 +250,7 @@ class Mapper:
         if verdict is SlotMatch.DIFFERS and proof.block.direction == "read":
             # it is not this parameter's value: it gets neither its scale nor its unit
             text = f"raw {word}"
-        return replace(told, word=through, text=text, verdict=verdict)
+        return replace(reported, word=through, text=text, verdict=verdict)
 
     def _text(self, parameter: Parameter, raw: int) -> str:
         profile, retrying = self.session.profile, self._asker

@@ -18,7 +18,7 @@ REFERENCE_QUANTITIES = frozenset({"command_frequency", "command_speed"})
 
 
 @dataclass(frozen=True, slots=True)
-class Meant:
+class ConfirmedWrite:
     """Values for outputs as a person agrees to them, with the slots as they were seen then."""
 
     outputs: Assignment
@@ -48,7 +48,7 @@ def example(
     )
 
 
-def meant(
+def intended(
     profile: Profile,
     device: int,
     outputs: Assignment,
@@ -56,7 +56,7 @@ def meant(
     raws: Mapping[str, int],
     text: str,
     absent: Collection[str] = (),
-) -> Meant:
+) -> ConfirmedWrite:
     """What a text like `LFRD=1500 ACC=5.0` means.
 
     `raws` are known raw values, for scales; `absent` are codes that the drive lacks. Raises
@@ -79,7 +79,7 @@ def meant(
     lines.append(
         f"Frame: {hex_text(block_request(profile, device, inputs, outputs, words, places))}"
     )
-    return Meant(outputs, inputs, wanted, "\n".join(lines))
+    return ConfirmedWrite(outputs, inputs, wanted, "\n".join(lines))
 
 
 def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:

@@ -64,8 +64,8 @@ def save_words(session: DriveSession, words: UserWords) -> str:
 
 
 def _kept() -> dict[str, object]:
-    told = stored_json(_file())
-    return told if isinstance(told, dict) else {}
+    reported = stored_json(_file())
+    return reported if isinstance(reported, dict) else {}
 
 
 def _key(session: DriveSession) -> str:

@@ -129,8 +129,8 @@ class _Writing:
         held = await self.retrying.ask_raws(self.plan.block.slots)
         missing = [slot for slot in self.plan.block.slots if slot not in held]
         if missing:
-            said = self.retrying.why_absent(missing[0])
-            raise AssignmentRefused(self.so_far(f"{missing[0]} cannot be read: {said}"))
+            message = self.retrying.why_absent(missing[0])
+            raise AssignmentRefused(self.so_far(f"{missing[0]} cannot be read: {message}"))
         return held
 
     async def _may(self) -> None:

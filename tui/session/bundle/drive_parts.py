@@ -72,7 +72,7 @@ class _Drive:
         """The diagnosis."""
         subject = self._subject
         found = await self._diagnosis()
-        if subject.opened is not None and not found.sight.heard.asked:
+        if subject.opened is not None and not found.sight.heard.requested:
             self._withheld = f"Nothing was sent to the drive. {found.text}"
         session = None
         if found.well:

@@ -27,7 +27,7 @@ from ..reading import Reading
 from ..settings.write import Writer
 from ..work import Permit
 from .given import GivenCommands
-from .way_out import told_anywhere
+from .way_out import block_reason_text
 
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
@@ -81,7 +81,7 @@ class CommandAccess:
             raise OrderRefused(f"This drive is not commanded from here: {name}.")
         held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
         if held is not None:
-            raise OrderRefused(told_anywhere(held))
+            raise OrderRefused(block_reason_text(held))
         return found
 
     async def state(self, chart: Chart) -> State:

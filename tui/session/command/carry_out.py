@@ -22,7 +22,7 @@ from .reference import (
     step_in,
     within_limits,
 )
-from .way_out import told_anywhere
+from .way_out import block_reason_text
 
 STILL_IN_FAULT = "sent, but the drive is still in fault, as long as its cause is there"
 
@@ -75,7 +75,7 @@ async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -
     if (then := chart_in_force(profile, raws)) is None:
         then = chart
     if (held := held_back(profile, then, id, raws)) is not None:
-        raise OrderRefused(told_anywhere(held))
+        raise OrderRefused(block_reason_text(held))
     if refusal := state_refusal(profile, then, id, raws):
         raise OrderRefused(refusal)
     await check_scale(access)

@@ -66,10 +66,10 @@ class Commander:
         Raises OrderRefused where the line is read-only or lost, or the drive is not to be armed.
         """
         session = self.session
-        asked = session.work.stops if stamp is None else stamp
+        requested = session.work.stops if stamp is None else stamp
         refused = session.line.read_only or bool(session.arming.barred)
         if refused or session.state(STATE_FRESH).kind != "unknown":
-            session.work.arm(asked, seconds)
+            session.work.arm(requested, seconds)
             return
 
         async def work(_permit: Permit) -> str:
@@ -78,7 +78,7 @@ class Commander:
             await Reader(session).read(dict.fromkeys(codes))
             if session.state(STATE_FRESH).kind == "unknown":
                 raise OrderRefused("The state of the drive is not known; nothing is commanded.")
-            session.work.arm(asked, seconds)
+            session.work.arm(requested, seconds)
             return ""
 
         session.work.put(Task(work, owner=self, armed=False))

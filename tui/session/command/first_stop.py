@@ -46,9 +46,9 @@ class SentFirst:
     def text(self) -> str:
         """For a person: which word went where, whom it stops, what was said to it."""
         names = [family.name for family in self.what.families]
-        whom = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
-        said = "" if self.taken else f" ({self.answer})"
-        return f"16#{self.what.word:04X} to {self.what.code}, the stop of {whom}{said}"
+        target = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+        message = "" if self.taken else f" ({self.answer})"
+        return f"16#{self.what.word:04X} to {self.what.code}, the stop of {target}{message}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,20 +165,23 @@ async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> 
 
 async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord) -> SentFirst:
     """Write the word, once. It goes into the journal whatever becomes of it."""
-    answer = told = "a signal came: not known whether it was taken"
+    answer = reported = "a signal came: not known whether it was taken"
     try:
         await line.write(device, what.address, [what.word], priority=Priority.STOP)
-        answer = told = "ok"
+        answer = reported = "ok"
     except DeviceException as error:
-        answer, told = str(error), "refused"
+        answer, reported = str(error), "refused"
     except ExchangeError as error:
-        answer, told = str(error), "no answer" if isinstance(error, NoAnswer) else "no good answer"
+        answer, reported = (
+            str(error),
+            "no answer" if isinstance(error, NoAnswer) else "no good answer",
+        )
     except LineError as error:
-        answer = told = str(error)
+        answer = reported = str(error)
         raise
     finally:
         journal.add(_entry(line, device, what, answer))
-    return SentFirst(what, told)
+    return SentFirst(what, reported)
 
 
 def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry:

@@ -94,7 +94,7 @@ class LastStop:
             self.send(session, ordered, error, taken=True)
 
     def _record(self, session: DriveSession, why: str) -> None:
-        session.told_by_line = True
+        session.reported_by_line = True
         for write in session.prepared:
             if not isinstance(write.request, WriteOne):
                 continue

@@ -214,7 +214,7 @@ class MotorStop:
         self._tell_sent(order)
 
     def _mark_commanded(self) -> None:
-        self.session.told_by_line = True
+        self.session.reported_by_line = True
 
     def _tell_sent(self, order: Order) -> None:
         """The words have gone out: it stops, unless something else is known to run the motor."""
@@ -236,7 +236,7 @@ class MotorStop:
             kind, hertz = await self._motion(chart)
             if not hertz and kind in STANDING:
                 self._tell_standing()
-                self.session.stir()
+                self.session.request_full_read()
                 return None
             if hertz == 0 and kind == "running" and ending is not None:
                 # at 0 Hz and enabled by the very word that has stopped it

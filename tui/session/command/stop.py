@@ -214,8 +214,8 @@ class Stopper:
             if self._events is not None:
                 kind = "failed" if phase in NOT_STOPPING else "stop"
                 head = "Stopping: " if phase is Phase.STOPPING else ""
-                said = f"{head}{text}" if head else f"{text[:1].upper()}{text[1:]}"
-                self._events.add(kind, said, session.device)
+                message = f"{head}{text}" if head else f"{text[:1].upper()}{text[1:]}"
+                self._events.add(kind, message, session.device)
             log.info("stop of device %s: %s, %s", session.device, phase, text)
 
     async def _behind_wave(

@@ -18,7 +18,7 @@ def way_by_key(held: HeldBack) -> str:
     return KEYS.get(held.way, held.remedy)
 
 
-def told_anywhere(held: HeldBack) -> str:
+def block_reason_text(held: HeldBack) -> str:
     """What speaks against a command with the way out, where the panel may not be open."""
     key = KEYS.get(held.way, "")
     return " ".join(

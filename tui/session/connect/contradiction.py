@@ -9,7 +9,7 @@ from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 
-from .identify import DriveIdentity, identity_told
+from .identify import DriveIdentity, confirmed_identity
 from .identifying import Askable, ask_identification, intact
 
 BRIEFLY = 0.4
@@ -52,7 +52,7 @@ async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdenti
         )
     except NoAnswer:
         return None
-    return await identity_told(device, answer) if answer is not None else None
+    return await confirmed_identity(device, answer) if answer is not None else None
 
 
 async def read_status(line: Askable, device: int, profile: Profile, priority: Priority) -> bool:
@@ -86,10 +86,10 @@ def _may_be(reference: str, profile: Profile) -> bool:
     if not prefixes:
         return True
     # what all kinds of a family begin with; a reference may be cut short
-    stem, told = min(prefixes), reference.upper()
+    stem, reported = min(prefixes), reference.upper()
     while not all(one.startswith(stem) for one in prefixes):
         stem = stem[:-1]
-    return told.startswith(stem) or stem.startswith(told)
+    return reported.startswith(stem) or stem.startswith(reported)
 
 
 def _with_article(name: str) -> str:

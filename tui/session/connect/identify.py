@@ -74,7 +74,7 @@ async def identify_drive(
     for _ in range(1 if priority >= Priority.BACKGROUND else 2):
         left -= 1
         try:
-            return await identity_told(device, await line.identify(device, priority=priority))
+            return await confirmed_identity(device, await line.identify(device, priority=priority))
         except DeviceException:
             return _nameless(device)
         except (ChecksumFault, WrongReply):
@@ -90,11 +90,11 @@ async def identify_drive(
         tries=left, healthy=bool(there.families),
     )  # fmt: skip
     if answer is not None:
-        return await identity_told(device, answer)
+        return await confirmed_identity(device, answer)
     return _nameless(device, there.families)
 
 
-async def identity_told(device: int, answer: IdentificationObjects) -> DriveIdentity:
+async def confirmed_identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
     """Who a drive is by its answer to function 43; looks for fitting profiles in a thread."""
     return await asyncio.to_thread(identity_from, device, answer)
 
@@ -139,7 +139,7 @@ async def _identified(
                 tries=TRIES if function == IDENTIFY else 1, healthy=bool(there.families),
             )  # fmt: skip
         if answer is not None and (answer.objects.get(REFERENCE) or function == IDENTIFY):
-            return ScanResult(device, await identity_told(device, answer), by=how)
+            return ScanResult(device, await confirmed_identity(device, answer), by=how)
     # that it has no such functions makes it no silent one: its last answer is what counts
     if there.families and not await control():
         raise NotIdentified(device)

@@ -70,14 +70,16 @@ class KnownLine:
             if not self._name.key:
                 return
             now = _mark_of(identity, profile)
-            if not any(now.said) and not now.profile:
+            if not any(now.stated) and not now.profile:
                 return
             before = self._remembered().drives.get(device)
             self._found[device] = now
-            told = ""
+            reported = ""
             if before is not None and not before.fits(now):
-                told = f"Device {device} was {plain(before.text)}, and is {plain(now.text)} now."
-            self._say(device, told)
+                reported = (
+                    f"Device {device} was {plain(before.text)}, and is {plain(now.text)} now."
+                )
+            self._say(device, reported)
             if device not in self._changed and None not in self._changed and before != now:
                 self._keep()
 
@@ -92,10 +94,10 @@ class KnownLine:
             self._line.held = ""
             self._keep()
 
-    def _say(self, what: int | None, told: str) -> None:
+    def _say(self, what: int | None, reported: str) -> None:
         """What is with the adapter or a device now; the line is held while anything differs."""
         others = {key: text for key, text in self._changed.items() if key != what}
-        self._changed = {**others, what: told} if told and not self._accepts else others
+        self._changed = {**others, what: reported} if reported and not self._accepts else others
         reason = f"Nothing is written to this line: {self.text} {self.way}"
         self._line.held = reason if self._changed else ""
 
@@ -149,14 +151,14 @@ class KnownLine:
 def _mark_of(identity: DriveIdentity | None, profile: str) -> DriveMark:
     if identity is None:
         return DriveMark(profile=profile)
-    said = (identity.vendor, identity.reference, identity.version, identity.name)
-    vendor, reference, version, name = (text[:LONGEST_SAID] for text in said)
+    stated = (identity.vendor, identity.reference, identity.version, identity.name)
+    vendor, reference, version, name = (text[:LONGEST_SAID] for text in stated)
     return DriveMark(vendor, reference, version, name, profile or identity.profile or "")
 
 
 def _fuller(before: DriveMark | None, now: DriveMark) -> DriveMark:
     """What is known of a drive that said less of itself this time."""
-    if before is not None and any(before.said) and not any(now.said) and before.fits(now):
+    if before is not None and any(before.stated) and not any(now.stated) and before.fits(now):
         return before
     return now
 

@@ -42,23 +42,23 @@ class DriveMark:
     profile: str = ""
 
     @property
-    def said(self) -> tuple[str, ...]:
+    def stated(self) -> tuple[str, ...]:
         """What it says of itself; texts that are all empty where it says nothing."""
         return self.vendor, self.reference, self.version, self.name
 
     def fits(self, now: DriveMark) -> bool:
         """Whether it may be the same drive; by the profile where one of them says nothing."""
-        if any(self.said) and any(now.said):
-            return self.said == now.said
+        if any(self.stated) and any(now.stated):
+            return self.stated == now.stated
         return not (self.profile and now.profile) or self.profile == now.profile
 
     @property
     def text(self) -> str:
         """The drive in a few words."""
-        told = " ".join(part for part in (self.reference or self.vendor, self.name) if part)
+        name_text = " ".join(part for part in (self.reference or self.vendor, self.name) if part)
         shown = version_shown(self.profile, self.version)
         version = f"version {shown}" if shown else ""
-        return ", ".join(part for part in (told, version) if part) or self.profile or "a drive"
+        return ", ".join(part for part in (name_text, version) if part) or self.profile or "a drive"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ def load_memory() -> LinesMemory:
         return LinesMemory()
     if not isinstance(stored, dict):
         return LinesMemory()
-    lines = {key: _line_mark(told) for key, told in _table(stored, "lines").items()}
+    lines = {key: _line_mark(name_text) for key, name_text in _table(stored, "lines").items()}
     names = {typed: key for typed, key in _table(stored, "names").items() if isinstance(key, str)}
     return LinesMemory({key: one for key, one in lines.items() if one is not None}, names)
 
@@ -153,17 +153,17 @@ def keep_memory(memory: LinesMemory) -> None:
     part.replace(file)
 
 
-def _table(told: Mapping[str, Any], key: str) -> dict[str, Any]:
-    found = told.get(key)
+def _table(name_text: Mapping[str, Any], key: str) -> dict[str, Any]:
+    found = name_text.get(key)
     return found if isinstance(found, dict) else {}
 
 
-def _line_mark(told: object) -> LineMark | None:
-    if not isinstance(told, dict):
+def _line_mark(name_text: object) -> LineMark | None:
+    if not isinstance(name_text, dict):
         return None
-    adapter = told.get("adapter")
+    adapter = name_text.get("adapter")
     drives = {}
-    for device, mark in _table(told, "drives").items():
+    for device, mark in _table(name_text, "drives").items():
         if device.isdecimal() and isinstance(mark, dict):
             texts = {one.name: mark.get(one.name, "") for one in fields(DriveMark)}
             if all(isinstance(text, str) for text in texts.values()):

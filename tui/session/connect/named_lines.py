@@ -83,10 +83,10 @@ def line_settings() -> LineSettings:
     """What the settings file says, read anew where it has changed; raises nothing."""
     path = settings_file()
     try:
-        told = os.stat(path)
+        reported = os.stat(path)
     except OSError:
         return LineSettings(path)
-    return _read(path, (told.st_mtime_ns, told.st_size, told.st_ino))
+    return _read(path, (reported.st_mtime_ns, reported.st_size, reported.st_ino))
 
 
 def is_name(text: str) -> bool:
@@ -170,20 +170,20 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
         if key != LINES_TABLE or not isinstance(value, dict):
             faults.append(((key,), f"only a table [{LINES_TABLE}] is known here"))
             continue
-        for name, told in list(value.items())[:MOST_NAMED]:
-            if fault := next(_faults(name, told, found), None):
+        for name, reported in list(value.items())[:MOST_NAMED]:
+            if fault := next(_faults(name, reported, found), None):
                 faults.append(fault)
             else:
-                found[name.casefold()] = _named(name, told)
+                found[name.casefold()] = _named(name, reported)
                 at[name.casefold()] = f"{path}:{places.get((key, name), 1)}: {key}.{name}"
-    told_faults = (
+    fault_texts = (
         f"{path}:{places.get(key, 1)}: {'.'.join(map(str, key))}: {fault}." for key, fault in faults
     )
-    return LineSettings(path, found, tuple(told_faults), text, at)
+    return LineSettings(path, found, tuple(fault_texts), text, at)
 
 
 def _faults(
-    name: str, told: object, others: Mapping[str, NamedLine]
+    name: str, reported: object, others: Mapping[str, NamedLine]
 ) -> Iterator[tuple[TomlPath, str]]:
     """What is wrong with one name."""
     here: TomlPath = (LINES_TABLE, name)
@@ -192,33 +192,33 @@ def _faults(
     elif name.casefold() in others:
         yield here, f"{others[name.casefold()].name} is this name already"
     row = here
-    if isinstance(told, dict):
-        row = (*here, "line") if "line" in told else here
-    elif isinstance(told, str):
-        told = {"line": told}
+    if isinstance(reported, dict):
+        row = (*here, "line") if "line" in reported else here
+    elif isinstance(reported, str):
+        reported = {"line": reported}
     else:
         yield here, f"a LINE in quotes, or a table with {', '.join(_KEYS)}, is wanted"
         return
-    for key in told:
+    for key in reported:
         if key not in _KEYS:
             yield (*here, key), f"only {', '.join(_KEYS)} are known here"
-    line = told.get("line")
+    line = reported.get("line")
     if not isinstance(line, str) or not line.strip() or is_name(line.strip()):
         yield row, "`line` has to be a LINE in quotes"
-    device, profile = told.get("device"), told.get("profile")
-    if "device" in told and (type(device) is not int or device not in _DEVICES):
+    device, profile = reported.get("device"), reported.get("profile")
+    if "device" in reported and (type(device) is not int or device not in _DEVICES):
         yield (*here, "device"), f"a slave address from 1 to 247 is wanted, not {device!r}"
-    if "profile" in told and (not isinstance(profile, str) or not profile.strip()):
+    if "profile" in reported and (not isinstance(profile, str) or not profile.strip()):
         yield (*here, "profile"), "the id of a profile in quotes is wanted"
 
 
-def _named(name: str, told: Any) -> NamedLine:
-    told = {"line": told} if isinstance(told, str) else told
-    profile = told.get("profile")
+def _named(name: str, reported: Any) -> NamedLine:
+    reported = {"line": reported} if isinstance(reported, str) else reported
+    profile = reported.get("profile")
     return NamedLine(
         name,
-        told["line"].strip(),
-        told.get("device"),
+        reported["line"].strip(),
+        reported.get("device"),
         profile.strip().lower() if profile else None,
     )
 

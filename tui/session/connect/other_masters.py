@@ -42,9 +42,9 @@ class Overheard:
     def text(self) -> str:
         """Who is there, in a sentence: what is asked of which addresses; empty for nobody."""
         if self.requests:
-            asked = dict.fromkeys(one.device for one in self.requests)
-            told = "; ".join(f"address {device}: {self._of(device)}" for device in asked)
-            return f"Another master asks drives on this line. {told[0].upper()}{told[1:]}."
+            requested = dict.fromkeys(one.device for one in self.requests)
+            reported = "; ".join(f"address {device}: {self._of(device)}" for device in requested)
+            return f"Another master asks drives on this line. {reported[0].upper()}{reported[1:]}."
         if self.answered:
             who = addresses_text(self.answered)
             return f"Another master asks drives on this line: {who} answered it."

@@ -56,7 +56,7 @@ class Search:
         self.devices = tuple(devices)
         self.of = len(self.devices)
         """How many addresses are asked in this round."""
-        self.asked = 0
+        self.requested = 0
         """How many of them are being asked or were."""
         self.at: int | None = None
         """The address that is being asked."""
@@ -86,7 +86,7 @@ class Search:
         """
         if self.ended or not self.cost:
             return 0.0
-        still = self.of - self.asked
+        still = self.of - self.requested
         if self.again:
             return still * max(self._cost_again, self._silent.mean)
         first = still * max(self.cost, self._silent.mean)
@@ -100,10 +100,10 @@ class Search:
         found = f"{len(self.answered)} found"
         if self.ended:
             return f"{self.ended}, {found}"
-        return f"{self.asked} of {self.of} again" if self.again else self._first_round(found)
+        return f"{self.requested} of {self.of} again" if self.again else self._first_round(found)
 
     def _first_round(self, found: str) -> str:
-        return f"{self.asked} of {self.of}, {found}"
+        return f"{self.requested} of {self.of}, {found}"
 
     async def run(self, line: ModbusLine, found: Found) -> None:
         """Search; `found` hears of every address that is not silent.
@@ -111,7 +111,7 @@ class Search:
         What is wrong with one address ends nothing. Raises LineClosed and LineLost.
         """
         try:
-            if await self._said_at_once(line, found):
+            if await self._refused_at_once(line, found):
                 self.ended = "done"
                 return
             wait = line.timing.scan_timeout
@@ -136,21 +136,21 @@ class Search:
             self.ended = self.ended or "stopped"
             self.at = None
 
-    async def _said_at_once(self, line: ModbusLine, found: Found) -> bool:
+    async def _refused_at_once(self, line: ModbusLine, found: Found) -> bool:
         """Whether the one device that was named has said who it is.
 
         It is asked before all profiles are read, of which the questions to strangers are made:
         that takes longer than most drives do to say it.
         """
-        if len(self.devices) != 1 or self.devices[0] in line.facts.hushed:
+        if len(self.devices) != 1 or self.devices[0] in line.facts.paused:
             return False
         (device,) = self.devices
         self._between()
-        self.asked, self.at = 1, device
-        asked_first = (PresenceProbe(None),)
+        self.requested, self.at = 1, device
+        first_probe = (PresenceProbe(None),)
         try:
             result = await find_drive(
-                line, device, asked_first, priority=Priority.BACKGROUND, within=None
+                line, device, first_probe, priority=Priority.BACKGROUND, within=None
             )
         except (LineClosed, LineLost):
             raise
@@ -172,16 +172,16 @@ class Search:
         within: float | None,
     ) -> list[int]:
         """Ask these addresses; returns those that were silent."""
-        self.asked, self.of, self._silent = 0, len(devices), _SilentTimes()
+        self.requested, self.of, self._silent = 0, len(devices), _SilentTimes()
         silent: list[int] = []
         asks = _Considerate(line, self._rests)
         for number, device in enumerate(devices, start=1):
             self._between()
-            self.asked, self.at, began = number, device, self._now()
-            if hushed := line.facts.hushed.get(device):
+            self.requested, self.at, began = number, device, self._now()
+            if paused := line.facts.paused.get(device):
                 # left alone on purpose: it is there, and not silent
                 self.answered |= {device}
-                await found(ScanResult(device, None, hushed[1], LEFT_ALONE))
+                await found(ScanResult(device, None, paused[1], LEFT_ALONE))
                 continue
             try:
                 result = await find_drive(

@@ -124,14 +124,14 @@ def frames_since(before: int, now: int, sent: Bounds) -> int | None:
 
 def differences(found: Comparison) -> list[Difference]:
     """What the drive's counters show, the certain part of it; empty if all agrees."""
-    told = [Difference("counted-anew", 0, COUNTED_ANEW)] if found.anew else []
+    reported = [Difference("counted-anew", 0, COUNTED_ANEW)] if found.anew else []
     if found.counts_this_line is False:
         text = (
             f"{_frames(found.answered.low)} were answered and {found.frames} counted: these"
             " counters are those of another port than this line leads to, or were reset."
         )
-        return [*told, Difference("another-port", found.answered.low - found.frames, text)]
-    return [*told, *_differences(found)]
+        return [*reported, Difference("another-port", found.answered.low - found.frames, text)]
+    return [*reported, *_differences(found)]
 
 
 def _differences(found: Comparison) -> Iterator[Difference]:

@@ -256,7 +256,7 @@ class CounterWatch:
             self.session.device,
             tcp=isinstance(self.session.line.link, TcpLink),
         )
-        return replace(found, differences=(*_told(found.compared, since), *strays))
+        return replace(found, differences=(*_differences_since(found.compared, since), *strays))
 
 
 def _reset_entry(session: DriveSession, answer: str) -> Entry:
@@ -268,12 +268,12 @@ def _reset_entry(session: DriveSession, answer: str) -> Entry:
     )  # fmt: skip
 
 
-def _told(mine: Comparison | None, since: DeviceCounters) -> tuple[Difference, ...]:
+def _differences_since(mine: Comparison | None, since: DeviceCounters) -> tuple[Difference, ...]:
     """By the counters of this port; by ours alone where there are none."""
-    told = differences(mine) if mine is not None else []
-    if any(one.kind == "not-answered" for one in told):
-        return tuple(told)
+    reported = differences(mine) if mine is not None else []
+    if any(one.kind == "not-answered" for one in reported):
+        return tuple(reported)
     more = own_differences(since)
     if mine is not None:
         more = [one for one in more if one.kind == "damaged-here"]
-    return (*told, *more)
+    return (*reported, *more)

@@ -150,7 +150,7 @@ async def _heard(
         # replies come later than their requests
         await REAL_CLOCK.sleep(FRAMES_COME_WITHIN)
     heard = heard_of((frame for frame in line.trace if frame.time > last), device, tcp=tcp)
-    return heard if heard.asked >= len(outcomes) else heard_by_errors(outcomes, device)
+    return heard if heard.requested >= len(outcomes) else heard_by_errors(outcomes, device)
 
 
 def last_time(frames: Sequence[Frame]) -> float:

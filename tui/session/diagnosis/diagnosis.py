@@ -45,11 +45,11 @@ def diagnosed(sight: Sight) -> Diagnosis:
                 rung.id, rung.says(sight), tuple(rung.steps(sight)), sight, sure, others
             )
     heard = sight.heard
-    if not heard.asked:
+    if not heard.requested:
         return Diagnosis(UNOPENED, NOTHING_SEEN, (OPEN_IT,), sight)
     after = f", {sight.turnaround * 1000:.0f} ms after each request" if sight.turnaround else ""
     measure = sight.measure
-    sent = heard.asked + (measure.asked if measure is not None else 0)
+    sent = heard.requested + (measure.requested if measure is not None else 0)
     answered = heard.answered + (measure.answered if measure is not None else 0)
     text = f"Address {sight.device} answers: {answered} of {sent} requests{after}."
     if sight.idle:

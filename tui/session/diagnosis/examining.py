@@ -85,7 +85,7 @@ async def _examined(
         return sight
     heard = sight.heard
     unreached = heard.nothing or not (heard.answered or set(heard.exceptions) - GATEWAY_REFUSALS)
-    if not isinstance(line.link, SerialLink) and (cut or (heard.asked and unreached)):
+    if not isinstance(line.link, SerialLink) and (cut or (heard.requested and unreached)):
         return replace(sight, works=await probed(line, device, beside=not heard.exceptions))
     # a good reply of the last minute: the baud and the format are right, however few come now
     good = line.counters.devices.get(device, DeviceCounters()).minute.good

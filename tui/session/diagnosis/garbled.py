@@ -14,7 +14,7 @@ SAME_SPEED = 1.3
 """Times by which the bytes that came may differ from those due where the speed is the same."""
 
 
-def speed_told(sight: Sight) -> str:
+def speed_text(sight: Sight) -> str:
     """What so many bytes in place of those due say: a receiver at half the speed gets half."""
     came, due = sight.heard.compared
     if not came or not due:

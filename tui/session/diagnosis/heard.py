@@ -23,7 +23,7 @@ LATE_NOTE = "late"
 class Heard:
     """Counts of what was heard of one drive, and in its place."""
 
-    asked: int = 0
+    requested: int = 0
     answered: int = 0
     late: int = 0
     """Answers that came after the time for them was up."""
@@ -81,8 +81,8 @@ def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> 
     """What is heard with one more exchange."""
     if not request:
         return found
-    found = replace(found, asked=found.asked + 1)
-    asked = request[TCP_HEAD:] if tcp else request[:-2]
+    found = replace(found, requested=found.requested + 1)
+    requested = request[TCP_HEAD:] if tcp else request[:-2]
     loose, alone = b"", True
     for frame in answers:
         data = frame.data
@@ -90,44 +90,44 @@ def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> 
             found = replace(found, echoed=found.echoed + 1)
         elif tcp or is_whole(data):
             body = data[TCP_HEAD:] if tcp else data[:-2]
-            found = _with_whole(found, asked, body, late=frame.note.startswith(LATE_NOTE))
+            found = _with_whole(found, requested, body, late=frame.note.startswith(LATE_NOTE))
             alone = False
         else:
             loose += data
-    return _with_loose(found, asked, loose, alone=alone)
+    return _with_loose(found, requested, loose, alone=alone)
 
 
-def _with_whole(found: Heard, asked: bytes, body: bytes, *, late: bool) -> Heard:
+def _with_whole(found: Heard, requested: bytes, body: bytes, *, late: bool) -> Heard:
     """One whole frame more: address, function and data."""
     device, function = body[0], body[1]
-    if device != asked[0]:
+    if device != requested[0]:
         return replace(found, others=_once(found.others, device))
-    if function == asked[1] | REFUSED:
+    if function == requested[1] | REFUSED:
         return replace(found, exceptions=(*found.exceptions, body[-1]))
-    if function != asked[1]:
+    if function != requested[1]:
         return replace(found, functions=_once(found.functions, function))
-    if function in REGISTER_READS and len(body) != due_bytes(asked) - 2:
+    if function in REGISTER_READS and len(body) != due_bytes(requested) - 2:
         return replace(found, misshapen=found.misshapen + 1)
     if late:
         return replace(found, late=found.late + 1)
     return replace(found, answered=found.answered + 1)
 
 
-def _with_loose(found: Heard, asked: bytes, loose: bytes, *, alone: bool) -> Heard:
+def _with_loose(found: Heard, requested: bytes, loose: bytes, *, alone: bool) -> Heard:
     if not loose:
         return found
-    if loose[:2] in (asked[:2], bytes([asked[0], asked[1] | REFUSED])):
+    if loose[:2] in (requested[:2], bytes([requested[0], requested[1] | REFUSED])):
         return replace(found, damaged=found.damaged + 1)
     found = replace(found, garbage=found.garbage + len(loose))
-    if asked[1] in REGISTER_READS and alone:
+    if requested[1] in REGISTER_READS and alone:
         came, due = found.compared
-        found = replace(found, compared=(came + len(loose), due + due_bytes(asked)))
+        found = replace(found, compared=(came + len(loose), due + due_bytes(requested)))
     return found
 
 
-def due_bytes(asked: bytes) -> int:
+def due_bytes(requested: bytes) -> int:
     """Bytes of the frame that answers a read, from address to checksum; of a request without it."""
-    return 5 + 2 * int.from_bytes(asked[4:6], "big")
+    return 5 + 2 * int.from_bytes(requested[4:6], "big")
 
 
 def _once(known: tuple[int, ...], new: int) -> tuple[int, ...]:
@@ -138,7 +138,7 @@ def heard_by_errors(outcomes: Iterable[LineError | None], device: int) -> Heard:
     """The same where no frames are at hand: from how the requests ended, None being an answer."""
     found = Heard()
     for outcome in outcomes:
-        found = replace(found, asked=found.asked + 1)
+        found = replace(found, requested=found.requested + 1)
         match outcome:
             case None:
                 found = replace(found, answered=found.answered + 1)
@@ -156,5 +156,5 @@ def heard_by_errors(outcomes: Iterable[LineError | None], device: int) -> Heard:
             case NoAnswer(detail=detail):
                 found = replace(found, echoed=found.echoed + ("echo" in detail))
             case _:
-                found = replace(found, asked=found.asked - 1)
+                found = replace(found, requested=found.requested - 1)
     return found

@@ -30,7 +30,7 @@ TRANSACTION_BYTES = 2
 class Measure:
     """Counts of many short reads of one drive; `seconds` is the time they took."""
 
-    asked: int = 0
+    requested: int = 0
     answered: int = 0
     lost: int = 0
     damaged: int = 0
@@ -70,7 +70,7 @@ class Measure:
     @property
     def one_behind(self) -> bool:
         """True if requests get the reply to the one before; a repeated one gets its own."""
-        return self.behind > 1 and self.behind > self.late and self.behind * 3 >= self.asked
+        return self.behind > 1 and self.behind > self.late and self.behind * 3 >= self.requested
 
     def decide(self, paused: Measure) -> None:
         """Settle from reads with pauses if surplus replies are copies or a second drive's.
@@ -145,7 +145,7 @@ def measure_of(
 
 def _end(found: Measure, one: _Exchange) -> None:
     """Count an exchange that is over."""
-    found.asked += 1
+    found.requested += 1
     found.answered += bool(one.replies)
     found.lost += not one.replies and not one.sick
     if one.older and (one.replies or one.damaged or one.older == "second"):

@@ -9,7 +9,7 @@ from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefus
 from tui.bus.limits import STANDARD_EXCEPTIONS
 
 from . import next_steps as steps
-from .garbled import speed_told
+from .garbled import speed_text
 from .gateway_probe import GATEWAY_CODES, gateway_codes
 from .rung import Rung, first_sentence
 from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS
@@ -99,7 +99,7 @@ def _garbled(sight: Sight) -> bool:
 
 
 def _says_garbled(sight: Sight) -> str:
-    errors, told = sight.errors, speed_told(sight)
+    errors, reported = sight.errors, speed_text(sight)
     counted = [
         f"{count} {what}"
         for count, what in (
@@ -111,8 +111,10 @@ def _says_garbled(sight: Sight) -> str:
     ]
     if counted:
         seen = f"the port counted {' and '.join(counted)}"
-        told = f"{seen}; {told}" if told else seen
-    return f"The baud or the format of the line is not that of the drive: {told or _loose(sight)}."
+        reported = f"{seen}; {reported}" if reported else seen
+    return (
+        f"The baud or the format of the line is not that of the drive: {reported or _loose(sight)}."
+    )
 
 
 def _loose(sight: Sight) -> str:
@@ -125,7 +127,7 @@ def _late(sight: Sight) -> bool:
 
 def _silent(sight: Sight) -> bool:
     heard = sight.heard
-    return bool(heard.asked) and heard.nothing and not heard.echoed
+    return bool(heard.requested) and heard.nothing and not heard.echoed
 
 
 def _says_silent(sight: Sight) -> str:
@@ -145,7 +147,8 @@ def _says_damaged(sight: Sight) -> str:
     broken = f" ({sight.broken} characters the port itself saw broken)" if sight.broken else ""
     count = heard.damaged or 1
     return (
-        f"The drive answers, and {count} of {heard.asked} answers came damaged: the checksum does"
+        f"The drive answers, and {count} of {heard.requested} answers came damaged: the checksum"
+        " does"
         f" not fit{broken}."
     )
 

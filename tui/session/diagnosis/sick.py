@@ -76,14 +76,14 @@ def says_sick(kind: SickFrames, sight: Sight) -> str:
         if one is not kind and measure.count(one.kind)
     ]
     more = f"; also {', '.join(beside)}" if beside else ""
-    return f"In {measure.seconds:.1f} s, {count} of {measure.asked} {kind.text}{more}."
+    return f"In {measure.seconds:.1f} s, {count} of {measure.requested} {kind.text}{more}."
 
 
 def says_two_drives(sight: Sight) -> str:
     """The verdict of two drives at one address."""
     measure = _measure(sight)
     return (
-        f"Two drives have address {sight.device}: {measure.asked} requests got"
+        f"Two drives have address {sight.device}: {measure.requested} requests got"
         f" {measure.second} second replies with other values and {measure.damaged} damaged ones."
     )
 

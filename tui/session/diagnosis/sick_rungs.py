@@ -45,7 +45,7 @@ def _says_behind(sight: Sight) -> str:
     count = sight.measure
     if sight.behind or count is None:
         return f"{ONE_BEHIND}: each request gets the reply to the one before."
-    many = f"{count.behind} of {count.asked} requests"
+    many = f"{count.behind} of {count.requested} requests"
     return f"{ONE_BEHIND}: {many} got the reply to the request before."
 
 

@@ -55,7 +55,7 @@ class GatewayCommanding:
         facts = line.facts
         self._leave = (
             facts.on_stop(self._stopped_elsewhere),
-            facts.on_question(self._asked),
+            facts.on_question(self._requested),
             facts.on_denied(self._denied),
         )
 
@@ -146,7 +146,7 @@ class GatewayCommanding:
         with self._lock:
             self._by.pop(device, None)
 
-    def _asked(self, device: int, program: Program) -> None:
+    def _requested(self, device: int, program: Program) -> None:
         """A program wants a drive, which it gets where the motor stands; in the line's thread."""
         with suppress(LineClosed):
             self._line.spawn(lambda: self._decide(device, program), f"question about {device}")

@@ -61,7 +61,7 @@ class GatewayDrives:
         """Those losses when a device began to say who it is; none where it was silent since."""
         self._candidates: dict[int, tuple[str, ...]] = {}
         """Families of which a nameless device may be."""
-        self._asked: dict[int, tuple[int, float]] = {}
+        self._requested: dict[int, tuple[int, float]] = {}
         """Those losses, and the time, when a device was last asked who it is."""
         self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
         self._charts: dict[int, float] = {}
@@ -86,7 +86,7 @@ class GatewayDrives:
         """Ask a device that answers who it is, beside what else is done; not again and again."""
         sure = self.known(device) is not None and self._is_sure(device)
         if not sure and device not in self._tasks:
-            losses, since = self._asked.get(device, (-1, 0.0))
+            losses, since = self._requested.get(device, (-1, 0.0))
             now = asyncio.get_running_loop().time()
             if losses != self._losses or now - since >= WHO_AGAIN_AFTER:
                 self._begin(device)
@@ -122,7 +122,7 @@ class GatewayDrives:
     def doubt(self, device: int) -> None:
         """It was silent: who it is is asked again before anything but a stop is written to it."""
         self._sure.pop(device, None)
-        self._asked.pop(device, None)
+        self._requested.pop(device, None)
 
     async def read_deciding(
         self, session: DriveSession, codes: Sequence[str], *, hurry: bool
@@ -180,7 +180,7 @@ class GatewayDrives:
 
     def _begin(self, device: int) -> asyncio.Task[DriveSession | None]:
         loop = asyncio.get_running_loop()
-        self._asked[device] = self._losses, loop.time()
+        self._requested[device] = self._losses, loop.time()
         task = loop.create_task(self._identify(device), name=f"who is {device}")
         self._tasks[device] = task
         task.add_done_callback(lambda done: self._ended(device, done))
@@ -234,7 +234,7 @@ class GatewayDrives:
         key = line_name(self.line.link).key
         mark = load_memory().lines.get(key) if key else None
         drive = mark.drives.get(device) if mark is not None else None
-        if drive is None or any(drive.said) or not drive.profile:
+        if drive is None or any(drive.stated) or not drive.profile:
             return ""
         fits = not identity.candidates or drive.profile in identity.candidates
         return drive.profile if fits else ""

@@ -31,8 +31,8 @@ from tui.bus.gateway.pdu import (
     WriteAsked,
     diagnosed_pdu,
     exception_pdu,
-    gateway_asked,
     identified_pdu,
+    parse_request,
     words_pdu,
 )
 from tui.bus.gateway.server import TcpRequest
@@ -63,7 +63,7 @@ class Gateway:
 
     async def close(self) -> list[StopSummary]:
         """Leave all lines alone; what became of the motors that had to be stopped."""
-        return [told for line in self._lines if (told := await line.close()) is not None]
+        return [reported for line in self._lines if (reported := await line.close()) is not None]
 
     def gone(self, client: TcpClient) -> None:
         """A client has closed its connection."""
@@ -85,16 +85,18 @@ class Gateway:
             line.commanding.heard(device, request.client.peer)
             line.drives.keep_chart_known(device)
         try:
-            asked = gateway_asked(request.pdu)
+            requested = parse_request(request.pdu)
         except Unanswerable as refused:
             if function in WRITE_FUNCTIONS:
                 log.info("device %s, client %s: %s", device, request.client.peer, refused)
             return _refused(function, refused.code)
-        if isinstance(asked, WriteAsked):
-            write = line.pending.came(request.client, device, asked.words)
-            return self._write(line, request, asked, write)
-        answer = partial(self._answer, line, device, asked)
-        return self._told(line, device, request, partial(self._in_turn, line, request, answer))
+        if isinstance(requested, WriteAsked):
+            write = line.pending.came(request.client, device, requested.words)
+            return self._write(line, request, requested, write)
+        answer = partial(self._answer, line, device, requested)
+        return self._report_reply(
+            line, device, request, partial(self._in_turn, line, request, answer)
+        )
 
     async def _in_turn(
         self,
@@ -105,7 +107,7 @@ class Gateway:
         async with line.turns.reading(request.client.host):
             return await answer()
 
-    async def _told(
+    async def _report_reply(
         self,
         line: GatewayLine,
         device: int,
@@ -129,28 +131,28 @@ class Gateway:
             return exception_pdu(function, DEVICE_FAILURE)
 
     async def _answer(
-        self, line: GatewayLine, device: int, asked: ReadAsked | DiagnoseAsked | IdentifyAsked
+        self, line: GatewayLine, device: int, requested: ReadAsked | DiagnoseAsked | IdentifyAsked
     ) -> bytes:
-        match asked:
+        match requested:
             case ReadAsked():
-                return await self._read(line, device, asked)
+                return await self._read(line, device, requested)
             case DiagnoseAsked():
-                return await self._diagnose(line, device, asked)
+                return await self._diagnose(line, device, requested)
             case IdentifyAsked():
                 found = await self._identify(line, device)
-                return identified_pdu(asked, found.conformity, found.objects)
+                return identified_pdu(requested, found.conformity, found.objects)
 
-    async def _read(self, line: GatewayLine, device: int, asked: ReadAsked) -> bytes:
+    async def _read(self, line: GatewayLine, device: int, requested: ReadAsked) -> bytes:
         session = line.drives.known(device)
-        if session is not None and session.profile.function(asked.function) is None:
+        if session is not None and session.profile.function(requested.function) is None:
             raise Unanswerable(ILLEGAL_FUNCTION)
         try:
             reply = await line.line.read(
                 device,
-                asked.address,
-                asked.count,
+                requested.address,
+                requested.count,
                 priority=_patience(line.line, device),
-                function=asked.function,
+                function=requested.function,
                 max_age=self._rules.fresh,
             )
         except RequestRefused as refused:
@@ -158,43 +160,47 @@ class Gateway:
         finally:
             if line.line.device_state(device).answers:
                 line.drives.find_out(device)
-        return words_pdu(asked.function, reply.words)
+        return words_pdu(requested.function, reply.words)
 
     async def _write(
-        self, line: GatewayLine, request: TcpRequest, asked: WriteAsked, write: PendingWrite
+        self, line: GatewayLine, request: TcpRequest, requested: WriteAsked, write: PendingWrite
     ) -> bytes:
         try:
-            answer = partial(self._written, line, request, asked, write)
-            return await self._told(line, write.device, request, answer)
+            answer = partial(self._written, line, request, requested, write)
+            return await self._report_reply(line, write.device, request, answer)
         finally:
             line.pending.ended(write)
 
     async def _written(
-        self, line: GatewayLine, request: TcpRequest, asked: WriteAsked, write: PendingWrite
+        self, line: GatewayLine, request: TcpRequest, requested: WriteAsked, write: PendingWrite
     ) -> bytes:
         device = write.device
         # a stop does not wait until a drive that was silent has said again who it is
         session = line.drives.known(device) or await line.drives.found(device)
         if session is not None:
-            return await GatewayWrite(line, session, asked, request, self._rules, write).carry_out()
+            return await GatewayWrite(
+                line, session, requested, request, self._rules, write
+            ).carry_out()
         # a drive that does not say who it is is stopped by a word that stops all it may be
-        session = line.drives.stoppable(device, asked.words)
+        session = line.drives.stoppable(device, requested.words)
         if session is None:
             raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
         try:
-            return await GatewayWrite(line, session, asked, request, self._rules, write).carry_out()
+            return await GatewayWrite(
+                line, session, requested, request, self._rules, write
+            ).carry_out()
         finally:
             line.drives.unknown_again(device)
 
-    async def _diagnose(self, line: GatewayLine, device: int, asked: DiagnoseAsked) -> bytes:
+    async def _diagnose(self, line: GatewayLine, device: int, requested: DiagnoseAsked) -> bytes:
         session = await line.drives.found(device)
         function = session.profile.function(8) if session is not None else None
-        if function is None or asked.subfunction not in (function.subfunctions or ()):
+        if function is None or requested.subfunction not in (function.subfunctions or ()):
             raise Unanswerable(ILLEGAL_FUNCTION)
-        if asked.subfunction in CHANGING_SUBFUNCTIONS:
+        if requested.subfunction in CHANGING_SUBFUNCTIONS:
             raise Unanswerable(ILLEGAL_FUNCTION, "it would change the drive's counters")
-        data = await line.line.diagnose(device, asked.subfunction, asked.data)
-        return diagnosed_pdu(asked.subfunction, data)
+        data = await line.line.diagnose(device, requested.subfunction, requested.data)
+        return diagnosed_pdu(requested.subfunction, data)
 
     async def _identify(self, line: GatewayLine, device: int) -> IdentificationObjects:
         line.drives.known(device)
@@ -226,7 +232,7 @@ def _patience(line: ModbusLine, device: int) -> Priority:
 
 def _unsent(line: ModbusLine, device: int) -> int:
     """The exception for a read that the line did not send."""
-    return BUSY if device in line.facts.hushed else ILLEGAL_VALUE
+    return BUSY if device in line.facts.paused else ILLEGAL_VALUE
 
 
 def exception_of(error: LineError) -> int:

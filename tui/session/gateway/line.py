@@ -53,7 +53,7 @@ class GatewayLine:
         self.drives.close()
         return summary
 
-    async def told_apart(
+    async def identify_apart(
         self, host: str, session: DriveSession, words: Mapping[int, int]
     ) -> list[ForeignWord]:
         """Sort the words of a client by kind, by a read if necessary."""

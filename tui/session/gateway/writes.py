@@ -61,14 +61,14 @@ class GatewayWrite:
         self,
         line: GatewayLine,
         session: DriveSession,
-        asked: WriteAsked,
+        requested: WriteAsked,
         request: TcpRequest,
         rules: GatewayRules,
         write: PendingWrite,
     ) -> None:
         self._line = line
         self._session = session
-        self._asked = asked
+        self._requested = requested
         self._client, self._host = request.client.peer, request.client.host
         self._request = request
         self._rules = rules
@@ -83,7 +83,7 @@ class GatewayWrite:
         """
         if not self._may_go_first():
             await self._request.turn()
-        words = await self._line.told_apart(self._host, self._session, self._asked.words)
+        words = await self._line.identify_apart(self._host, self._session, self._requested.words)
         stops = [one for one in words if one.kind is WordKind.STOP]
         if len(stops) == len(words):
             return await self._send(Priority.STOP)
@@ -98,12 +98,12 @@ class GatewayWrite:
     def _may_go_first(self) -> bool:
         """Whether a stop may be in it, which no write before it turns into something else."""
         profile = self._session.profile
-        kinds = {one.kind for one in foreign_words(profile, self._asked.words, {})}
+        kinds = {one.kind for one in foreign_words(profile, self._requested.words, {})}
         if WordKind.COMMAND not in kinds:
             return WordKind.STOP in kinds
         # the command before it tells the state, not what the word means
         own = {chart.command for chart in profile.data.charts}
-        codes = stop_deciding_codes(profile, self._asked.words)
+        codes = stop_deciding_codes(profile, self._requested.words)
         deciding = [profile.find(one) for one in codes if one not in own]
         registers = {one.address + i for one in deciding for i in range(word_count(one))}
         return not self._line.pending.changes_before(self._write, registers)
@@ -145,7 +145,7 @@ class GatewayWrite:
         profile = self._session.profile
         parameters = parameters_at(settings)
         for one in parameters:
-            if why := value_refusal(profile, one, self._asked.words):
+            if why := value_refusal(profile, one, self._requested.words):
                 self._refuse(ILLEGAL_VALUE, why)
         # what the journal tells besides: the value before, and its unit
         codes = [code for one in parameters for code in (one.code, *depends_on(one))]
@@ -212,7 +212,7 @@ class GatewayWrite:
         if priority is not Priority.STOP:
             return await send()
         device = self._session.device
-        pdu = await self._line.turns.stopping(self._host, (device, self._asked), send)
+        pdu = await self._line.turns.stopping(self._host, (device, self._requested), send)
         self._line.commanding.stopped_too(device, self._client)
         return pdu
 
@@ -221,7 +221,7 @@ class GatewayWrite:
         stops = priority is Priority.STOP
         if stops:
             self._stop()
-        parameters = parameters_at(foreign_words(self._session.profile, self._asked.words, {}))
+        parameters = parameters_at(foreign_words(self._session.profile, self._requested.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
         answer = ENDED_BEFORE_ANSWER
         try:
@@ -239,23 +239,24 @@ class GatewayWrite:
             self._keep(parameters, before, answer, "stop" if stops else "write")
 
     async def _exchange(self, priority: Priority, parameters: list[Parameter]) -> bytes:
-        session, asked = self._session, self._asked
+        session, requested = self._session, self._requested
         forbidden = None if priority is Priority.STOP else self._voided
         if forbidden is not None:
             session.line.facts.leases.arm(session.device, ARMED_FOR_ONE, session.care())
         for one in parameters:
             session.image.doubt(one.code)
-        if asked.function == 23:
+        if requested.function == 23:
             reply = await session.line.read_write(
-                session.device, asked.read_address, asked.count, asked.address, asked.values,
+                session.device, requested.read_address, requested.count, requested.address,
+                requested.values,
                 priority=priority, forbidden=forbidden,
             )  # fmt: skip
             return words_pdu(23, reply.words)
         await session.line.write(
-            session.device, asked.address, asked.values,
-            priority=priority, multiple=asked.function == 16, forbidden=forbidden,
+            session.device, requested.address, requested.values,
+            priority=priority, multiple=requested.function == 16, forbidden=forbidden,
         )  # fmt: skip
-        return written_pdu(asked)
+        return written_pdu(requested)
 
     def _voided(self) -> str:
         """Why it must not go out any more; asked in the line's thread just before."""
@@ -269,10 +270,10 @@ class GatewayWrite:
     def _refusal_code(self) -> int:
         """The exception for what the line did not send."""
         line, profile = self._session.line, self._session.profile
-        if profile.function(self._asked.function) is None or line.read_only or line.held:
+        if profile.function(self._requested.function) is None or line.read_only or line.held:
             return ILLEGAL_FUNCTION
         device = self._session.device
-        if line.facts.commander(device) or device in line.facts.hushed or self._voided():
+        if line.facts.commander(device) or device in line.facts.paused or self._voided():
             return BUSY
         return ILLEGAL_VALUE
 
@@ -284,7 +285,7 @@ class GatewayWrite:
         what: str,
     ) -> None:
         """Put each parameter whose words were all written into the journal."""
-        session, words = self._session, self._asked.words
+        session, words = self._session, self._requested.words
         why = f"{what} of Modbus TCP client {self._client}"
         for one in parameters:
             own = [one.address + offset for offset in range(word_count(one))]

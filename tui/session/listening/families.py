@@ -17,7 +17,7 @@ from tui.wire.heard.pairing import HeardExchange
 
 from ..connect.identify import DriveIdentity, identity_from
 from ..connect.known_lines import line_name, load_memory
-from .words import objects_told, spans_of
+from .words import identity_objects, spans_of
 
 How = Literal["named", "identified", "remembered", "likely"]
 NO_SUCH_FUNCTION, NO_SUCH_ADDRESS = 1, 2
@@ -98,10 +98,10 @@ class Families:
 
     def note(self, exchange: HeardExchange) -> None:
         """Learn from an exchange."""
-        if (objects := objects_told(exchange)) is not None:
-            told = identity_from(exchange.device, objects)
-            if told.reference or exchange.device not in self.identities:
-                self.identities[exchange.device] = told
+        if (objects := identity_objects(exchange)) is not None:
+            reported = identity_from(exchange.device, objects)
+            if reported.reference or exchange.device not in self.identities:
+                self.identities[exchange.device] = reported
         if exchange.answer not in ("ok", "exception"):
             return
         evidence = self._evidence.setdefault(exchange.device, _Evidence())
@@ -145,11 +145,11 @@ def _score(evidence: _Evidence, profile: Profile) -> float:
     longest = max((one.max_read or 1 for one in profile.data.functions), default=1)
     if evidence.longest > longest:
         return 0.0
-    told = _words(profile)
-    hits = len(evidence.answered & told)
+    reported = _words(profile)
+    hits = len(evidence.answered & reported)
     misses = len(evidence.answered) - hits
     # an address that is refused may be one that this model, or this moment, does not have
-    doubts = len(evidence.lacking & told) + len(evidence.unknown_functions & functions)
+    doubts = len(evidence.lacking & reported) + len(evidence.unknown_functions & functions)
     weight = 0.5 if profile.data.reading.gaps_readable else 1.0
     return hits - weight * misses - 0.5 * doubts
 

@@ -23,12 +23,12 @@ class Hearing:
         self,
         line: ListeningLine,
         families: Families,
-        told: ExchangeTold,
+        reported: ExchangeTold,
         frame_heard: FrameHeard = lambda _frame, _request: None,
         clock: Clock = REAL_CLOCK,
     ) -> None:
         self.clock = clock
-        self._line, self._told = line, told
+        self._line, self._report = line, reported
         self._timing = WireTiming(character_time(line.link), silence(line.link))
         self.listener = LineListener(
             families,
@@ -47,12 +47,12 @@ class Hearing:
         """Tell what follows from what was read, or from a pause in which nothing came."""
         found = self.listener.take(data, now) if data else self.listener.idle(now)
         for one in found:
-            self._told(one)
+            self._report(one)
 
     def end(self, now: float) -> None:
         """Tell what is still open."""
         for one in self.listener.end(now):
-            self._told(one)
+            self._report(one)
 
     def summary(self, now: float) -> ListeningSummary:
         """What it came to by now."""

@@ -65,19 +65,19 @@ class LineListener:
 
     def take(self, data: bytes, time: float) -> list[ToldExchange]:
         """Bytes that were read at a time; the exchanges that are known by now."""
-        return self._told(self._splitter.take(data, time))
+        return self._report(self._splitter.take(data, time))
 
     def idle(self, now: float) -> list[ToldExchange]:
         """No byte came for a pause: what ends with it, and what is not answered any more."""
-        found = self._told(self._splitter.pause())
+        found = self._report(self._splitter.pause())
         return found + [self._tell(one) for one in self._pairing.wait(now)]
 
     def end(self, now: float) -> list[ToldExchange]:
         """Nothing more is heard: a request that waits for its answer since long has none."""
-        found = self._told(self._splitter.pause())
+        found = self._report(self._splitter.pause())
         return found + [self._tell(one) for one in self._pairing.wait(now, LONG_FOR_AN_ANSWER)]
 
-    def _told(self, frames: Iterable[HeardFrame]) -> list[ToldExchange]:
+    def _report(self, frames: Iterable[HeardFrame]) -> list[ToldExchange]:
         found = []
         for frame in frames:
             self.tally.take_frame(frame, self.silence if self.character else 0.0)

@@ -50,7 +50,7 @@ class ListeningSummary:
     load: float | None
     """Part of the time in which there were bytes on the line; None where that is not known."""
     drives: tuple[DriveSummary, ...]
-    silences_told: bool
+    reports_silences: bool
     """Whether pauses between bytes could be told."""
 
 
@@ -113,7 +113,7 @@ def _drive_lines(drive: DriveSummary) -> Iterator[str]:
     if drive.silent and tally.device:
         yield f"  no answer to {_many(tally.requests, 'request')}"
     elif tally.device:
-        yield f"  {_asked_text(drive)}"
+        yield f"  {_drive_request_text(drive)}"
     yield f"  {_commanded_text(drive)}"
     if drive.feeding is not None:
         yield f"  {feeding_text(drive.feeding)}"
@@ -131,7 +131,7 @@ def family_text(family: TakenFamily | None) -> str:
     return f"{family.profile.name} ({HOW_SURE[family.how]}{or_})"
 
 
-def _asked_text(drive: DriveSummary) -> str:
+def _drive_request_text(drive: DriveSummary) -> str:
     tally = drive.tally
     text = "asked once"
     if drive.pace is not None:
@@ -238,7 +238,7 @@ def _line_troubles(summary: ListeningSummary) -> Iterator[str]:
         )
     if not tally.frames:
         return
-    if not summary.silences_told:
+    if not summary.reports_silences:
         yield "Silences are not judged: this port has no baud rate of its own."
         return
     if tally.cut:

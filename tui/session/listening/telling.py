@@ -19,38 +19,38 @@ def function_name(function: int) -> str:
     return FUNCTION_NAMES.get(function, f"function {function}")
 
 
-def names_asked(told: ToldExchange) -> list[str]:
+def requested_names(reported: ToldExchange) -> list[str]:
     """The parameters that a request names, each once; addresses where none is known."""
-    spans = spans_of(told.exchange.request)
-    found = (name for span in spans for name in names_of_words(span, told.profile))
+    spans = spans_of(reported.exchange.request)
+    found = (name for span in spans for name in names_of_words(span, reported.profile))
     return list(dict.fromkeys(found))
 
 
-def exchange_text(told: ToldExchange, families: Families) -> str:
+def exchange_text(reported: ToldExchange, families: Families) -> str:
     """Device, function, and the values or what became of it; control characters as signs."""
-    one = told.exchange
+    one = reported.exchange
     head = f"{one.device or 'all':>3} {function_name(one.function):<{FUNCTION_WIDTH}}"
-    return plain(f"{head} {_what(told, families)}".rstrip())
+    return plain(f"{head} {_what(reported, families)}".rstrip())
 
 
-def _what(told: ToldExchange, families: Families) -> str:
-    one = told.exchange
+def _what(reported: ToldExchange, families: Families) -> str:
+    one = reported.exchange
     match one.answer:
         case "ok" | "broadcast":
             if one.function == WHO:
                 return _identity_text(one.device, families)
-            return " · ".join(map(_value_text, told.values))
+            return " · ".join(map(_value_text, reported.values))
         case "again":
             return "a second answer to the same request: two devices at one address?"
         case "unasked":
             return "an answer to no request that was heard"
-    return f"{_asked_text(told)}: {_trouble(told)}".removeprefix(": ")
+    return f"{_drive_request_text(reported)}: {_trouble(reported)}".removeprefix(": ")
 
 
-def _trouble(told: ToldExchange) -> str:
-    one = told.exchange
+def _trouble(reported: ToldExchange) -> str:
+    one = reported.exchange
     if one.exception is not None:
-        return f"exception {one.exception}, {exception_meaning(one.exception, told.profile)}"
+        return f"exception {one.exception}, {exception_meaning(one.exception, reported.profile)}"
     return "damaged answer" if one.answer == "damaged" else "no answer"
 
 
@@ -58,8 +58,8 @@ def _value_text(value: HeardValue) -> str:
     return f"{value.code} {'← ' if value.written else ''}{value.value.display}"
 
 
-def _asked_text(told: ToldExchange) -> str:
-    names = names_asked(told)
+def _drive_request_text(reported: ToldExchange) -> str:
+    names = requested_names(reported)
     more = len(names) - CODES_TOLD_AT_MOST
     return " ".join(names[:CODES_TOLD_AT_MOST]) + (f" and {more} more" if more > 0 else "")
 

@@ -142,7 +142,7 @@ def _parts(
         at += wide
 
 
-def objects_told(exchange: HeardExchange) -> IdentificationObjects | None:
+def identity_objects(exchange: HeardExchange) -> IdentificationObjects | None:
     """What a drive said of itself in an exchange of function 43; None where it said nothing."""
     if exchange.answer != "ok" or exchange.function != WHO or len(exchange.reply) < _OBJECTS_FROM:
         return None

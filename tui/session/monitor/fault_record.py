@@ -167,14 +167,14 @@ def _pointed_at(
     help_ = session.profile.guide.fault(fault.raw if fault else None)
     if help_ is None:
         return []
-    told = hint_markdown(
+    reported = hint_markdown(
         session.profile,
         help_,
         advice(session.profile, help_, session.image.trusted, latest=True),
         lambda code: values.get(code, NOT_AVAILABLE),
         reset_text(help_, None, "a fault reset").text,
     )
-    return ["", "## What it points at", "", *told]
+    return ["", "## What it points at", "", *reported]
 
 
 def _clock(wall: float) -> str:

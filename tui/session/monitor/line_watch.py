@@ -238,11 +238,11 @@ class LineWatch:
         contact: Contact = "answers"
         try:
             codes = [*_state_codes(profile), *_glance_codes(profile), *unread_limit(kept.session)]
-            told = channel_codes(profile)
-            codes += [code for code in told if profile[code].access == "r"]
+            reported = channel_codes(profile)
+            codes += [code for code in reported if profile[code].access == "r"]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
             # settings are read with the timeout: another channel is set up at rest only
-            settings = {c: one for c in told if (one := kept.session.image.get(c)) is not None}
+            settings = {c: one for c in reported if (one := kept.session.image.get(c)) is not None}
             state = drive_state(profile, settings | readings)
             self.onsets.note(device, state, kept.session.clock.wall())
         except LineError as fault:

@@ -144,8 +144,8 @@ class Monitor:
             except Exception as error:
                 log.exception("watching device %s failed", self.device)
                 self.restarts += 1
-                told = f"Watching failed ({type(error).__name__}: {error}) and is begun anew."
-                self._tell_failure(told)
+                reported = f"Watching failed ({type(error).__name__}: {error}) and is begun anew."
+                self._tell_failure(reported)
                 await self.session.clock.sleep(RESTART_AFTER)
 
     def _tell_failure(self, text: str) -> None:

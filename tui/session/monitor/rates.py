@@ -42,11 +42,15 @@ def rates_of(profile: Profile) -> Rates:
     when = {chart.when.parameter for chart in profile.data.charts if chart.when}
     changing = {profile.data.faults.parameter, *when} - {""}
     codes = monitoring_codes(profile)
-    told = {code: rates.get(code, "on-change" if code in changing else "fast") for code in codes}
+    reported = {
+        code: rates.get(code, "on-change" if code in changing else "fast") for code in codes
+    }
     if code := fault_code(profile):
-        told[code] = "fast"  # it tells the state, and one that was reset must not stand beside it
+        reported[code] = (
+            "fast"  # it tells the state, and one that was reset must not stand beside it
+        )
     fast, change, slow = (
-        tuple(code for code in codes if told[code] == rate)
+        tuple(code for code in codes if reported[code] == rate)
         for rate in ("fast", "on-change", "slow")
     )
     watched = set(watched_codes(profile))

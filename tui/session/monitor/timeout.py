@@ -67,12 +67,12 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
     if rules is None or not rules.timeout:
         return Timeout(known=True)
     readings = await timeouts_of_ports(reader, rules, priority)
-    found = await reader.read([*_told_with_it(session, rules), *besides], priority=priority)
-    told = [one for one in readings if one.raw is not None]
-    running = [(timeout_seconds(one, rules.off), one.parameter.code) for one in told]
+    found = await reader.read([*_related_words(session, rules), *besides], priority=priority)
+    reported = [one for one in readings if one.raw is not None]
+    running = [(timeout_seconds(one, rules.off), one.parameter.code) for one in reported]
     shortest = min(((s, code) for s, code in running if s is not None), default=None)
     if shortest is None:
-        return Timeout(known=bool(told))
+        return Timeout(known=bool(reported))
     raw = found[rules.reaction].raw if rules.reaction else None
     reaction = next((one for one in rules.reactions if one.raw == raw), None)
     faults = {one.raw: one.code for one in session.profile.data.faults.codes}
@@ -109,10 +109,10 @@ async def timeouts_of_ports(
     return found
 
 
-def _told_with_it(session: DriveSession, rules: CommunicationFault) -> list[str]:
+def _related_words(session: DriveSession, rules: CommunicationFault) -> list[str]:
     """Codes of what tells the reaction, and whether the watch has begun."""
     codes = [rules.reaction] if rules.reaction else []
-    if rules.needs_write and not session.told_by_line:
+    if rules.needs_write and not session.reported_by_line:
         codes += [chart.command for chart in session.profile.data.charts if chart.command]
     return list(dict.fromkeys(codes))
 
@@ -132,7 +132,7 @@ def has_begun(session: DriveSession) -> bool:
     the drive holds tells it, and what was written from here.
     """
     rules = session.profile.data.communication_fault
-    if rules is None or not rules.needs_write or session.told_by_line:
+    if rules is None or not rules.needs_write or session.reported_by_line:
         return True
     raws = session.image.trusted
     return any(raws.get(chart.command) for chart in session.profile.data.charts)

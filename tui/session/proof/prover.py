@@ -51,14 +51,14 @@ def hidden_at_rest(reaction: Reaction | None) -> str:
     )
 
 
-def _nothing_runs(rules: CommunicationFault, told: Mapping[str, Reading]) -> str:
+def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) -> str:
     """Why there is nothing to prove, by what each port of the drive has told of its timeout."""
     ports = (rules.timeout, *rules.other_timeouts)
-    silent = " and ".join(code for code in ports if code not in told)
+    silent = " and ".join(code for code in ports if code not in reported)
     missing = f"{silent} cannot be read: perhaps this drive has no such word"
-    if not told:
+    if not reported:
         return f"{missing}. Whether it notices a dead line is not known; nothing was proved."
-    off = " and ".join(f"{code} is {one.text}" for code, one in told.items())
+    off = " and ".join(f"{code} is {one.text}" for code, one in reported.items())
     goes_on = "the drive does not notice a dead line, and a motor that runs goes on."
     return f"{off}: {goes_on}" + (f" {missing}." if silent else "")
 
@@ -93,7 +93,7 @@ class Prover:
         # then waits for the late reply that may yet come
         readings = await self._settings(rules)
         await self._reader.read(self._state_codes())
-        facts.hush(session.device, LEFT_ALONE_FOR_PROOF)
+        facts.pause_polling(session.device, LEFT_ALONE_FOR_PROOF)
         try:
             timeout = self._timeout(rules, readings)
             readings |= await self._read(self._codes(rules))
@@ -106,19 +106,21 @@ class Prover:
             return result
         finally:
             facts.unhush(session.device)
-            session.stir()
+            session.request_full_read()
 
     async def _settings(self, rules: CommunicationFault) -> dict[str, Reading]:
         """The timeout of each port that the drive has."""
-        told = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)
-        return {one.parameter.code: one for one in told if one.raw is not None}
+        reported = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)
+        return {one.parameter.code: one for one in reported if one.raw is not None}
 
     @staticmethod
-    def _timeout(rules: CommunicationFault, told: dict[str, Reading]) -> float:
+    def _timeout(rules: CommunicationFault, reported: dict[str, Reading]) -> float:
         """The shortest that is not off; raises NothingToProve where all are."""
-        running = [s for one in told.values() if (s := timeout_seconds(one, rules.off)) is not None]
+        running = [
+            s for one in reported.values() if (s := timeout_seconds(one, rules.off)) is not None
+        ]
         if not running:
-            raise NothingToProve(_nothing_runs(rules, told))
+            raise NothingToProve(_nothing_runs(rules, reported))
         return min(running)
 
     def _codes(self, rules: CommunicationFault) -> list[str]:
@@ -211,7 +213,7 @@ class Prover:
         for seconds in silences(timeout):
             self.tell(f"silent for {seconds:.1f} s; set are {timeout:g} s.")
             await self._silence(ended + seconds)
-            asked = clock.monotonic()
+            requested = clock.monotonic()
             readings = await self._read_after_silence()
             heard = clock.monotonic()
             state = drive_state(self.session.profile, readings)
@@ -221,8 +223,8 @@ class Prover:
                 bracket = bracket.reacted(heard - begun)
                 return await self._result(rules, timeout, reaction, bracket, seen, changed)
             self._check_rest(state)
-            bracket = bracket.alive(asked - ended)
-            begun, ended = asked, heard
+            bracket = bracket.alive(requested - ended)
+            begun, ended = requested, heard
         return await self._result(rules, timeout, reaction, bracket, "", changed)
 
     async def _read_after_silence(self) -> dict[str, Reading]:

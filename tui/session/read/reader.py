@@ -296,10 +296,10 @@ class Reader:
         return self._reading(parameter, reply.words, reply.time, priority)
 
     def _reading(
-        self, parameter: Parameter, words: Sequence[int], told: float, priority: Priority
+        self, parameter: Parameter, words: Sequence[int], reported: float, priority: Priority
     ) -> Reading:
         origin = Origin.POLL if priority >= Priority.POLL else Origin.READ
-        time = self.session.clock.of_line(told)
+        time = self.session.clock.of_line(reported)
         return Reading.undecoded(parameter, from_words(parameter, words), time, origin)
 
     def _refusal(self, parameter: Parameter, refusal: DeviceException) -> Reading:

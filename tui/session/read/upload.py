@@ -107,9 +107,9 @@ class Upload:
 def head_of(session: DriveSession) -> SetHead:
     """Where a parameter set of this drive, read now, comes from."""
     profile, identity = session.profile, session.identity
-    said = {}
+    message = {}
     if identity is not None:
-        said = {
+        message = {
             "vendor": identity.vendor,
             "reference": identity.reference,
             "version": identity.version_text,
@@ -125,5 +125,5 @@ def head_of(session: DriveSession) -> SetHead:
         line=session.line_text,
         device=session.device,
         panel=tui.__version__,
-        identity={key: text for key, text in said.items() if text},
+        identity={key: text for key, text in message.items() if text},
     )

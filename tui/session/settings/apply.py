@@ -65,7 +65,7 @@ async def apply_edits(
         session, Writer(session, journal, permit), RetryingReader(session), edits, confirmed, why
     )
     await work.look_at_all()
-    told = edit_problems(session.profile, edits, work.retrying.raws)
+    reported = edit_problems(session.profile, edits, work.retrying.raws)
     order = ordered(session.profile, edits, work.retrying.raws)
     for number, edit in enumerate(order, start=1):
         if work.stopped:
@@ -76,8 +76,8 @@ async def apply_edits(
         elif ask_after_failure and work.missed:
             text = f"{edit.code} is not written yet: {work.missed[0]} failed before it."
             result = Result(edit, EditOutcome.WAITS, text, edit.old)
-        elif edit.code in told:
-            result = Result(edit, EditOutcome.REFUSED, told[edit.code], edit.old)
+        elif edit.code in reported:
+            result = Result(edit, EditOutcome.REFUSED, reported[edit.code], edit.old)
         else:
             result = await work.apply(edit)
         work.results.append(result)
@@ -169,11 +169,11 @@ class _Work:
             return Result(edit, EditOutcome.REFUSED, text, edit.old)
         held = raws.get(edit.code)
         if held is None:
-            said = retrying.why_absent(edit.code)
+            message = retrying.why_absent(edit.code)
             return Result(
                 edit,
                 EditOutcome.REFUSED,
-                f"{edit.code} cannot be read, so it is not written: {said}",
+                f"{edit.code} cannot be read, so it is not written: {message}",
             )
         if held == edit.new and self._means(edit):
             unsaved = self.session.unsaved
@@ -278,11 +278,11 @@ class _Work:
 
     def _left(self, done: set[str]) -> Edits:
         """What is staged yet, against what the drive holds now."""
-        left = Edits(tuple(edit for edit in self.edits.asked if edit.code not in done))
+        left = Edits(tuple(edit for edit in self.edits.requested if edit.code not in done))
         held = {r.edit.code: r.held for r in self.results if r.held is not None}
         raws = {**self.retrying.raws, **held}
         try:
             return left.now(self.session.profile, raws, self.retrying.lacking)
         except DriveError:
             # under the scales of now a value has no place: it stays as it was typed
-            return Edits(tuple(replace(e, old=raws.get(e.code, e.old)) for e in left.asked))
+            return Edits(tuple(replace(e, old=raws.get(e.code, e.old)) for e in left.requested))

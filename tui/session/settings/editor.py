@@ -69,7 +69,7 @@ class Editor:
         return self.session.unsaved
 
     @property
-    def said(self) -> Outcome | None:
+    def message(self) -> Outcome | None:
         """What the last work on the drive has come to."""
         return self.session.work.outcome
 
@@ -149,7 +149,7 @@ class Editor:
                 progress=self._progress,
                 ask_after_failure=True,
             )
-            staging.take_left((*applied.left.asked, *held_back))
+            staging.take_left((*applied.left.requested, *held_back))
             self.applied = applied
             self._applied(applied)
             return _summary(applied, [edit.code for edit in staging.edits])

@@ -52,7 +52,7 @@ async def factory_reset(
     retrying = await _carry_out(writer, order, why="factory settings", confirmed=confirmed)
     # every word may hold something else now
     session.image.forget()
-    return await _told(session, retrying)
+    return await _report(session, retrying)
 
 
 async def _carry_out(
@@ -118,8 +118,8 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
     """Wait until the order's bit or value has gone and the EEPROM is no longer written."""
     profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
-    told = [order.done.parameter] if order.done else []
-    codes = [order.parameter, *([status.code] if status else []), *told]
+    reported = [order.done.parameter] if order.done else []
+    codes = [order.parameter, *([status.code] if status else []), *reported]
     end = retrying.session.clock.monotonic() + SAVING_LONGEST
     while retrying.session.clock.monotonic() < end:
         try:
@@ -149,7 +149,7 @@ def _is_pending(order: MemoryOrder, raws: Mapping[str, int]) -> bool:
     return bool(held & order.raw) if order.bit else held == order.raw
 
 
-async def _told(session: DriveSession, retrying: RetryingReader) -> str:
+async def _report(session: DriveSession, retrying: RetryingReader) -> str:
     """Which of the known factory settings the drive holds now."""
     profile = session.profile
     settings = [

@@ -40,8 +40,10 @@ class Marks:
 
 def load_marks(profile_id: str) -> Marks:
     """What was kept; nothing where the file is missing or damaged."""
-    told = stored_json(_file(profile_id))
-    listed = {key: told.get(key) for key in asdict(Marks())} if isinstance(told, dict) else {}
+    reported = stored_json(_file(profile_id))
+    listed = (
+        {key: reported.get(key) for key in asdict(Marks())} if isinstance(reported, dict) else {}
+    )
     return Marks(**{key: _texts(found) for key, found in listed.items()})
 
 

@@ -13,8 +13,8 @@ def device_refusal(
     """What the exception means on this family, the drive's state, and the next step."""
     known = next((e for e in profile.data.exceptions if e.code == error.code), None)
     if known is None:
-        said = f"exception {error.code}, which no document of this family explains"
-        return f"{parameter.code}: the drive refused with {said}. The drive is {headline}."
+        message = f"exception {error.code}, which no document of this family explains"
+        return f"{parameter.code}: the drive refused with {message}. The drive is {headline}."
     meaning = _sentence(known.meaning)
     next_step = _sentence(known.remedy)
     text = f"{parameter.code}: the drive refused with exception {known.code}, {known.name}."

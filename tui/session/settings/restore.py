@@ -169,10 +169,10 @@ class Mark:
     @property
     def interrupted(self) -> str:
         """What is known of a restoring that did not come to its end; else empty."""
-        told = stored_json(self.path)
-        if not isinstance(told, dict) or not {"begun", "parameters", "set"} <= set(told):
+        reported = stored_json(self.path)
+        if not isinstance(reported, dict) or not {"begun", "parameters", "set"} <= set(reported):
             return ""
-        begun, of, taken = (str(told[key])[:60] for key in ("begun", "parameters", "set"))
+        begun, of, taken = (str(reported[key])[:60] for key in ("begun", "parameters", "set"))
         return (
             f"A restoring of {of} settings (set of {taken}) began at {begun} and did not come to"
             " its end. The drive is read and what is missing is written."
@@ -180,9 +180,9 @@ class Mark:
 
     def begin(self, source: ParameterSet, count: int) -> None:
         """Leave the mark; a folder that cannot be written stops no restoring."""
-        told = {"begun": now_text(), "parameters": count, "set": source.head.time or "no time"}
+        reported = {"begun": now_text(), "parameters": count, "set": source.head.time or "no time"}
         with suppress(OSError):
-            store_json(self.path, told)
+            store_json(self.path, reported)
 
     def end(self) -> None:
         """Take the mark away."""

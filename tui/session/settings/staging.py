@@ -92,13 +92,13 @@ class Staging:
     def take_plan(self, plan: RestorePlan) -> None:
         """Stage what a plan would write."""
         profile = self.session.profile
-        self.edits = self.edits.stage_many(profile, plan.edits.asked, self._raws, self._lacking)
+        self.edits = self.edits.stage_many(profile, plan.edits.requested, self._raws, self._lacking)
 
     def only(self, codes: Iterable[str]) -> tuple[Edits, tuple[Edit, ...]]:
         """The edits of these codes, of all where there are none; and those held back."""
-        wanted = frozenset(codes) or frozenset(edit.code for edit in self.edits.asked)
-        chosen = Edits(tuple(edit for edit in self.edits.asked if edit.code in wanted))
-        return chosen, tuple(edit for edit in self.edits.asked if edit.code not in wanted)
+        wanted = frozenset(codes) or frozenset(edit.code for edit in self.edits.requested)
+        chosen = Edits(tuple(edit for edit in self.edits.requested if edit.code in wanted))
+        return chosen, tuple(edit for edit in self.edits.requested if edit.code not in wanted)
 
     def take_left(self, left: Sequence[Edit]) -> None:
         """What a writing has left; what was no change is staged only while its scale waits yet.
@@ -122,10 +122,10 @@ class Staging:
     def drop_written(self) -> list[str]:
         """What the drive has is no longer staged; returns its codes."""
         done = [result.edit.code for result in self.results.values() if result.done]
-        self.edits = Edits(tuple(edit for edit in self.edits.asked if edit.code not in done))
+        self.edits = Edits(tuple(edit for edit in self.edits.requested if edit.code not in done))
         return done
 
     def drop_held(self) -> None:
         """What the drive holds already, by what was read last, is no longer staged."""
         raws = self._raws
-        self.edits = Edits(tuple(e for e in self.edits.asked if raws.get(e.code) != e.new))
+        self.edits = Edits(tuple(e for e in self.edits.requested if raws.get(e.code) != e.new))

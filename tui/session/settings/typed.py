@@ -36,6 +36,6 @@ async def stage_typed(
         if profile[code].access == "r":
             raise ValueRefused(f"{code} can only be read.")
         edits = edits.stage(profile, code, value, retrying.raws, retrying.lacking)
-    if not rounded and (losses := [edit.loss for edit in edits.asked if edit.loss]):
+    if not rounded and (losses := [edit.loss for edit in edits.requested if edit.loss]):
         raise WouldRound(f"{'; '.join(losses)}.")
     return edits, retrying

@@ -47,7 +47,7 @@ class WatchedValues:
     """Since when the drive does not answer."""
     _starting: bool = False
     """Whether the drive was starting up when it was last looked at."""
-    _asked: dict[str, float] = field(default_factory=dict)
+    _requested: dict[str, float] = field(default_factory=dict)
 
     @property
     def raws(self) -> Mapping[str, int]:
@@ -82,7 +82,7 @@ class WatchedValues:
     def start(self) -> None:
         """Begin to read, all of it anew."""
         self.stop()
-        self._asked = {}
+        self._requested = {}
         self._reader = self.session.line.spawn(self._read, f"editor {self.session.device}")
 
     def stop(self) -> None:
@@ -103,10 +103,10 @@ class WatchedValues:
             try:
                 if due := self._due():
                     await first.ask(due)
-                    self._asked |= dict.fromkeys(due, self.session.clock.monotonic())
+                    self._requested |= dict.fromkeys(due, self.session.clock.monotonic())
                 elif waiting:
                     await later.ask(waiting[0])
-                    self._asked |= dict.fromkeys(waiting.pop(0), self.session.clock.monotonic())
+                    self._requested |= dict.fromkeys(waiting.pop(0), self.session.clock.monotonic())
                 elif (part := next(parts, None)) is not None:
                     known, absent = self.raws, self.absent
                     left = [c for c in part if c not in known and c not in absent]
@@ -129,13 +129,13 @@ class WatchedValues:
         if not off and (before or not self._starting):
             return
         self.was_reset()
-        self._asked = {}
+        self._requested = {}
         self.session.image.forget()
 
     def _due(self) -> list[str]:
         """What is looked at and was not read lately."""
         oldest = self.session.clock.monotonic() - REREAD_AFTER
-        due = [code for code in self.visible if self._asked.get(code, 0.0) < oldest]
+        due = [code for code in self.visible if self._requested.get(code, 0.0) < oldest]
         if not due:
             return []
         follows = [p.scale_by.parameter for c in due if (p := self._parameter(c)) and p.scale_by]

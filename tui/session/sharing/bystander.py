@@ -51,7 +51,7 @@ class Bystander:
         self._sign = sign
         self._latest = latest
         self._now = now
-        self._asked = now()
+        self._requested = now()
 
     def freely(self) -> bool:
         """Whether it may be asked at any time: nobody is known to have started its motor."""
@@ -62,7 +62,7 @@ class Bystander:
         self.waits = not self._may_ask()
         if self.waits:
             return COMMANDER_SILENT
-        self._asked = self._now()
+        self._requested = self._now()
         return ""
 
     def _may_ask(self) -> bool:
@@ -70,7 +70,7 @@ class Bystander:
         if sign is None and not self.orphan:
             return True
         sign = -math.inf if sign is None else sign
-        if sign >= self._asked or self._stands(sign):
+        if sign >= self._requested or self._stands(sign):
             return True
         timeout = self._timeout()
         if timeout is None:
@@ -90,11 +90,11 @@ class Bystander:
 
     def _silence(self) -> float:
         heard = self._session.line.device_state(self._session.device).heard
-        return self._now() - (heard if heard is not None else self._asked)
+        return self._now() - (heard if heard is not None else self._requested)
 
     def _timeout(self) -> float | None:
         """The drive's communication timeout in seconds, 0 for one that has none; None: unknown."""
-        told = self._session.timeout
-        if told is None or not told.known:
+        reported = self._session.timeout
+        if reported is None or not reported.known:
             return None
-        return told.watch.timeout if told.watch is not None else 0.0
+        return reported.watch.timeout if reported.watch is not None else 0.0

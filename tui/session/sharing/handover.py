@@ -64,10 +64,10 @@ class Handover:
         self._commanders: Mapping[int, str] = MappingProxyType({})
         facts = line.facts
         self._leave = (
-            facts.on_question(self._asked),
+            facts.on_question(self._requested),
             facts.on_reply(self._replied),
             facts.on_stop(self._stopped),
-            facts.on_text(self._told),
+            facts.on_text(self._on_text),
             facts.on_change(self._changed),
         )
         self._changed()
@@ -115,7 +115,7 @@ class Handover:
 
     # Asked elsewhere
 
-    def _asked(self, device: int, program: Program) -> None:
+    def _requested(self, device: int, program: Program) -> None:
         """A program wants a drive; called in the line's thread."""
         if not self.person:
             self._decide(device, program)
@@ -189,7 +189,7 @@ class Handover:
             if self._session_of(device) is not None:
                 self._events.add("stop", f"Stop from {program.text} ({by}).", device)
 
-    def _told(self, device: int, text: str) -> None:
+    def _on_text(self, device: int, text: str) -> None:
         self._events.add("stop", text, device or None)
 
     def _changed(self) -> None:

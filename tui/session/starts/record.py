@@ -93,13 +93,13 @@ def offer(
 
 
 def _same(record: StartRecord, identity: DriveIdentity) -> bool:
-    said = (
+    stated = (
         (record.vendor, identity.vendor),
         (record.reference, identity.reference),
         (record.version, identity.version),
         (record.name, identity.name),
     )
-    if identity.device != record.device or any(a and b and a != b for a, b in said):
+    if identity.device != record.device or any(a and b and a != b for a, b in stated):
         return False
     fitting = {*identity.candidates, identity.profile} - {None}
     return not fitting or not record.profile or record.profile in fitting

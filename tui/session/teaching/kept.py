@@ -54,7 +54,7 @@ class TaughtDrive:
     line: str
     device: int
     profile: str
-    said: str
+    stated: str
     """What it says of itself; empty where it says nothing."""
 
     @classmethod
@@ -62,14 +62,14 @@ class TaughtDrive:
         cls, line_text: str, device: int, profile: str, identity: DriveIdentity | None
     ) -> TaughtDrive:
         """The drive at an address of a line, however that is typed."""
-        said = (identity.vendor, identity.reference, identity.name) if identity else ()
-        return cls(line_key(line_text), device, profile, " ".join(part for part in said if part))
+        stated = (identity.vendor, identity.reference, identity.name) if identity else ()
+        return cls(line_key(line_text), device, profile, " ".join(part for part in stated if part))
 
     @property
     def file(self) -> Path:
         """Where what was taught of it stands."""
         readable = re.sub(r"[^A-Za-z0-9]+", "-", self.line).strip("-")[:40]
-        own = _digest(self.said) if self.said else "unsaid"
+        own = _digest(self.stated) if self.stated else "unsaid"
         return _folder() / f"{readable}-{self.device}-{self.profile}-{self._place}-{own}.json"
 
     @property
@@ -81,7 +81,7 @@ class TaughtDrive:
         if self.file.exists():
             return self.file
         others = sorted(_folder().glob(f"*-{self._place}-*.json"))
-        if self.said:
+        if self.stated:
             others = [path for path in others if path.stem.endswith("-unsaid")]
         return others[0] if len(others) == 1 else None
 
@@ -142,7 +142,7 @@ def _as_json(drive: TaughtDrive, kept: TaughtLooks) -> dict[str, object]:
         "line": drive.line,
         "device": drive.device,
         "profile": drive.profile,
-        "drive": drive.said,
+        "drive": drive.stated,
         "reference": kept.reference,
         "looks": {
             code: [{"raw": one.word, "shown": f"{one.shown:f} {one.unit}".strip()} for one in looks]
@@ -152,11 +152,11 @@ def _as_json(drive: TaughtDrive, kept: TaughtLooks) -> dict[str, object]:
     }
 
 
-def _looks_in(told: object) -> TaughtLooks:
+def _looks_in(reported: object) -> TaughtLooks:
     """What a file says; raises ValueRefused where it says something else."""
-    if not isinstance(told, dict):
+    if not isinstance(reported, dict):
         raise ValueRefused("it is no table")
-    looks, reference = told.get("looks"), told.get("reference", "")
+    looks, reference = reported.get("looks"), reported.get("reference", "")
     if not isinstance(looks, dict) or not isinstance(reference, str):
         raise ValueRefused("it has no looks")
     return TaughtLooks({_code(c): _looks_of(c, listed) for c, listed in looks.items()}, reference)
@@ -174,8 +174,10 @@ def _looks_of(code: str, listed: object) -> tuple[DisplayLook, ...]:
     return tuple(_look(code, one) for one in listed)
 
 
-def _look(code: str, told: object) -> DisplayLook:
-    word, shown = (told.get("raw"), told.get("shown")) if isinstance(told, dict) else (None, None)
+def _look(code: str, reported: object) -> DisplayLook:
+    word, shown = (
+        (reported.get("raw"), reported.get("shown")) if isinstance(reported, dict) else (None, None)
+    )
     if type(word) is not int or not 0 <= word <= 0xFFFF or not isinstance(shown, str):
         raise ValueRefused(f"a look at {code} has no raw word and what was shown")
     return DisplayLook(word, *parse_display(shown))

@@ -105,7 +105,7 @@ class Teacher:
         """
         with self._lock:
             self._latest()
-            if why := why_no_reference(self.family, code, self._told()):
+            if why := why_no_reference(self.family, code, self._taught_scales()):
                 raise ValueRefused(why)
             self._change({}, code)
         return f"{code} takes the reference, in {self.scales[code].unit}."
@@ -151,9 +151,9 @@ class Teacher:
 
     def _use(self) -> None:
         """The drive's profile, with what is known by the looks."""
-        self.session.learn(with_taught(self.family, self._told(), self._known.reference))
+        self.session.learn(with_taught(self.family, self._taught_scales(), self._known.reference))
 
-    def _told(self) -> dict[str, TaughtScale]:
+    def _taught_scales(self) -> dict[str, TaughtScale]:
         """The scales that the kept looks tell."""
         found = {code: taught_by(looks) for code, looks in self._known.looks.items()}
         return {code: scale for code, scale in found.items() if scale is not None}

@@ -254,8 +254,8 @@ class Altivar21Chart:
         coast = remote and bool(self._word & COAST)
         ready = not fault and motor.mains > 0
         run = self._run_ordered() or motor.frequency != 0
-        asked = bool(self._word & REVERSE) if remote else self._inputs.reverse
-        reverse = motor.frequency < 0 or asked
+        requested = bool(self._word & REVERSE) if remote else self._inputs.reverse
+        reverse = motor.frequency < 0 or requested
         marks = (
             (fault, 0),
             (fault, 1),

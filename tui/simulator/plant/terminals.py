@@ -102,7 +102,7 @@ class Terminals:
         """The logic inputs as bits, the first in bit 0."""
         return sum(1 << bit for bit, name in enumerate(self.names.logic) if self.closed(name))
 
-    def told(self) -> str:
+    def reported(self) -> str:
         """All inputs in a line, for a person."""
         logic = self.names.logic
         group = f"{logic[0]} to {logic[-1]}" if len(logic) > SHORT_LIST else ", ".join(logic)

@@ -49,9 +49,9 @@ def _text(text: str) -> bytes:
 
 def _block(kind: int, body: bytes, options: Sequence[_Option]) -> bytes:
     parts = [struct.pack("<HH", code, len(value)) + _padded(value) for code, value in options]
-    told = b"".join([*parts, bytes(4)]) if parts else b""
-    length = struct.pack("<I", 12 + len(body) + len(told))
-    return struct.pack("<I", kind) + length + body + told + length
+    reported = b"".join([*parts, bytes(4)]) if parts else b""
+    length = struct.pack("<I", 12 + len(body) + len(reported))
+    return struct.pack("<I", kind) + length + body + reported + length
 
 
 def _padded(data: bytes) -> bytes:

@@ -59,7 +59,7 @@ class Pairing:
     """Takes frames in their order, gives exchanges as soon as it is known what became of each."""
 
     def __init__(self) -> None:
-        self._asked: _Asked | None = None
+        self._requested: _Asked | None = None
         self._last: HeardExchange | None = None
         self._replied = float("-inf")
         """When the last reply ended."""
@@ -68,61 +68,64 @@ class Pairing:
 
     def is_due(self, device: int, function: int) -> bool:
         """Whether a reply of a device to a function is due."""
-        asked = self._asked.frame if self._asked is not None else None
-        return asked is not None and (asked.device, asked.function) == (device, function)
+        requested = self._requested.frame if self._requested is not None else None
+        return requested is not None and (requested.device, requested.function) == (
+            device,
+            function,
+        )
 
     def take(self, frame: HeardFrame) -> tuple[list[HeardExchange], bool | None]:
         """A frame; what is known by it, and whether it is a request (None of noise)."""
         if not frame.whole:
-            if self._asked is not None:
-                self._asked.noise += frame.data
+            if self._requested is not None:
+                self._requested.noise += frame.data
             return [], None
-        asked = self._asked
-        if asked is not None and _answers(asked.frame, frame):
-            return [self._answered(asked, frame)], False
+        requested = self._requested
+        if requested is not None and _answers(requested.frame, frame):
+            return [self._answered(requested, frame)], False
         if not fits_request(frame.data):
             return [self._stray(frame)], False  # the reply that is due may still come
         found = self._given_up(frame)
         if frame.device == BROADCAST_DEVICE:
             return [*found, self._kept(_exchange(frame, "broadcast"))], True
-        self._asked = _Asked(frame)
+        self._requested = _Asked(frame)
         return found, True
 
     def wait(self, now: float, longest: float = GIVEN_UP_AFTER) -> list[HeardExchange]:
         """The time is `now`, and nothing has come: the request that waits for `longest` seconds."""
-        if self._asked is None or now - self._asked.frame.ended < longest:
+        if self._requested is None or now - self._requested.frame.ended < longest:
             return []
         return self._given_up()
 
-    def _answered(self, asked: _Asked, frame: HeardFrame) -> HeardExchange:
-        self._asked = None
+    def _answered(self, requested: _Asked, frame: HeardFrame) -> HeardExchange:
+        self._requested = None
         self._replied, self._reply = frame.ended, frame.data
         refused = bool(frame.function & REFUSAL)
         return self._kept(
             HeardExchange(
-                asked.frame.begun,
+                requested.frame.begun,
                 frame.device,
-                asked.frame.function,
+                requested.frame.function,
                 "exception" if refused else "ok",
-                asked.frame.pdu,
+                requested.frame.pdu,
                 frame.pdu,
-                max(0.0, frame.begun - asked.frame.ended),
-                asked.noise,
+                max(0.0, frame.begun - requested.frame.ended),
+                requested.noise,
             )
         )
 
     def _given_up(self, following: HeardFrame | None = None) -> list[HeardExchange]:
         """The request that is open, without an answer; `following` is the next request."""
-        asked, self._asked = self._asked, None
-        if asked is None:
+        requested, self._requested = self._requested, None
+        if requested is None:
             return []
-        frame = asked.frame
+        frame = requested.frame
         # a second drive at the same address says the same a moment later
         if frame.data == self._reply and frame.begun - self._replied < AGAIN_WITHIN:
             return [self._again(frame)]
-        answer: HeardAnswer = "damaged" if asked.noise else "none"
+        answer: HeardAnswer = "damaged" if requested.noise else "none"
         waited = max(0.0, following.begun - frame.ended) if following is not None else None
-        return [self._kept(_exchange(frame, answer, asked.noise, waited))]
+        return [self._kept(_exchange(frame, answer, requested.noise, waited))]
 
     def _stray(self, frame: HeardFrame) -> HeardExchange:
         """A reply that nobody waits for."""
@@ -154,9 +157,9 @@ def _exchange(
     )
 
 
-def _answers(asked: HeardFrame, frame: HeardFrame) -> bool:
+def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
     """Whether a frame is the reply to a request, refusals too."""
-    if frame.device != asked.device or frame.function & ~REFUSAL != asked.function:
+    if frame.device != requested.device or frame.function & ~REFUSAL != requested.function:
         return False
     if frame.function & REFUSAL:
         return True
@@ -164,14 +167,14 @@ def _answers(asked: HeardFrame, frame: HeardFrame) -> bool:
         return False
     function = frame.function
     if function in SAME_BOTH_WAYS:
-        return frame.pdu[:3] == asked.pdu[:3] and not _repeated(asked, frame)
+        return frame.pdu[:3] == requested.pdu[:3] and not _repeated(requested, frame)
     if function in (3, 4, 23):
-        return len(frame.pdu) == 2 + 2 * int.from_bytes(asked.pdu[3:5], "big")
+        return len(frame.pdu) == 2 + 2 * int.from_bytes(requested.pdu[3:5], "big")
     if (count := _ECHOED.get(function)) is not None:
-        return frame.pdu[:count] == asked.pdu[:count]
-    return not _repeated(asked, frame)
+        return frame.pdu[:count] == requested.pdu[:count]
+    return not _repeated(requested, frame)
 
 
-def _repeated(asked: HeardFrame, frame: HeardFrame) -> bool:
+def _repeated(requested: HeardFrame, frame: HeardFrame) -> bool:
     """Whether a master that got no answer has sent the same once more."""
-    return frame.data == asked.data and frame.begun - asked.ended > REPLY_WITHIN
+    return frame.data == requested.data and frame.begun - requested.ended > REPLY_WITHIN

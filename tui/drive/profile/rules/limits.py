@@ -100,8 +100,8 @@ def _refused(parameter: Parameter, raw: int, names: dict[str, str]) -> str:
     if not low <= raw <= high and not 0 <= raw <= 0xFFFF:
         return f"does not fit {parameter.type}: {low} to {high}."
     if names and is_enumeration(parameter):
-        told = ", ".join(f"{key} {text}" for key, text in names.items())
-        return f"is none of its values: {told}."
+        reported = ", ".join(f"{key} {text}" for key, text in names.items())
+        return f"is none of its values: {reported}."
     least, most = raw_range(parameter)
     if not least <= raw <= most:
         return f"is outside its limits, {least} to {most}."

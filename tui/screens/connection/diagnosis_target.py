@@ -9,12 +9,12 @@ from .choices import same_line
 from .line_keys import LineKeys
 
 
-class WhyMeant(LineKeys):
+class DiagnosisTarget(LineKeys):
     """The line under the cursor, the drive under the cursor, else the first address to search."""
 
-    def why_meant(self) -> WhyTarget | None:
+    def why_target_now(self) -> WhyTarget | None:
         """None where no line is chosen, or no address can be made out."""
-        text = self._line_meant()
+        text = self._line_target()
         if not text:
             return None
         here = self.app.open_line_of(text)
@@ -37,9 +37,9 @@ class WhyMeant(LineKeys):
 
     def line_to_hear(self) -> tuple[str, str]:
         """The line that is meant, empty for none, and the profile that was typed for it."""
-        return self._line_meant(), self.form.profile
+        return self._line_target(), self.form.profile
 
-    def _line_meant(self) -> str:
+    def _line_target(self) -> str:
         choice, text = self.lines.chosen, self.app.line_text
         if choice is not None and (self.focused is self.lines or not text):
             return self.line_of(choice)

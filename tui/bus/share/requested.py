@@ -27,7 +27,7 @@ class RequestsAsked:
         self._tell = tell
         self._loop = asyncio.get_running_loop()
         self._numbers = itertools.count(1)
-        self._asked: dict[int, Job] = {}
+        self._requested: dict[int, Job] = {}
         self._left: set[int] = set()
         """Stops that nobody waits for any more."""
         self._described: dict[int, object] = {}
@@ -43,13 +43,13 @@ class RequestsAsked:
         self.describe(request.device, job.limits)
         kind, fields = request_form(request)
         number = next(self._numbers)
-        self._asked[number] = job
+        self._requested[number] = job
         job.answer.add_done_callback(lambda answer: self._withdrawn(number, answer.cancelled()))
         limits = job.limits if request.device == BROADCAST else None
         self._tell(
             Asking(
                 number, kind, fields, job.priority, job.replaceable, job.max_age,
-                job.stamp, job.asked, limits, job.within,
+                job.stamp, job.requested, limits, job.within,
             )
         )  # fmt: skip
 
@@ -66,12 +66,12 @@ class RequestsAsked:
                 self._loop.call_soon_threadsafe(self._withdraw, number)
 
     def _withdraw(self, number: int) -> None:
-        if self._asked.pop(number, None) is not None:
+        if self._requested.pop(number, None) is not None:
             self._tell(Withdraw(number))
 
     def answered(self, message: Answer | Failed) -> None:
         """The owner tells what became of a request."""
-        job = self._asked.pop(message.number, None)
+        job = self._requested.pop(message.number, None)
         if job is None or not (job.begun or job.answer.set_running_or_notify_cancel()):
             return
         job.begun = True
@@ -90,12 +90,12 @@ class RequestsAsked:
 
     def fail_all(self, why: str) -> None:
         """Fail all that waits. Nothing of it is sent later, except the words of stops."""
-        for number, job in list(self._asked.items()):
+        for number, job in list(self._requested.items()):
             stops = job.priority is Priority.STOP
             if stops and job.request.changes:
                 if number not in self._left:
                     self._left.add(number)
-                    self._asked[number] = _without_asker(job)
+                    self._requested[number] = _without_asker(job)
                     job.fail(LineLost(why))
                 continue
             self._withdraw(number)
@@ -108,8 +108,8 @@ class RequestsAsked:
 
     def give_up_all(self, *, closing: bool) -> None:
         """The owner is gone, or `closing`: this program leaves it."""
-        asked, self._asked = self._asked, {}
-        for job in asked.values():
+        requested, self._requested = self._requested, {}
+        for job in requested.values():
             if closing and job.request.changes:
                 job.fail(LineClosed(f"The line was closed during the request.{UNKNOWN_FATE}"))
             else:
@@ -135,5 +135,5 @@ class RequestsAsked:
 def _without_asker(job: Job) -> Job:
     """The same job, for whose answer nobody waits."""
     again = Job(job.request, job.priority, job.limits)
-    again.program, again.asked = job.program, job.asked
+    again.program, again.requested = job.program, job.requested
     return again
