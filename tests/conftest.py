@@ -52,8 +52,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Deal the modules to the workers, the costly first: no long test is left for the end."""
     workers: int = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
-        modules = [list(of_one) for _, of_one in groupby(items, _dealt_with)]
-        modules.sort(key=lambda of_one: COSTLY_FIRST.get(of_one[0].path.parent.name, 9))
+        modules = [list(module) for _, module in groupby(items, _dealt_with)]
+        modules.sort(key=lambda module: COSTLY_FIRST.get(module[0].path.parent.name, 9))
         dealt = [module for worker in range(workers) for module in modules[worker::workers]]
         items[:] = chain.from_iterable(dealt)
 

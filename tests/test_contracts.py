@@ -189,7 +189,7 @@ def test_every_folder_of_tests_is_run_by_one_of_the_two_commands() -> None:
     assert re.search(rf"^layer {layer}.* tests/line$", CI.read_text("utf-8"), re.MULTILINE)
 
 
-def test_what_the_test_command_leaves_out_is_run_by_the_gate() -> None:
+def test_gate_runs_tests_that_test_command_omits() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     options = settings["tool"]["pytest"]["ini_options"]
     assert options["addopts"].endswith(" -m 'not sweep'")

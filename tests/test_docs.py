@@ -227,7 +227,7 @@ def rooms_that_know_a_family(package: Path) -> set[str]:
     }
 
 
-def test_every_room_that_knows_a_family_is_told() -> None:
+def test_every_room_that_knows_a_family_is_reported() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     section = text.partition(f"\n## {HOLDS_FAMILIES}")[2].partition("\n## ")[0]
     reported = {span for span in SPAN.findall(section) if span.startswith("tui")}

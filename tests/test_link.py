@@ -44,7 +44,7 @@ def test_a_shaped_link_takes_small_pieces() -> None:
 
 
 @pytest.mark.parametrize("link", [Link(), Link(1_000_000, 0.02)], ids=["no limit", "shaped"])
-def test_what_goes_in_comes_out_whole_and_in_order(link: Link) -> None:
+def test_output_is_whole_and_in_order(link: Link) -> None:
     sent = bytes(range(256)) * 200
     with echo() as port, Proxy(port, link).at_work() as proxy, connected(proxy) as end:
         threading.Thread(target=end.sendall, args=(sent,), daemon=True).start()

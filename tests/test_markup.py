@@ -52,7 +52,7 @@ def faults(nodes: Iterable[ast.AST], path: Path) -> Iterator[str]:
     """What in a module could take a text for markup, or print it as it is."""
     for node in nodes:
         if isinstance(node, ast.Call):
-            yield from _of_call(node, path)
+            yield from _call_texts(node, path)
         elif isinstance(node, ast.Attribute | ast.Name):
             name = node.attr if isinstance(node, ast.Attribute) else node.id
             if name in ("from_markup", "render_markup"):
@@ -63,7 +63,7 @@ def faults(nodes: Iterable[ast.AST], path: Path) -> Iterator[str]:
                     yield f"{target.attr} is read as markup"
 
 
-def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
+def _call_texts(call: ast.Call, path: Path) -> Iterator[str]:
     name = _name(call.func)
     off = any(_is(k, "markup", value=False) for k in call.keywords)
     if any(k.arg == "markup" and not _is(k, "markup", value=False) for k in call.keywords):
@@ -144,7 +144,7 @@ def test_the_check_sees_what_it_is_for(line: str) -> None:
     assert list(faults(parsed(line), PACKAGE / "screens" / "new.py"))
 
 
-def test_what_is_right_passes() -> None:
+def test_correct_text_passes() -> None:
     assert list(faults(parsed("console().print(table)"), PACKAGE / "cli" / "new.py")) == []
     right = 'Plain(name); entry(Text(name)); table.add_row(Text(name), ""); app.notify(name)'
     assert list(faults(parsed(right), PACKAGE / "screens" / "new.py")) == []

@@ -83,7 +83,7 @@ def test_the_table_of_what_python_knows_is_empty() -> None:
     ['RESETS = ("cfg", "bfr")', 'if parameter.group == "Command": pass', 'DEMO = {"atv21": 35.0}',
      'TEXT = "at most to HSP"', 'if chart.kind == "drivecom": pass', 'WORD = "15.01"'],
 )  # fmt: skip
-def test_what_is_planted_is_found(
+def test_planted_defect_is_found(
     planted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = tmp_path / "planted.py"

@@ -84,7 +84,7 @@ def test_with_an_address_pictures_and_links_lead_to_their_version(tmp_path: Path
     assert {"Homepage", "Documentation", "Changelog", "Issues", "Source"} <= urls.keys()
 
 
-def test_what_leads_somewhere_already_stays() -> None:
+def test_existing_link_stays() -> None:
     text = "[a](https://code.example/x) [b](#keys) [c](mailto:a@b.example) `[lines]`"
     for address in ("", ADDRESS):
         assert as_on_a_package_page(text, address, "1") == text

@@ -43,7 +43,7 @@ def sizes(source: str, tree: ast.Module, module: str) -> Iterator[tuple[str, int
             yield f"{module}:{node.name}", len(public), MOST_METHODS
 
 
-def of_project() -> list[tuple[str, int, int]]:
+def project_sizes() -> list[tuple[str, int, int]]:
     return [
         size
         for path in modules()
@@ -63,11 +63,11 @@ def too_large(found: list[tuple[str, int, int]]) -> list[str]:
 
 
 def test_no_module_and_no_class_is_past_its_size() -> None:
-    assert too_large(of_project()) == [], "cut it along its reasons to change"
+    assert too_large(project_sizes()) == [], "cut it along its reasons to change"
 
 
 def test_every_exception_is_needed_and_has_its_reason() -> None:
-    past = {name: size for name, size, most in of_project() if size > most}
+    past = {name: size for name, size, most in project_sizes() if size > most}
     assert EXCEPTIONS.keys() <= past.keys(), "it has become small: take its exception out"
     assert all(reason for _, reason in EXCEPTIONS.values())
 
@@ -79,7 +79,7 @@ def test_the_architecture_tells_what_is_past_its_size_and_how_far() -> None:
     )
     past = {
         (name.partition(":")[2] or name.removesuffix(".py")): str(size)
-        for name, size, most in of_project()
+        for name, size, most in project_sizes()
         if size > most
     }
     assert dict(rows) == past
@@ -101,5 +101,5 @@ def test_the_architecture_tells_what_is_past_its_size_and_how_far() -> None:
     ],
     ids=["long", "just short enough", "many methods", "private methods"],
 )
-def test_what_is_too_large_is_told(source: str, reported: list[str]) -> None:
+def test_oversized_module_is_reported(source: str, reported: list[str]) -> None:
     assert too_large(list(sizes(source, ast.parse(source), "m.py"))) == reported

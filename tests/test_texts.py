@@ -76,33 +76,33 @@ def _no_imperative(text: str) -> int:
 
 
 CHECKS: dict[int, Check] = {
-    1: Check("UDS", of(r"\b(is|are|was|be) told\b"), 179, "it is told"),
-    2: Check("UDS", of(r"\btells?\b(?! apart)"), 354, "a drive tells it"),
+    1: Check("UDS", of(r"\b(is|are|was|be) told\b"), 149, "it is told"),
+    2: Check("UDS", of(r"\btells?\b(?! apart)"), 300, "a drive tells it"),
     3: Check("UDS", of(r"\bask(s|ed)? (\S+ ){0,2}on\b"), 37, "the drive is asked on"),
-    4: Check("UDS", of(r"asked? no more|nobody asks"), 27, "it is asked no more"),
-    5: Check("UDS", of(r"\bof now\b"), 27, "values of now"),
+    4: Check("UDS", of(r"asked? no more|nobody asks"), 20, "it is asked no more"),
+    5: Check("UDS", of(r"\bof now\b"), 25, "values of now"),
     6: Check("UD", of(r"unless told"), 0, "unless told otherwise"),
-    7: Check("UDS", of(r"\bwhoever\b|\bfor who\b|who it is"), 88, "whoever starts"),
-    8: Check("UDS", of(r"(?<!there )\b(is|are) no (?!longer)\w+"), 115, "x is no line"),
-    9: Check("UDS", of(r"\banew\b|\bmend"), 95, "read anew"),
-    10: Check("UDS", of(r"\ball the same\b|(?<!restart )\bby itself\b"), 60, "ends by itself"),
+    7: Check("UDS", of(r"\bwhoever\b|\bfor who\b|who it is"), 78, "whoever starts"),
+    8: Check("UDS", of(r"(?<!there )\b(is|are) no (?!longer)\w+"), 109, "x is no line"),
+    9: Check("UDS", of(r"\banew\b|\bmend"), 91, "read anew"),
+    10: Check("UDS", of(r"\ball the same\b|(?<!restart )\bby itself\b"), 56, "ends by itself"),
     11: Check("UD", of(r"from (here|elsewhere)\b|\bof others\b"), 36, "commanded from here"),
     12: Check("UD", of(r"\bgo(es)? (out|by|with)\b|\bwent out\b"), 17, "the frame goes out"),
     13: Check("U", of(r"there already|is there again"), 4, "x is there already"),
     14: Check("UD", of(r"\b(no|some|any)body\b"), 50, "nobody answers"),
-    15: Check("UDS", of(r"\bstands?\b(?! for\b)"), 224, "it stands there"),
-    16: Check("UDS", of(r"\b(became|becomes?) of\b|\bc(a|o)mes? to\b"), 142, "what becomes of it"),
+    15: Check("UDS", of(r"\bstands?\b(?! for\b)"), 200, "it stands there"),
+    16: Check("UDS", of(r"\b(became|becomes?) of\b|\bc(a|o)mes? to\b"), 86, "what becomes of it"),
     17: Check("UDS", of(r"\btime-outs?\b"), 0, "its time-out"),
     18: Check(
         "UDSNL",
         of("colour|favourite|neighbour|behaviour|analogue|licence|recognis"),
-        39,
+        38,
         "one_colour",
     ),
     19: Check(
-        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), 300, "told_by"
+        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), 3, "told_by"
     ),
-    20: Check("N", of(r"^_?of_", 0), 64, "of_drives"),
+    20: Check("N", of(r"^_?of_", 0), 0, "drive_documents"),
     21: Check(
         "U",
         of(r"^(takes|keeps|leaves|writes|gives|does|closes|opens)( \w+)?$", 0),
@@ -110,7 +110,7 @@ CHECKS: dict[int, Check] = {
         "takes it",
     ),
     22: Check("L", _no_imperative, 1, "What a drive does"),
-    23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), 1545, "What it does."),
+    23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), 2, "What it does."),
     24: Check("D", _long, 306, "It is: one; and then two: three."),
     25: Check(
         "G",
@@ -119,7 +119,7 @@ CHECKS: dict[int, Check] = {
         0,
         "The line is open",
     ),
-    26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), 305, "test_who_asks"),
+    26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), 0, "test_who_asks"),
 }  # fmt: skip
 
 

@@ -86,6 +86,6 @@ def test_nothing_is_kept_that_nothing_uses() -> None:
         ("class C:\n    def on_key(self): ...\nC()\n", []),
     ],
 )
-def test_what_is_used_nowhere_is_found(source: str, reported: list[str]) -> None:
+def test_unused_name_is_found(source: str, reported: list[str]) -> None:
     found = unused({"m.py": ast.parse(source)})
     assert sorted(found) == sorted(f"m.py: {name}" for name in reported)

@@ -76,7 +76,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         self.low_bandwidth = low_bandwidth
         self.mouse = mouse
         self.bell_rings = bell
-        """Whether a new fault rings."""
+        """True if a new fault rings."""
         self.period = 0.5
         self.events = EventLog()
         self.opening = LineOpening(start or "")
@@ -88,7 +88,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         if drive_documents is not None:
             self.drive_documents = drive_documents
         self.leave_running = self.settled = leave_running
-        """Whether it was decided what becomes of motors that run by an order from here."""
+        """True if it was decided what becomes of motors that run by an order from here."""
 
     def get_theme(self, theme_name: str) -> Theme | None:
         """The panel's theme, or one of Textual's own."""
@@ -99,7 +99,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         return with_own_keys(super().get_driver_class())
 
     def look_around(self) -> None:
-        """What must be seen on every screen, and whether the line is still the same."""
+        """Check what every screen shows, and that the line is unchanged."""
         super().look_around()
         if self.is_running:
             self.mind_line()

@@ -117,7 +117,7 @@ async def test_a_read_brings_the_words_and_when_they_came(end: Open) -> None:
     assert made.sent() == [bytes.fromhex("03 0064 0003")]
 
 
-async def test_what_is_written_is_read_back(end: Open) -> None:
+async def test_write_is_read_back(end: Open) -> None:
     made = end()
     before = (await made.line.read(THERE, 101)).time
     assert await made.line.write(THERE, 101, [7]) >= before
@@ -128,7 +128,7 @@ async def test_what_is_written_is_read_back(end: Open) -> None:
     assert [pdu[0] for pdu in made.sent()] == [3, 6, 16, 16, 23]
 
 
-async def test_an_exception_is_told_with_its_code_and_meaning(end: Open) -> None:
+async def test_an_exception_is_reported_with_its_code_and_meaning(end: Open) -> None:
     made = end()
     with pytest.raises(DeviceException, match="an address is not known") as read:
         await made.line.read(THERE, 108, 4)
@@ -144,7 +144,7 @@ async def test_an_exception_is_told_with_its_code_and_meaning(end: Open) -> None
 BRISK = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=0.3, retries=0)
 
 
-async def test_silence_is_told_and_a_write_is_sent_once(end: Open) -> None:
+async def test_silence_is_reported_and_a_write_is_sent_once(end: Open) -> None:
     made = end(timing=BRISK)
     with pytest.raises(NoAnswer) as raised:
         await made.line.write(SILENT, 100, [5])
@@ -187,7 +187,7 @@ async def test_a_device_is_sent_what_describe_allows(end: Open) -> None:
         await made.line.read(3, 100, 2)  # nobody described it
 
 
-async def test_what_is_forbidden_at_the_last_moment_is_not_sent(end: Open) -> None:
+async def test_forbidden_request_is_not_sent_at_last_moment(end: Open) -> None:
     made = end()
     with pytest.raises(RequestRefused, match="A stop came"):
         await made.line.write(THERE, 100, [6], forbidden=lambda: "A stop came.")
@@ -210,7 +210,7 @@ async def test_identification_diagnosis_and_broadcast(end: Open) -> None:
     assert [pdu[0] for pdu in made.sent()] == [43, 8, 6, 3]
 
 
-async def test_a_device_without_function_43_is_asked_by_17(end: Open) -> None:
+async def test_a_device_without_function_43_is_identified_by_17(end: Open) -> None:
     made = end()
     made.line.describe(THERE, CAUTIOUS)
     found = await made.line.identify(THERE, function=17)
@@ -218,7 +218,7 @@ async def test_a_device_without_function_43_is_asked_by_17(end: Open) -> None:
     assert made.sent() == [bytes([17])]
 
 
-async def test_who_asks_a_stranger_says_how_long_is_waited(end: Open) -> None:
+async def test_caller_sets_wait_for_unknown_device(end: Open) -> None:
     made = end(timing=Timing(first_timeout=600.0, scan_timeout=600.0, retries=0))
     with pytest.raises(NoAnswer):
         await made.line.read(SILENT, 100, priority=Priority.BACKGROUND, within=0.01)
@@ -227,7 +227,7 @@ async def test_who_asks_a_stranger_says_how_long_is_waited(end: Open) -> None:
     assert len(made.sent()) == 2
 
 
-async def test_who_looks_whether_a_silent_device_is_there_waits_for_no_back_off() -> None:
+async def test_probe_of_silent_device_waits_for_no_back_off() -> None:
     held.update(HELD | {17: 0})  # function 17 meets silence
     with TcpPeer(device) as peer:
         timing = replace(PATIENT, back_off_first=600.0, back_off_longest=600.0, retries=0)
@@ -324,7 +324,7 @@ async def test_a_write_whose_answer_is_lost_may_have_been_taken(
     assert line.devices[THERE].words[100] == 6
 
 
-async def test_what_was_never_sent_is_not_in_the_log(line: FakeLine) -> None:
+async def test_unsent_request_is_not_in_log(line: FakeLine) -> None:
     line.fail_write(THERE, 100, Superseded(THERE, 100))
     with pytest.raises(Superseded):
         await line.write(THERE, 100, [5])

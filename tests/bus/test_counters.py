@@ -21,7 +21,7 @@ from .peer import PtyPeer, Step, TcpPeer, eventually, honest, reply, tcp_reply, 
 READ_SIZE, REPLY_SIZE, REFUSAL_SIZE = 8, 7, 5
 
 
-def of_some_kinds(request: bytes, _count: int) -> Sequence[Step]:
+def answer_some_kinds(request: bytes, _count: int) -> Sequence[Step]:
     """Refuse register 10 with 2, damage 20, answer nothing to 30, and all else rightly."""
     address = int.from_bytes(request[2:4], "big")
     if address == 10:
@@ -33,7 +33,7 @@ def of_some_kinds(request: bytes, _count: int) -> Sequence[Step]:
 
 
 async def test_each_device_has_its_own_counts(open_line: OpenLine) -> None:
-    with PtyPeer(of_some_kinds) as peer:
+    with PtyPeer(answer_some_kinds) as peer:
         line = open_line(peer.path, replace(BRISK, retries=1))
         for device, address in ((1, 5), (1, 10), (1, 20), (2, 5), (2, 6), (1, 30)):
             with suppress(ExchangeError):
@@ -92,7 +92,7 @@ def test_a_turnaround_falls_into_one_bar(seconds: float, bar: int) -> None:
     assert [at for at, count in enumerate(tally.frozen(0.0).turnarounds) if count] == [bar]
 
 
-def test_what_was_given_out_does_not_change_any_more() -> None:
+def test_snapshot_does_not_change_later() -> None:
     tally = DeviceTally()
     before = tally.frozen(0.0)
     tally.count_exception(2)

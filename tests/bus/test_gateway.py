@@ -29,7 +29,7 @@ from tui.bus.gateway.server import HEADER, TcpGateway, TcpRequest
 from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 
 
-def test_what_each_function_asks() -> None:
+def test_requests_of_each_function() -> None:
     assert parse_request(bytes.fromhex("03 0C81 0002")) == ReadAsked(3, 3201, 2)
     assert parse_request(bytes.fromhex("04 0000 007D")) == ReadAsked(4, 0, 125)
     assert parse_request(bytes.fromhex("06 2135 0007")) == WriteAsked(6, 8501, (7,))
@@ -62,7 +62,7 @@ def test_what_each_function_asks() -> None:
         ("2B 0E 05 00", 3),
     ],
 )
-def test_what_is_not_exactly_a_request_is_refused(pdu: str, code: int) -> None:
+def test_malformed_request_is_refused(pdu: str, code: int) -> None:
     with pytest.raises(Unanswerable) as refused:
         parse_request(bytes.fromhex(pdu))
     assert refused.value.code == code
@@ -194,7 +194,7 @@ async def test_reads_that_pile_up_keep_no_write_in_the_socket() -> None:
     await gateway.close()
 
 
-async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> None:
+async def test_request_sent_before_close_is_carried_out() -> None:
     done: list[bytes] = []
     both = asyncio.Event()
 
@@ -218,7 +218,7 @@ async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> No
     await gateway.close()
 
 
-async def test_what_waited_while_the_loop_stood_still_is_told_apart() -> None:
+async def test_requests_delayed_by_a_suspended_loop_are_recognized() -> None:
     stale: list[bool] = []
     now = 100.0
     awake = Awake(lambda: now)
@@ -267,7 +267,7 @@ async def test_one_client_that_waits_holds_up_no_other() -> None:
     writer.close()
 
 
-async def test_who_has_long_asked_nothing_makes_room_for_a_further_client(
+async def test_idle_client_makes_room_for_another(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Programs that forgot 64 connections kept the one out that came to stop a motor."""

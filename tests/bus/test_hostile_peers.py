@@ -76,7 +76,7 @@ def context(strays: list[Piece]) -> LineContext:
     return LineContext(BRISK, trace, Tally(), time.monotonic, lambda piece, _: strays.append(piece))
 
 
-async def test_what_came_before_a_request_is_not_its_answer() -> None:
+async def test_bytes_before_a_request_are_not_its_reply() -> None:
     strays: list[Piece] = []
     transport = HeldBack(reply(b"\x01" + QUESTION + b"\0\0"))
     around = context(strays)
@@ -88,7 +88,7 @@ async def test_what_came_before_a_request_is_not_its_answer() -> None:
     master.close()
 
 
-async def test_what_came_while_the_program_stood_still_as_it_sent_is_no_answer() -> None:
+async def test_bytes_from_a_suspension_while_sending_are_no_reply() -> None:
     """Frozen between its look at the line and the request: an answer of before is there first."""
     strays: list[Piece] = []
     transport = HeldBack(b"")
@@ -109,7 +109,7 @@ async def test_what_came_while_the_program_stood_still_as_it_sent_is_no_answer()
     master.close()
 
 
-async def test_what_came_before_a_request_is_not_its_answer_by_a_guessed_number() -> None:
+async def test_bytes_before_a_request_with_guessed_number_are_no_reply() -> None:
     """The transaction ids of a client count up: whoever wants to can tell the next one."""
     transport = HeldBack(tcp_reply(bytes([0, 1, 0, 0, 0, 6, 1]) + QUESTION))
     around = context([])

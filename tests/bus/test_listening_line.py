@@ -76,7 +76,7 @@ def _leads_to(descriptor: int) -> str:
         return ""
 
 
-def test_a_port_that_goes_away_is_told(talk: Talk) -> None:
+def test_a_port_that_goes_away_is_reported(talk: Talk) -> None:
     with ListeningLine(SerialLink(talk.path), None, ME) as line:
         talk.close()
         with pytest.raises(LineLost, match="went away"):
@@ -152,7 +152,7 @@ def test_silence_and_characters_are_those_of_the_line(
     assert line.silence == pytest.approx(35 / 9600)
 
 
-def test_what_is_no_port_is_said_to_be_none_and_not_to_be_in_use(tmp_path: Path) -> None:
+def test_invalid_port_is_reported_as_invalid_not_busy(tmp_path: Path) -> None:
     """Every program has /dev/null open: `listen` named all of them."""
     notes = tmp_path / "notes"
     with notes.open("w"):

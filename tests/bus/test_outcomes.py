@@ -24,7 +24,7 @@ from tui.bus.tally import Tally
         (0.005, 0.02, 1.2, True),
     ],
 )
-def test_an_answer_is_asked_for_anew_where_it_waited_and_not_where_it_is_long(
+def test_an_answer_is_requested_again_where_it_waited_and_not_where_it_is_long(
     turnaround: float, on_wire: float, lay: float, anew: bool
 ) -> None:
     """A backup at 1200 baud asked for its first long answer again and again, without an end."""

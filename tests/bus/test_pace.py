@@ -28,7 +28,7 @@ def test_all_are_slowed_down_evenly_until_they_fit(wishes: list[tuple[float, flo
     assert factors[0] == 1.0 or load == pytest.approx(SHARE)
 
 
-def test_who_leaves_gives_time_back() -> None:
+def test_detached_client_gives_time_back() -> None:
     pace = Pace()
     pace.claim("a", 1, 0.09, 0.1)
     assert pace.claim("b", 1, 0.09, 0.1) == pytest.approx(0.2)
@@ -37,7 +37,7 @@ def test_who_leaves_gives_time_back() -> None:
     assert pace.claim("b", 1, 0.09, 0.1) == pytest.approx(0.1)
 
 
-def test_what_another_program_reads_of_the_same_device_is_read_once_for_both() -> None:
+def test_read_of_two_programs_is_sent_once() -> None:
     pace = Pace()
     pace.others = {1: 0.8}
     assert pace.claim("a", 1, 0.08, 0.1) == pytest.approx(0.1)

@@ -63,7 +63,7 @@ def test_counts_begin_anew_with_the_driver() -> None:
 
 
 @pytest.mark.parametrize("answered", [False, True])
-async def test_what_was_added_is_counted_where_an_answer_fails(answered: bool) -> None:
+async def test_added_request_is_counted_if_a_reply_fails(answered: bool) -> None:
     counts = counting(PortErrors(7, 1, 0, 0), PortErrors(10, 1, 2, 0))
     transport, tally = HeldBack(b""), Tally()
     around = LineContext(BRISK, Trace(9), tally, time.monotonic, lambda *_: None)

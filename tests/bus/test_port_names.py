@@ -31,7 +31,7 @@ def test_an_adapter_without_a_serial_number_is_known_by_its_socket(adapters: Ada
     assert (found.adapter, found.shared) == ("0403:6001", True)
 
 
-def test_two_of_one_make_share_their_by_id_name_and_are_told_apart(adapters: Adapters) -> None:
+def test_two_of_one_make_share_their_by_id_name_and_are_distinguished(adapters: Adapters) -> None:
     one = lasting_name(adapters.plug("ttyUSB0", "1.1"))
     two = lasting_name(adapters.plug("ttyUSB1", "1.2"))
     assert one.path != two.path
@@ -40,7 +40,7 @@ def test_two_of_one_make_share_their_by_id_name_and_are_told_apart(adapters: Ada
     assert lasting_name(str(shared)) == two
 
 
-def test_two_with_one_serial_number_are_told_apart(adapters: Adapters) -> None:
+def test_two_with_one_serial_number_are_distinguished(adapters: Adapters) -> None:
     one = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="0001"))
     assert not one.shared
     two = adapters.plug("ttyUSB1", "1.2", serial="0001")
@@ -63,7 +63,7 @@ def test_a_serial_number_with_signs_that_a_link_cannot_have(adapters: Adapters) 
     assert "by-id" in lasting_name(adapters.plug("ttyUSB0", "1.1", serial="A 5")).path
 
 
-def test_what_is_not_on_usb_has_its_own_path(adapters: Adapters) -> None:
+def test_port_without_usb_has_its_own_path(adapters: Adapters) -> None:
     (adapters.dev / "ttyS0").touch()
     port = adapters.port("ttyS0")
     found = lasting_name(port)

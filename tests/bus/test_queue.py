@@ -62,7 +62,7 @@ def stop_job(device: int) -> Job:
     return Job(WriteOne(device, 8501, 0x0007), Priority.STOP, WIDE)
 
 
-def test_what_must_wait_is_passed_by() -> None:
+def test_waiting_job_is_passed_by() -> None:
     queue = JobQueue(20)
     first, second = job(Priority.STOP, 1), job(Priority.POLL, 2)
     queue.put(first)
@@ -208,7 +208,7 @@ def test_scan_waits_shortly_for_unknown_devices_only(devices: Devices) -> None:
     assert devices.time_out(1, 6, background) == 1.0
 
 
-def test_who_asks_once_more_waits_longer(devices: Devices) -> None:
+def test_repeated_request_waits_longer(devices: Devices) -> None:
     waits = [devices.time_out(1, 3, p) for p in (Priority.BACKGROUND, Priority.PATIENT)]
     assert waits == [0.3, 0.8]
     hurried = Devices(Timing(first_timeout=0.2), mistakable=True)
@@ -218,7 +218,7 @@ def test_who_asks_once_more_waits_longer(devices: Devices) -> None:
     assert devices.backed_off(1, Priority.PATIENT, 10.0) is None
 
 
-def test_who_asks_says_how_long_a_stranger_is_waited_for(devices: Devices) -> None:
+def test_caller_sets_wait_for_stranger(devices: Devices) -> None:
     background = Priority.BACKGROUND
     assert devices.time_out(1, 3, background, 0.01) == 0.01
     assert devices.time_out(1, 3, background, 5.0) == 1.0, "no longer than the longest"
@@ -319,7 +319,7 @@ def test_copies_that_go_on_are_waited_for_as_long_as_they_come(devices: Devices)
     assert devices.state(1).lateness == 0.0
 
 
-def test_who_takes_a_line_over_knows_that_it_repeats_the_replies_of_all(devices: Devices) -> None:
+def test_new_owner_knows_that_line_repeats_replies(devices: Devices) -> None:
     devices.answered(1, EXPECTED, 0.01, 10.0)
     assert devices.stray(LATE, 10.004)
     heir = Devices(TIMING, mistakable=True)
@@ -339,7 +339,7 @@ def test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before(devices: Devic
     assert waited == pytest.approx(0.004 + TIMING.frame_gap)
 
 
-def test_what_repeats_quickly_stands_in_the_line(devices: Devices) -> None:
+def test_quickly_repeated_entries_share_a_line(devices: Devices) -> None:
     devices.answered(1, EXPECTED, 0.01, 10.0)
     assert devices.stray(LATE, 10.02)
     other = Read(2, 5, 1).expectation()
@@ -443,7 +443,7 @@ def test_a_feed_is_not_held_back_but_skips_what_may_come_late() -> None:
     assert devices.doubts(1, request.expectation(), 11.0) == (False, 1)
 
 
-def test_who_takes_a_line_over_knows_whose_replies_come_late_or_twice() -> None:
+def test_new_owner_knows_late_and_repeated_replies() -> None:
     owner, heir = (Devices(Timing(), mistakable=True) for _ in range(2))
     expectation = Read(1, 3201, 1).expectation()
     reply = Piece(frame(1, bytes([3, 2, 0, 7])), whole=True)

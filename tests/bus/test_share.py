@@ -52,7 +52,7 @@ async def test_the_second_program_works_as_if_it_had_the_line(share: Share) -> N
         assert other.state.status is LineStatus.CONNECTED
 
 
-async def test_an_exception_of_a_drive_reaches_whoever_asked(share: Share) -> None:
+async def test_an_exception_of_a_drive_reaches_its_sender(share: Share) -> None:
     def refuses(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(request[0], bytes([request[1] | 0x80, 2]))]
 
@@ -103,7 +103,7 @@ async def test_a_program_that_asks_for_too_much_takes_no_room_from_the_others(
         assert sum(isinstance(one, LineBusy) for one in results) == 2
 
 
-async def test_who_waits_no_more_is_not_asked_for(share: Share) -> None:
+async def test_abandoned_request_is_not_sent(share: Share) -> None:
     with PtyPeer(slow) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("backup")
@@ -131,7 +131,7 @@ async def test_a_client_sees_counters_devices_frames_and_the_state_of_the_line(
         eventually(lambda: any(one.data[1:4] == b"\x03\x00\x65" for one in other.trace))
 
 
-async def test_a_lost_line_is_told_to_clients_which_recover_with_it(
+async def test_a_lost_line_is_reported_to_clients_which_recover_with_it(
     share: Share, tmp_path: Path
 ) -> None:
     link = tmp_path / "port"
@@ -147,7 +147,7 @@ async def test_a_lost_line_is_told_to_clients_which_recover_with_it(
         assert (await other.read(1, 5)).words == (5,)
 
 
-async def test_what_was_read_for_one_is_taken_by_another_that_accepts_its_age(
+async def test_value_is_reused_by_program_that_accepts_its_age(
     share: Share,
 ) -> None:
     values = iter(range(100, 200))
@@ -227,7 +227,7 @@ async def test_a_drive_that_another_program_commands_takes_no_write(share: Share
         assert [one[5] for one in peer.requests if one[1] == 6] == [2, 3, 0, 4]
 
 
-async def test_of_two_that_claim_at_once_one_is_told_no(share: Share) -> None:
+async def test_of_two_that_claim_at_once_one_is_informed_no(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         await lines.open("panel").read(1, 1)
@@ -331,7 +331,7 @@ async def test_a_lock_that_was_taken_away_is_made_anew_so_that_nobody_else_owns(
     [b"", b"\0\xff" * 50, b'{"version":1}', b"[" * 4000, b"9" * 100_000],
     ids=["empty", "garbage", "half", "deep", "huge"],
 )
-async def test_what_a_lock_file_holds_keeps_nobody_out(
+async def test_damaged_lock_file_keeps_nobody_out(
     share: Share, tmp_path: Path, held: bytes
 ) -> None:
     place = place_in(tmp_path)
@@ -375,9 +375,7 @@ async def test_a_path_that_is_too_long_for_a_socket_is_none_for_us(
         assert [one.suffix for one in folder.iterdir()] == [".sock"]
 
 
-async def test_where_no_folder_takes_a_socket_the_line_works_unshared(
-    share: Share, tmp_path: Path
-) -> None:
+async def test_line_works_unshared_without_socket_folder(share: Share, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     place = SharePlace("serial:line", tmp_path / "lines", (tmp_path / "file",))
     with PtyPeer(honest) as peer:
@@ -388,7 +386,7 @@ async def test_where_no_folder_takes_a_socket_the_line_works_unshared(
         await line.write(1, 8, [1])
 
 
-async def test_how_long_a_stranger_is_waited_for_is_said_to_the_owner(share: Share) -> None:
+async def test_how_long_a_stranger_is_waited_for_is_reported_to_the_owner(share: Share) -> None:
     patient = replace(QUICK, first_timeout=600.0, scan_timeout=600.0, retries=0)
     with PtyPeer(silent) as peer:
         lines = share(peer.path)

@@ -62,7 +62,9 @@ async def come(condition: Callable[[], bool]) -> None:
 # The owner ends
 
 
-async def test_the_owners_end_hands_the_line_over_and_reads_are_asked_anew(share: Share) -> None:
+async def test_the_owners_end_hands_the_line_over_and_reads_are_requested_again(
+    share: Share,
+) -> None:
     with PtyPeer(slow_at_77) as peer:
         lines = share(peer.path)
         owner, other, third = (lines.open(name) for name in ("panel", "watch", "remote"))
@@ -272,7 +274,7 @@ NONSENSE = {
 
 
 @pytest.mark.parametrize("output", NONSENSE.values(), ids=NONSENSE.keys())
-async def test_what_one_program_says_costs_the_others_nothing(share: Share, output: bytes) -> None:
+async def test_message_of_one_program_costs_others_nothing(share: Share, output: bytes) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")

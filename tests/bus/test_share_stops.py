@@ -64,7 +64,7 @@ async def refused(task: asyncio.Task[float]) -> str:
     return str(caught.value)
 
 
-async def test_a_stop_voids_what_any_program_meant_for_that_drive_and_only_that(
+async def test_a_stop_discards_pending_work_for_that_drive_and_only_that(
     share: Share,
 ) -> None:
     with PtyPeer(slow) as peer:
@@ -88,7 +88,7 @@ async def test_a_stop_voids_what_any_program_meant_for_that_drive_and_only_that(
             await one.write(1, 1, [RUN])
 
 
-async def test_each_is_told_of_a_stop_once_and_by_whom(share: Share) -> None:
+async def test_each_is_reported_a_stop_once_and_by_which_program(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         programs = [lines.open(name) for name in ("panel", "remote", "run")]
@@ -272,7 +272,7 @@ async def test_a_keeper_in_another_container_is_named_with_what_to_do(share: Sha
             await send_stop(other, 1)
 
 
-async def test_what_waits_for_a_frozen_owner_for_long_is_reported_and_never_sent(
+async def test_request_for_frozen_owner_is_reported_and_not_sent_late(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -320,7 +320,7 @@ async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share
         assert [one for one in output if "does not answer" in one] == []
 
 
-async def test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew(
+async def test_an_answer_that_waited_for_a_stopped_program_is_requested_again(
     share: Share,
 ) -> None:
     """Nobody can tell when it came: its time would be that of the program's going on."""
@@ -335,7 +335,7 @@ async def test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew(
         assert len(peer.requests) == 2
 
 
-async def test_who_comes_after_a_stop_is_told_when_it_was_given(share: Share) -> None:
+async def test_late_client_learns_when_stop_was_given(share: Share) -> None:
     """A command that was typed before the stop, and comes to the line after it, must know."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)

@@ -102,9 +102,7 @@ def test_json_is_one_document_after_writing_too(line: str) -> None:
         (("look",), 2, "look"),
     ],
 )
-def test_what_is_refused_and_with_which_status(
-    arguments: tuple[str, ...], status: int, says: str
-) -> None:
+def test_refusals_and_their_statuses(arguments: tuple[str, ...], status: int, says: str) -> None:
     assert says in refused(status, "sim:atv71", *arguments)
 
 
@@ -128,7 +126,7 @@ def test_a_running_motor_keeps_its_assignment() -> None:
         assert "Nothing was written" in output
 
 
-def test_what_a_signal_cuts_short_is_told_by_slot(
+def test_write_cut_by_signal_is_reported_by_slot(
     line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing was told of the slots that were written by then."""

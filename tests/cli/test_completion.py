@@ -84,7 +84,7 @@ def test_codes() -> None:
     assert completed("read sim:nosuch AC") == []
 
 
-def test_what_is_wrong_completes_to_nothing() -> None:
+def test_wrong_word_completes_to_nothing() -> None:
     assert completed("sttaus x") == []
     assert completed("block /dev/ttyUSB0 ver") == ["verify"]
     assert completed("compare fac") == ["factory"]

@@ -41,7 +41,7 @@ def test_the_control_is_taken_and_given_back(line: str) -> None:
     assert held(line, IN_FORCE) == 0
 
 
-def test_6_a_stop_gives_nothing_back_unarmed_but_stops(line: str) -> None:
+def test_stop_without_arming_gives_nothing_back_exits_with_6(line: str) -> None:
     put(line, IN_FORCE, 1)
     put(line, COMMAND_WORD, 0x0003)
     done = invoked("stop", line, *DRIVE, "--give-back")
@@ -54,23 +54,23 @@ def test_6_a_stop_gives_nothing_back_unarmed_but_stops(line: str) -> None:
     assert held(line, IN_FORCE) == 1
 
 
-def test_5_the_control_is_not_taken_where_that_would_start_the_motor(line: str) -> None:
+def test_control_that_would_start_motor_is_not_taken_exits_with_5(line: str) -> None:
     put(line, COMMAND_WORD, 0x0003)
     output = motor(5, line, *DRIVE, "--arm", "--take-control")
     assert "the motor would start as soon as it is in force" in output
     assert held(line, IN_FORCE) == 0
 
 
-def test_2_giving_back_is_for_one_drive() -> None:
+def test_giving_back_needs_one_drive_exits_with_2() -> None:
     refused(2, "stop", "sim:powerdrive", "--all", "--give-back")
 
 
-def test_5_a_family_without_a_control_to_take() -> None:
+def test_family_without_control_to_take_exits_with_5() -> None:
     output = motor(5, "sim:atv71@1", "--arm", "--take-control")
     assert "has no control to take" in output
 
 
-def test_6_a_family_without_a_control_to_give_back_is_stopped() -> None:
+def test_family_without_control_to_give_back_is_stopped_exits_with_6() -> None:
     output = refused(6, "stop", "sim:atv71@1", "--give-back", "--arm")
     assert "has no control to give back" in output
 

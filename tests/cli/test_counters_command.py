@@ -31,7 +31,7 @@ def test_a_good_line_ends_with_0() -> None:
     assert (minutes["line"]["foreign"], minutes["line"]["strays"]) == (0, 0)
 
 
-def test_lost_answers_end_with_1_and_are_told() -> None:
+def test_lost_answers_end_with_1_and_are_reported() -> None:
     with tcp_line("atv71@2", "--line-fault", "lost=0.2", "--seed", "3") as line:
         reported = counted(1, line, "-d", "2", "--frames", "10")
         (found,) = reported["differences"]

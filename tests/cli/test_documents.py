@@ -106,7 +106,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_what_a_command_prints_fits_the_schema(name: str, folder: Path) -> None:
+def test_printed_documents_fit_the_schema(name: str, folder: Path) -> None:
     status, words, form = RUNS[name]
     typed = [word.replace("FOLDER", str(folder)) for word in words]
     reported = documents(ended(status, *typed, "--json").stdout)
@@ -128,7 +128,7 @@ def test_a_drive_that_is_held() -> None:
     assert "HoldDocument" in SEEN
 
 
-def test_what_a_stop_sent_first_is_told() -> None:
+def test_first_stop_word_is_reported() -> None:
     (reported,) = documents(ended(0, "stop", *DRIVE, "--json").stdout)
     (first,) = reported["first"]
     assert (first["address"], first["word"], first["answer"]) == (8501, 7, "ok")

@@ -121,7 +121,7 @@ async def test_an_alarm_has_its_causes_and_no_reset() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71", "varmeca"])
-async def test_nothing_is_read_or_told_where_there_is_no_fault(family: str) -> None:
+async def test_nothing_is_read_or_reported_where_there_is_no_fault(family: str) -> None:
     async with line(family) as opened:
         status = await status_of(opened, family)
     assert status.finding is None

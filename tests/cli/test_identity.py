@@ -34,7 +34,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_5_a_drive_that_is_another_is_told_and_not_written(
+def test_another_drive_is_reported_and_not_written_exits_with_5(
     atv71: str, command: str, tmp_path: object
 ) -> None:
     words = [one.format(line=atv71, folder=tmp_path) for one in COMMANDS[command]]
@@ -78,7 +78,7 @@ NEVER = ("run", "reference", "reset", "restore", "block", "teach", "backup", "re
 
 
 @pytest.mark.parametrize("command", NEVER)
-def test_2_what_moves_or_keeps_goes_by_the_drives_own_only(atv71: str, command: str) -> None:
+def test_moving_or_storing_needs_own_identity_exits_with_2(atv71: str, command: str) -> None:
     more = {"reference": ["20Hz"], "restore": ["x"], "backup": ["x"], "report": ["x"]}
     words = [command, atv71, *more.get(command, ["factory"] if command == "compare" else [])]
     output = refused(2, *words, "-p", "atv312", "--force-profile")
@@ -91,6 +91,6 @@ def test_a_family_that_says_nothing_contradicts_nothing(family: str) -> None:
         assert "10.40" in run(0, "read", line, "10.40", "-p", family)
 
 
-def test_3_nobody_is_there_to_contradict() -> None:
+def test_no_drive_to_contradict_exits_with_3() -> None:
     with tcp_line("powerdrive@1") as line:
         refused(3, "read", line, "10.40", "-p", "powerdrive", "-d", "9")

@@ -37,7 +37,7 @@ def journal() -> Path:
     return file
 
 
-def test_what_was_written_is_listed_and_damage_told(journal: Path) -> None:
+def test_journal_lists_writes_and_reports_damage(journal: Path) -> None:
     done = ended(0, "journal")
     first, second, trip = done.stdout.splitlines()
     assert "1/tcp:host:502  ACC: 3.0 s -> 4.0 s  ok  (test)" in first

@@ -56,7 +56,7 @@ def program(
     )
 
 
-def test_a_write_whose_journal_cannot_be_kept_is_done_and_told() -> None:
+def test_a_write_whose_journal_cannot_be_kept_is_done_and_reported() -> None:
     state = state_folder()
     state.parent.mkdir(parents=True, exist_ok=True)
     state.write_text("a file where the folder should be")
@@ -70,7 +70,9 @@ def test_a_write_whose_journal_cannot_be_kept_is_done_and_told() -> None:
 
 
 @pytest.mark.parametrize("command", kept([WRITE, STOP, STOP_ALL, REFERENCE, RUN], WRITE, RUN))
-def test_a_full_disk_is_said_in_a_sentence_and_nothing_else_fails(command: tuple[str, ...]) -> None:
+def test_a_full_disk_is_reported_in_a_sentence_and_nothing_else_fails(
+    command: tuple[str, ...],
+) -> None:
     done = program(*command, limit=no_room)
     assert done.returncode == 0, done.stderr
     first, last = done.stderr.splitlines()
@@ -88,7 +90,7 @@ def test_a_folder_that_is_read_only() -> None:
     assert "The journal cannot be written: Permission denied" in done.stderr
 
 
-def test_a_disk_that_does_not_answer_is_told_at_the_end(
+def test_a_disk_that_does_not_answer_is_reported_at_the_end(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     journal = Journal()
@@ -103,7 +105,7 @@ def test_a_disk_that_does_not_answer_is_told_at_the_end(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="without /dev/full")
 @pytest.mark.parametrize("command", kept([WRITE, STOP, STOP_ALL, REFERENCE], STOP))
-def test_what_was_done_is_not_said_to_have_failed_as_its_output_is_lost(
+def test_lost_output_does_not_report_done_work_as_failed(
     command: tuple[str, ...],
 ) -> None:
     with Path("/dev/full").open("w") as full:
@@ -118,7 +120,7 @@ def test_what_was_done_is_not_said_to_have_failed_as_its_output_is_lost(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="without /dev/full")
 @pytest.mark.parametrize("more", [(), ("--json",)])
-def test_what_was_asked_for_and_is_lost_is_a_failure(more: tuple[str, ...]) -> None:
+def test_lost_output_that_was_requested_is_a_failure(more: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = program(*READ, *more, out=full.fileno())
     assert done.returncode == 70

@@ -48,7 +48,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("command", [*READING, *OTHERS])
-def test_it_is_told_which_drive_how_long_what_follows_and_what_to_do(
+def test_it_is_reported_which_drive_how_long_what_follows_and_what_to_do(
     atv21: str, command: str, tmp_path: object
 ) -> None:
     words = (READING | OTHERS)[command]
@@ -70,7 +70,7 @@ def test_one_object_of_json_everywhere(atv21: str, command: str) -> None:
         assert reported["watch"]["timeout_s"] == reported["timeout"]["seconds"]
 
 
-def test_it_is_told_where_the_command_failed(atv21: str) -> None:
+def test_it_is_reported_where_the_command_failed(atv21: str) -> None:
     done = ended(5, "write", atv21, "ACC=99999s", "--arm")
     assert "F803 runs" in done.stderr
 
@@ -93,7 +93,7 @@ def test_a_drive_that_refuses_the_words_fails_no_command() -> None:
         assert "its communication timeout cannot be read; it may react" in done.stderr
 
 
-def test_a_watch_that_begins_with_a_command_is_told_of_once_one_was_written() -> None:
+def test_a_watch_that_begins_with_a_command_is_reported_once_one_was_written() -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         done = ended(0, "read", line, "ETA", "--json")
         assert done.stderr == ""
@@ -104,7 +104,7 @@ def test_a_watch_that_begins_with_a_command_is_told_of_once_one_was_written() ->
         assert json.loads(done.stdout)["timeout"]["begun"] is True
 
 
-def test_a_lost_line_that_goes_unnoticed_is_not_told_as_an_act() -> None:
+def test_a_lost_line_that_goes_unnoticed_is_not_reported_as_an_act() -> None:
     with tcp_line("atv71@1", "--set", "SLL=0") as line:
         put(line, CMD, 6)
         done = ended(0, "read", line, "ETA", "--json")
@@ -118,7 +118,7 @@ def test_a_lost_line_that_goes_unnoticed_is_not_told_as_an_act() -> None:
         assert json.loads(ended(0, "status", line, "--json").stdout)["timeout"]["begun"] is False
 
 
-def test_what_no_document_says_is_not_told_as_sure() -> None:
+def test_undocumented_reaction_is_not_reported_as_certain() -> None:
     with tcp_line("atv31@1") as line:
         output = ended(0, "read", line, "ETA").stderr
         assert "timeout ttO runs (when it begins is in no document). After 10 s" in output
@@ -143,7 +143,7 @@ def test_run_does_not_end_in_a_trip_without_a_word() -> None:
 
 
 @pytest.mark.parametrize("command", ["reference", "reset"])
-def test_commands_are_told_of(command: str) -> None:
+def test_commands_are_reported(command: str) -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         more = ["10Hz"] if command == "reference" else []
         done = drivepanel(command, line, *more, "--arm")
@@ -188,14 +188,14 @@ def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) ->
 @pytest.mark.parametrize(
     "number", kept([signal.SIGTERM, signal.SIGHUP], signal.SIGHUP), ids=lambda number: number.name
 )
-def test_what_a_signal_ends_says_it_too(atv21: str, number: signal.Signals) -> None:
+def test_command_ended_by_signal_reports_it_too(atv21: str, number: signal.Signals) -> None:
     with served((*DRIVEPANEL, "watch", atv21, "FD01"), ready="FD01") as program:
         status, output = program.end(number)
     assert (status, "F803 runs" in output) == (SIGNALS[number], True)
 
 
 @pytest.mark.parametrize("failure", ["", "The drive refused it."])
-def test_a_signal_that_comes_while_it_is_said_takes_nothing_from_what_was_done(
+def test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done(
     monkeypatch: pytest.MonkeyPatch, failure: str
 ) -> None:
     """It ended with a traceback and status 1, the answer of the command lost."""
@@ -244,7 +244,7 @@ def test_hold_tells_of_a_drive_that_is_lost_and_of_one_that_never_was() -> None:
         assert program.process.poll() is None, "the others are held"
 
 
-def test_3_nobody_to_hold() -> None:
+def test_no_drive_to_hold_exits_with_3() -> None:
     with tcp_line("atv21@1") as line:
         assert "protects nobody" not in refused(3, "hold", line, "-d", "9")
 

@@ -25,7 +25,7 @@ SLOW = UsualSettings(9600, "8N2")
         ("serial:/dev/ttyUSB0,38400,8o1", 38400, "8O1"),
     ],
 )
-def test_what_a_line_names_counts(text: str, baud: int, format: str) -> None:
+def test_profile_named_for_line_applies(text: str, baud: int, format: str) -> None:
     link = parse_link(text, SLOW)
     assert isinstance(link, SerialLink)
     assert (link.baud, link.format) == (baud, format)

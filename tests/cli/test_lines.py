@@ -59,7 +59,7 @@ def test_a_name_stands_where_a_line_is_typed(line: str) -> None:
     assert (reported["device"], reported["profile"]) == (5, "powerdrive")
 
 
-def test_what_is_typed_goes_before_what_the_name_says(line: str) -> None:
+def test_typed_option_overrides_line_name(line: str) -> None:
     named(line)
     assert json.loads(run(0, "read", "fan", "ACC", "-d", "1", "--json"))["profile"] == "atv71"
     assert "-p" in refused(2, "read", "pump", "5.01", "-d", "5")
@@ -75,7 +75,7 @@ def test_a_drive_of_a_name_may_be_compared_and_restored_to(line: str, tmp_path: 
     assert "0 to write" in run(0, "restore", "fan", file, "--dry-run")
 
 
-def test_the_environment_says_which_line_is_meant(
+def test_the_environment_says_which_line_is_selected(
     line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert "Missing argument 'LINE'" in refused(2, "identify")
@@ -111,14 +111,16 @@ def test_the_environment_may_hold_a_name(line: str, monkeypatch: pytest.MonkeyPa
     assert json.loads(run(0, "read", "5.01", "--json"))["device"] == 5
 
 
-def test_a_name_that_is_none_is_told_with_those_there_are(line: str) -> None:
+def test_a_name_that_is_none_is_reported_with_those_there_are(line: str) -> None:
     named(line)
     reported = refused(2, "read", "pumb", "ACC")
     assert "'pumb' is not a LINE or a name from" in reported
     assert "pump, fan" in reported
 
 
-def test_a_fault_in_the_settings_is_told_where_a_name_is_used_and_nowhere_else(line: str) -> None:
+def test_a_fault_in_the_settings_is_reported_where_a_name_is_used_and_nowhere_else(
+    line: str,
+) -> None:
     settings(f'[lines]\npump = "{line}"\nfan = 5\n')
     reported = refused(2, "read", "fan", "ACC")
     assert "settings.toml:3: lines.fan: a LINE in quotes" in reported
@@ -259,7 +261,7 @@ def test_a_stop_goes_to_a_drive_that_is_another_one(line: str) -> None:
     assert "stopped" in run(0, "stop", line, "--all", "--addresses", "1")
 
 
-def test_what_was_accepted_once_is_accepted_for_good(line: str) -> None:
+def test_accepted_line_stays_accepted(line: str) -> None:
     swapped(line)
     refused(5, "write", line, "ACC=7", "--arm")
     run(0, "write", line, "ACC=7", "--arm", "--accept-line")

@@ -144,7 +144,7 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
         ((TWO, "-p", "atv71", "-p", "atv31"), "one profile"),
     ],
 )
-def test_what_cannot_be_listened_to(words: tuple[str, ...], why: str) -> None:
+def test_lines_that_cannot_be_monitored(words: tuple[str, ...], why: str) -> None:
     assert why in refused(2, "listen", *words, "--for", "0.1")
 
 
@@ -195,7 +195,7 @@ def test_silence_and_refusals_of_a_plc_cycle() -> None:
     assert refusal["asked"] == ["1"]
 
 
-def test_what_came_from_the_wire_commands_no_terminal() -> None:
+def test_text_from_the_wire_does_not_control_terminal() -> None:
     """A drive whose name is an escape sequence, asked who it is by another master."""
     spec = DriveSpec("atv71", 2, identity={6: "\x1b[2J\x07"})
     with Simulation([spec]) as simulation:

@@ -47,7 +47,7 @@ def test_values_stand_in_base_units_with_the_unit_in_the_name() -> None:
 
 
 @pytest.mark.parametrize("why", ["a failed cycle", "no cycle for long"])
-def test_what_is_not_good_has_no_value(why: str) -> None:
+def test_bad_reading_has_no_value(why: str) -> None:
     good = cycle(small_drive(), ETA=0x27, RFR=499)
     if why == "a failed cycle":
         drive = drive_of(failed(good, "No answer."))
@@ -63,7 +63,7 @@ def test_what_is_not_good_has_no_value(why: str) -> None:
     assert f'drivepanel_value_age_seconds{{{WHERE},code="ETA"}} 0.5' in seen
 
 
-def test_a_fault_is_told_by_its_code_and_its_name_is_escaped() -> None:
+def test_a_fault_is_reported_by_its_code_and_its_name_is_escaped() -> None:
     seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x88, LFT=18))))
     reported = f'drivepanel_drive_fault_info{{{WHERE},fault="ObF",name="Over\\"braking\\\\"}} 1'
     assert reported in seen
@@ -96,7 +96,7 @@ def test_line_quality_and_turnarounds_add_up() -> None:
     assert f"drivepanel_drive_turnaround_seconds_count{{{WHERE}}} 7" in seen
 
 
-def test_what_nobody_is_sure_of_is_no_number_and_a_taught_scale_is_marked() -> None:
+def test_uncertain_value_is_not_a_number_and_taught_scale_is_marked() -> None:
     seen = cycle(small_drive(), RFR=499, THD=50)
     changed = {"RFR": {"unsure": True}, "THD": {"taught": True}}
     readings = {
@@ -186,7 +186,7 @@ async def requested(port: int, request: bytes) -> bytes:
         writer.close()
 
 
-async def test_metrics_are_told_and_nothing_else(served: int) -> None:
+async def test_metrics_are_reported_and_nothing_else(served: int) -> None:
     answer = await requested(served, b"GET /metrics HTTP/1.1\r\nHost: LOCALHOST:1\r\n\r\n")
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4;")

@@ -46,7 +46,7 @@ def test_a_cycle_of_a_drive_is_one_message() -> None:
     assert reported["values"]["RFR"]["time"].startswith("2023-11-14T22:13:20")
 
 
-def test_what_is_not_good_says_so() -> None:
+def test_bad_reading_is_marked() -> None:
     seen = drive_of(failed(cycle(small_drive(), ETA=0x27, RFR=499), "No answer."))
     (text,) = drive_messages("plant", [line_of(seen)]).values()
     reported = json.loads(text)
@@ -58,7 +58,7 @@ def test_what_is_not_good_says_so() -> None:
     )
 
 
-def test_a_line_is_told_with_what_it_counted() -> None:
+def test_a_line_is_reported_with_what_it_counted() -> None:
     ((topic, text),) = line_messages("plant", [line_of()]).items()
     assert topic == "plant/pump/line"
     reported = json.loads(text)
@@ -104,7 +104,7 @@ def test_a_url_says_which_broker() -> None:
         ("mqtt://me:secret@h", "seen by every user"),
     ],
 )
-def test_what_is_no_broker_is_refused(url: str, reported: str) -> None:
+def test_invalid_broker_is_refused(url: str, reported: str) -> None:
     assert reported in refused(2, "serve", "sim:atv71", "--mqtt", url)
     assert reported in refused(2, "publish", "sim:atv71", "--mqtt", url)
 
@@ -127,7 +127,9 @@ def test_the_password_comes_out_of_a_file_or_the_environment(
         broker_of("mqtt://me@h", file)
 
 
-def test_without_the_package_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_package_it_is_reported_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "aiomqtt", None)
     assert "pip install 'drivepanel[mqtt]'" in refused(
         2, "publish", "sim:atv71", "--mqtt", "mqtt://h"

@@ -75,7 +75,7 @@ def test_without_arguments_nothing_is_taken_apart(
     assert (panel.given["start"], panel.given["device"]) == (None, None)
 
 
-def test_without_arguments_an_error_is_told_as_by_every_command(
+def test_without_arguments_an_error_is_reported_as_by_every_command(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def fail(panel: FakePanel) -> None:
@@ -131,7 +131,7 @@ def test_a_panel_that_had_to_stop_is_no_success(
 
 
 @pytest.mark.parametrize("command", [(), ("demo",), ("tcp:10.0.0.5",)])
-def test_the_mouse_is_reported_only_where_that_is_asked_for(
+def test_the_mouse_is_reported_only_where_that_is_requested(
     panel: type[FakePanel], command: tuple[str, ...]
 ) -> None:
     for options, mouse in (((), False), (("--mouse",), True)):

@@ -12,7 +12,7 @@ from tui.cli.commands.orders import watch_of
 from tui.cli.shared.patience import patience
 from tui.drive.profile import library
 from tui.session.fleet import Fleet
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 
 
 def line_to(link: Link) -> Any:

@@ -125,7 +125,7 @@ async def test_line_that_is_full_is_reported_once_until_it_is_not(
     ]
 
 
-async def test_a_drive_that_was_long_silent_is_asked_anew_who_it_is(
+async def test_a_drive_that_was_long_silent_is_requested_again_who_it_is(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drives, "SILENT_FOR_LONG", 0.5)

@@ -66,7 +66,7 @@ def events(text: str, kind: str) -> list[dict[str, Any]]:
     return [one for one in documents(text) if one.get("event") == kind]
 
 
-def test_who_answers_is_told_with_how_sure_it_is() -> None:
+def test_answering_drive_is_reported_with_certainty() -> None:
     with drives(*MOTORS) as peer:
         text = ended(0, "scan", peer.path, "--addresses", "1-9", "--json").stdout
     first, second, third = events(text, "hit")
@@ -111,7 +111,7 @@ def test_silent_addresses_are_no_hits() -> None:
     assert "No drives found at addresses 1-5, 19200 8E1." in done.stderr
 
 
-def test_who_watches_the_line_is_named_before_the_first_request() -> None:
+def test_drive_with_line_timeout_is_named_before_first_request() -> None:
     with drives() as peer:
         done = invoked("scan", peer.path, "--addresses", "1-2", "--json")
     assert documents(done.stdout)[0]["event"] == "families"
@@ -168,7 +168,7 @@ def test_a_master_that_begins_later_ends_it_too_and_what_was_found_stays() -> No
     assert max(request[0] for request in peer.requests) < 20
 
 
-def test_two_drives_at_one_address_are_told_as_unclear() -> None:
+def test_two_drives_at_one_address_are_reported_as_unclear() -> None:
     def script(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(3, bytes.fromhex("03 02 0001"))[:-1] + b"\0"] if request[0] == 3 else []
 
@@ -249,7 +249,7 @@ SLOW = DriveSpec("atv71", 4, sets={"TBR": 28})
 """At 9600 baud."""
 
 
-def test_other_settings_are_tried_and_what_hears_two_is_told_once() -> None:
+def test_other_settings_are_tried_and_what_hears_two_is_reported_once() -> None:
     with line_of(DriveSpec("atv71", 1), SLOW) as line:
         text = ended(0, "scan", line, "--addresses", "1,4", "--all-settings", "--json").stdout
     hits = events(text, "hit")
@@ -267,7 +267,7 @@ def test_other_settings_are_tried_and_what_hears_two_is_told_once() -> None:
     assert end["not_tried"] == 0
 
 
-def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = [LineSetting(9600, "8E1"), LineSetting(600, "8E1"), LineSetting(300, "8E1")]
     monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
     with PtyPeer(silent) as peer:

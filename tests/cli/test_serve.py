@@ -41,11 +41,11 @@ from .commands import refused
         (["tcp:10.0.0.1", "sim:atv71", "--metrics", ":1", "-d", "1", "-p", "atv71"], "which line"),
     ],
 )
-def test_what_makes_no_sense_is_usage(typed: list[str], reported: str) -> None:
+def test_senseless_options_exit_with_usage(typed: list[str], reported: str) -> None:
     assert reported in refused(2, "serve", *typed)
 
 
-def test_a_port_that_is_taken_is_told() -> None:
+def test_a_port_that_is_taken_is_reported() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port: int = taken.getsockname()[1]
         place = f"127.0.0.1:{port}"
@@ -55,7 +55,7 @@ def test_a_port_that_is_taken_is_told() -> None:
         assert f"No metrics can be served at {place}: Address already in use." in reported
 
 
-def test_a_line_without_a_keeper_is_told(
+def test_a_line_without_a_keeper_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = FakeLine()

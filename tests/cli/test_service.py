@@ -32,7 +32,7 @@ def service(systemd: socket.socket, **more: str) -> Service:
     return Service({"NOTIFY_SOCKET": systemd.getsockname(), **more})
 
 
-def test_ready_and_stopping_are_told(systemd: socket.socket) -> None:
+def test_ready_and_stopping_are_reported(systemd: socket.socket) -> None:
     one = service(systemd)
     one.ready("sim:atv71\nMAINPID=1")
     assert systemd.recv(500) == b"READY=1\nSTATUS=sim:atv71 MAINPID=1"
@@ -40,7 +40,7 @@ def test_ready_and_stopping_are_told(systemd: socket.socket) -> None:
     assert systemd.recv(500).startswith(b"STOPPING=1\n")
 
 
-def test_an_abstract_address_is_told_too() -> None:
+def test_an_abstract_address_is_reported_too() -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
         name = f"drivepanel-test-{os.getpid()}"
         end.bind(f"\0{name}")
@@ -49,7 +49,7 @@ def test_an_abstract_address_is_told_too() -> None:
         assert end.recv(500) == b"READY=1\nSTATUS=here"
 
 
-def test_nothing_is_told_to_nobody(tmp_path: Path) -> None:
+def test_nothing_is_reported_to_nobody(tmp_path: Path) -> None:
     Service({}).ready("here")
     Service({"NOTIFY_SOCKET": str(tmp_path / "gone")}).ready("here")
     assert Service({}).watchdog is None

@@ -102,7 +102,7 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
         assert "did not come" not in run(0, "restore", line, file, "--arm")
 
 
-def test_3_a_restore_that_cannot_look_again_says_why(
+def test_restore_that_cannot_compare_again_says_why_exits_with_3(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It told "1 written, 0 not" and status 4, as if the drive had refused something."""
@@ -170,14 +170,14 @@ def test_a_backup_on_standard_output(line: str, tmp_path: Path) -> None:
     assert "standard output" in refused(2, "backup", line, "-", "-d", "2", "--json")
 
 
-def test_4_a_backup_that_is_not_whole(tmp_path: Path) -> None:
+def test_incomplete_backup_exits_with_4(tmp_path: Path) -> None:
     with tcp_line("atv71@2", "--protect", "ACC") as line:
         output = refused(4, "backup", line, tmp_path / "set.toml", "-d", "2")
     assert "ACC could not be read" in output
     assert "[absent]" in (tmp_path / "set.toml").read_text("utf-8")
 
 
-def test_drives_of_one_line_are_told_apart_by_their_address(tmp_path: Path) -> None:
+def test_drives_of_one_line_are_distinguished_by_their_address(tmp_path: Path) -> None:
     run(0, "backup", "sim:atv71", tmp_path / "set.toml")
     assert "-d" not in run(0, "compare", tmp_path / "set.toml", tmp_path / "set.toml")
     with tcp_line("atv31@1", "atv31@2") as line:
@@ -200,7 +200,7 @@ ROUNDED = [("LSP=0.04", "LSP: 0.04 would be held as 0.0 Hz"), ("ACC=3.55s", "3.5
 
 
 @pytest.mark.parametrize(("wanted", "text"), ROUNDED)
-def test_5_a_value_that_rounding_makes_another_of(line: str, wanted: str, text: str) -> None:
+def test_value_changed_by_rounding_exits_with_5(line: str, wanted: str, text: str) -> None:
     drive = (line, "-d", "2")
     for how in ("--arm", "--dry-run"):
         output = refused(5, "write", *drive, wanted, how)
@@ -210,12 +210,12 @@ def test_5_a_value_that_rounding_makes_another_of(line: str, wanted: str, text: 
     assert code in run(0, "write", *drive, wanted, "--arm", "--round")
 
 
-def test_what_is_a_little_rounded_is_written_and_told(line: str) -> None:
+def test_slightly_rounded_value_is_written_and_reported(line: str) -> None:
     reported = run(0, "write", line, "-d", "2", "ACC=3.56", "--arm")
     assert "3.56 is held as 3.6 s" in reported
 
 
-def test_2_a_code_that_is_given_twice(line: str) -> None:
+def test_repeated_code_exits_with_2(line: str) -> None:
     assert "ACC: given more than once" in refused(
         2, "write", line, "-d", "2", "ACC=3", "W9001=4", "--arm"
     )
@@ -256,11 +256,11 @@ USAGE: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("arguments", USAGE.values(), ids=USAGE.keys())
-def test_2_usage(arguments: tuple[str, ...]) -> None:
+def test_compare_usage_exits_with_2(arguments: tuple[str, ...]) -> None:
     refused(2, *arguments)
 
 
-def test_2_a_bad_file_is_told_with_its_line(tmp_path: Path) -> None:
+def test_bad_file_is_reported_with_its_line_exits_with_2(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     run(0, "backup", "sim:powerdrive", file, "-p", "powerdrive")
     text = file.read_text(encoding="utf-8")
@@ -276,7 +276,7 @@ def test_2_a_bad_file_is_told_with_its_line(tmp_path: Path) -> None:
         )
 
 
-def test_2_two_families_are_not_compared(tmp_path: Path) -> None:
+def test_two_families_are_not_compared_exits_with_2(tmp_path: Path) -> None:
     for family in ("atv31", "atv312"):
         run(0, "backup", f"sim:{family}", tmp_path / f"{family}.toml")
     assert "different families" in refused(
@@ -284,7 +284,7 @@ def test_2_two_families_are_not_compared(tmp_path: Path) -> None:
     )
 
 
-def test_3_nobody_answers(tmp_path: Path) -> None:
+def test_no_answer_exits_with_3(tmp_path: Path) -> None:
     refused(3, "backup", "sim:atv71@2", tmp_path / "x.toml", "-d", "9")
     assert not (tmp_path / "x.toml").exists()
 
@@ -302,7 +302,7 @@ WRITES_REFUSED_HERE = [
 
 
 @pytest.mark.parametrize(("arguments", "text"), WRITES_REFUSED_HERE)
-def test_5_refused_here(arguments: tuple[str, ...], text: str) -> None:
+def test_refusal_exits_with_5(arguments: tuple[str, ...], text: str) -> None:
     assert text in refused(5, "write", "sim:atv71", *arguments)
 
 
@@ -312,12 +312,12 @@ def test_a_setting_written_before_a_refused_one_gives_status_6() -> None:
     assert error.endswith("drivepanel: Sent by this command: HSP = 40.0 Hz.\n")
 
 
-def test_5_nothing_is_restored_unarmed(tmp_path: Path) -> None:
+def test_unarmed_restore_writes_nothing_exits_with_5(tmp_path: Path) -> None:
     run(0, "backup", "sim:atv21", tmp_path / "x.toml")
     assert "Not armed" in refused(5, "restore", "sim:atv21", tmp_path / "x.toml")
 
 
-def test_6_a_motor_that_runs_is_not_set_up_whole() -> None:
+def test_running_motor_is_not_fully_restored_exits_with_6() -> None:
     with tcp_line("atv312", "--run", "30") as line:
         output = refused(6, "write", line, "ACC=4", "FrS=60", "--arm")
         assert "motor stopped only" in output
@@ -343,7 +343,9 @@ PAST_LIMITS = [
 
 
 @pytest.mark.parametrize(("wanted", "text"), PAST_LIMITS)
-def test_5_a_value_past_a_limit_of_another_parameter(wanted: tuple[str, ...], text: str) -> None:
+def test_value_beyond_another_parameters_limit_exits_with_5(
+    wanted: tuple[str, ...], text: str
+) -> None:
     assert text in run(5, "write", "sim:atv71", *wanted, "--dry-run")
     assert text in refused(5, "write", "sim:atv71", *wanted, "--arm")
 
@@ -352,7 +354,7 @@ def test_a_limit_is_raised_before_what_it_limits() -> None:
     assert "HSP: 50.0 Hz -> 70.0 Hz" in run(0, "write", "sim:atv71", "HSP=70", "TFR=80", "--arm")
 
 
-def test_where_the_drive_is_found_after_its_address_was_written() -> None:
+def test_drive_is_found_at_its_new_address() -> None:
     with tcp_line("atv21") as line:
         reported = run(0, "write", line, "F802=7", "--arm")
         assert "-d 7" in reported

@@ -61,36 +61,36 @@ USAGE = {
 
 
 @pytest.mark.parametrize("arguments", USAGE.values(), ids=USAGE.keys())
-def test_2_usage(arguments: tuple[str, ...]) -> None:
+def test_scan_usage_exits_with_2(arguments: tuple[str, ...]) -> None:
     expect(2, *arguments)
 
 
 @pytest.mark.parametrize("command", [("read", "ETA"), ("watch", "ETA"), ("identify",)])
-def test_3_nobody_has_the_address(command: tuple[str, ...]) -> None:
+def test_unused_address_exits_with_3(command: tuple[str, ...]) -> None:
     expect(3, command[0], SIM, *command[1:], "-d", "9")
 
 
-def test_3_nobody_answers_though_the_profile_is_named() -> None:
+def test_unanswered_read_with_profile_exits_with_3() -> None:
     expect(3, "read", SIM, "ETA", "-d", "9", "-p", "atv71")
 
 
 @pytest.mark.parametrize("extra", [(), ("--json",)])
-def test_3_nothing_was_ever_watched(extra: tuple[str, ...]) -> None:
+def test_watch_without_any_value_exits_with_3(extra: tuple[str, ...]) -> None:
     watch = ("watch", SIM, "ETA", "-d", "9", "-p", "atv71", "--count", "2", "--every", "0.1")
     done = drivepanel(*watch, *extra)
     assert done.returncode == 3, done.stdout
     assert done.stderr.startswith("drivepanel: Device 9 does not answer")
 
 
-def test_3_nothing_listens() -> None:
+def test_closed_tcp_port_exits_with_3() -> None:
     expect(3, "identify", f"tcp:127.0.0.1:{free_port()}")
 
 
-def test_3_no_such_port() -> None:
+def test_missing_port_exits_with_3() -> None:
     expect(3, "identify", "/dev/ttyNOSUCH9")
 
 
-def test_4_the_drive_refused() -> None:
+def test_refusal_by_the_drive_exits_with_4() -> None:
     with tcp_line("atv71@2", "--protect", "ACC") as line:
         done = drivepanel("read", line, "ACC", "-d", "2")
         assert done.returncode == 4
@@ -102,7 +102,7 @@ def test_4_the_drive_refused() -> None:
 
 
 @pytest.mark.parametrize("refusal", [RequestRefused, ValueRefused])
-def test_5_refused_here(refusal: type[Exception]) -> None:
+def test_refusal_by_drivepanel_exits_with_5(refusal: type[Exception]) -> None:
     @click.command()
     @reported
     def command() -> None:

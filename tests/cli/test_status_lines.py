@@ -33,7 +33,7 @@ def listed(text: str) -> list[dict[str, Any]]:
     return found
 
 
-def test_drives_are_told_with_their_lines_in_order(named: tuple[str, str]) -> None:
+def test_drives_are_reported_with_their_lines_in_order(named: tuple[str, str]) -> None:
     pump, fan = named
     reported = listed(run(0, "status", "pump@2,1", "fan", "--json"))
     drives = [(pump, 2, "atv312"), (pump, 1, "atv71"), (fan, 5, "atv71")]
@@ -73,10 +73,10 @@ def test_a_drive_that_is_not_there_hides_no_other(named: tuple[str, str]) -> Non
     ).stderr  # fmt: skip
 
 
-def test_drives_of_several_lines_are_asked_on(named: tuple[str, str]) -> None:
+def test_drives_of_several_lines_are_still_polled(named: tuple[str, str]) -> None:
     assert run(0, "status", "pump", "fan", "--hold", "0.2").count("State ") == 2
 
 
-def test_2_what_is_no_line_opens_none(named: tuple[str, str]) -> None:
+def test_invalid_line_opens_nothing_exits_with_2(named: tuple[str, str]) -> None:
     assert "'nonsense' is not a LINE" in refused(2, "status", "pump", "nonsense")
     assert "1 to 247" in refused(2, "status", "pump@300", "fan")

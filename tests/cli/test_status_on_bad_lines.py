@@ -14,7 +14,7 @@ from tui.bus.errors import NoAnswer
 from tui.bus.line import Line
 from tui.cli.shared import drive_status
 from tui.session.drive import DriveSession
-from tui.session.timeout_told import Timeout, TimeoutWatch
+from tui.session.timeout_report import Timeout, TimeoutWatch
 
 from .commands import ended, tcp_line
 

@@ -56,7 +56,7 @@ def with_drive(damaged: float) -> FakeLine:
     return line
 
 
-async def test_what_is_heard_but_damaged_is_asked_for_with_more_patience() -> None:
+async def test_damaged_replies_are_requested_with_more_patience() -> None:
     for patience in (Priority.BACKGROUND, Priority.PATIENT):
         assert await stop_of(with_drive(2), patience) == "Altivar 71"
     with pytest.raises(LineError):  # the next round is the patient one

@@ -66,7 +66,7 @@ def test_a_csv_file_says_that_its_column_was_taught(line: str, tmp_path: Path) -
     assert "600" in row
 
 
-def test_what_a_look_came_to_in_json(line: str) -> None:
+def test_lesson_result_in_json(line: str) -> None:
     first = json.loads(teach(line, "1.21", "90.0", "Hz", "--json"))
     assert (first["lesson"], first["taught"]) == ("first", None)
     put(line, PRESET, 600)
@@ -85,7 +85,7 @@ def test_a_number_below_zero_is_a_value_and_no_option(line: str) -> None:
     assert "It has a sign." in teach(line, "1.21", "30.0")
 
 
-def test_1_a_look_that_disagrees_ends_it_and_says_so(line: str) -> None:
+def test_disagreeing_look_ends_lesson_with_1(line: str) -> None:
     preset_taught(line)
     teach(line, "1.21", "--reference")
     output = teach(line, "1.21", "61.5", status=1)
@@ -113,11 +113,11 @@ def test_forgetting(line: str) -> None:
         (5, ("1.21", "--reference"), "not taught yet"),
     ],
 )
-def test_what_is_refused(line: str, status: int, arguments: tuple[str, ...], why: str) -> None:
+def test_refused_lessons(line: str, status: int, arguments: tuple[str, ...], why: str) -> None:
     assert why in refused(status, "teach", line, *DRIVE, *arguments)
 
 
-def test_a_damaged_file_is_told_by_every_command_and_hinders_none(
+def test_a_damaged_file_is_reported_by_every_command_and_hinders_none(
     line: str, own_folders: Path
 ) -> None:
     preset_taught(line)

@@ -160,6 +160,6 @@ def test_json_keeps_every_character_and_gives_a_terminal_none_of_the_bad_ones() 
     assert json.loads(text) == data
 
 
-def test_where_there_are_no_signs_a_question_mark_stands() -> None:
+def test_terminal_without_signs_shows_question_mark() -> None:
     assert printable("a\x1b[2J → \n", "ascii") == "a?[2J ? \n"
     assert printable("a\x1b[2J →", "utf-8") == "a␛[2J →"

@@ -22,7 +22,7 @@ def session_of(line: FakeLine, device: int = 1) -> DriveSession:
     return DriveSession(line, device, library.load("atv71"))
 
 
-def test_what_was_typed_before_a_stop_is_refused_and_what_comes_behind_it_is_not() -> None:
+def test_stop_refuses_earlier_input_and_accepts_later() -> None:
     line = FakeLine({1: {}, 2: {}})
     with click.Context(main) as typed:
         note_typed(typed)

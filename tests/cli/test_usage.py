@@ -16,13 +16,13 @@ SIM = ("sim:atv71@2", "-d", "2")
 @pytest.mark.parametrize(
     ("typed", "intended"), [("sttaus", "status"), ("Reed", "read"), ("wirte", "write")]
 )
-def test_a_misspelt_command_is_told_and_opens_no_panel(typed: str, intended: str) -> None:
+def test_a_misspelt_command_is_reported_and_opens_no_panel(typed: str, intended: str) -> None:
     for words in ((typed, *SIM), ("--read-only", typed), (typed,)):
         output = refused(2, *words)
         assert f"{typed}: no such command, did you mean {intended}?" in output
 
 
-def test_a_word_like_no_command_is_told_too() -> None:
+def test_a_word_like_no_command_is_reported_too() -> None:
     assert "xyzzy: no such command, and no LINE." in refused(2, "xyzzy")
 
 

@@ -53,7 +53,7 @@ def test_nothing_is_good_once_the_server_is_gone() -> None:
             watching.process.kill()
 
 
-def test_3_a_drive_that_is_gone_at_the_end() -> None:
+def test_drive_lost_at_the_end_exits_with_3() -> None:
     with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
         line = f"tcp:127.0.0.1:{port_of(simulation.ready)},timeout=0.2"
         watch = ("watch", line, "-d", "2", "RFR", "--every", "0.1", "--count", "20", "--json")
@@ -106,7 +106,7 @@ def test_several_drives_in_one_file(tmp_path: Path) -> None:
 # Files
 
 
-def test_a_file_is_replaced_or_continued_only_as_told(tmp_path: Path) -> None:
+def test_a_file_is_replaced_or_continued_only_as_requested(tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     watch = ("watch", *LINE, "ETA", *SHORT, "1", "--csv", file)
     run(0, *watch)
@@ -125,7 +125,7 @@ def test_a_file_is_replaced_or_continued_only_as_told(tmp_path: Path) -> None:
     [("--append",), ("--rotate", "day"), ("--csv", "x.csv", "--append", "--force"),
      ("--csv", "x.csv", "--rotate", "soon"), ("--csv", "x.csv", "--rotate", "0MB")],
 )  # fmt: skip
-def test_2_options_that_do_not_fit(options: tuple[str, ...]) -> None:
+def test_conflicting_options_exit_with_2(options: tuple[str, ...]) -> None:
     refused(2, "watch", *LINE, "ETA", *SHORT, "1", *options)
     assert not Path("x.csv").exists()
 
@@ -182,7 +182,7 @@ def test_rotation_by_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert (tmp_path / "run.csv").read_text("utf-8").split() == ["time", "three"]
 
 
-def test_a_full_disk_is_told() -> None:
+def test_a_full_disk_is_reported() -> None:
     with pytest.raises(Failure, match="cannot be written: No space left"):
         CsvFile(Path("/dev/full"), ["time"], force=True)
 
@@ -195,7 +195,7 @@ def test_a_full_disk_is_told() -> None:
     [("write", "ACC=5", "--arm"), ("run", "--arm"), ("reference", "5", "--arm"),
      ("reset", "--arm"), ("backup", "x.toml"), ("report", "x.md"), ("teach",), ("block",)],
 )  # fmt: skip
-def test_2_a_command_for_one_drive_takes_one(command: tuple[str, ...]) -> None:
+def test_one_drive_command_takes_one_exits_with_2(command: tuple[str, ...]) -> None:
     name, *more = command
     output = refused(2, name, "sim:atv71@1,atv71@2", *more, "-d", "1", "-d", "2")
     assert "this command is for one drive" in output

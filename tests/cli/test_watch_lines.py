@@ -93,7 +93,7 @@ def test_simulated_lines_are_watched_with_all_their_drives() -> None:
 # What one line costs the others
 
 
-def test_a_line_that_is_not_there_is_told_and_costs_the_others_nothing(
+def test_a_line_that_is_not_there_is_reported_and_costs_the_others_nothing(
     named: tuple[str, str],
 ) -> None:
     done = ended(3, "watch", NOBODY, "fan", "ETA", *SHORT, "2", "--json")
@@ -103,7 +103,7 @@ def test_a_line_that_is_not_there_is_told_and_costs_the_others_nothing(
     assert [(one["line"], one["error"]) for one in cycles] == 2 * [(named[1], None)]
 
 
-def test_a_drive_that_is_not_there_is_told_with_its_line(named: tuple[str, str]) -> None:
+def test_a_drive_that_is_not_there_is_reported_with_its_line(named: tuple[str, str]) -> None:
     done = ended(3, "watch", "pump@1,9", "fan", "ETA", *SHORT, "1")
     assert "drivepanel: pump: Device 9 did not answer" in done.stderr
     assert "pump  device 1" in done.stdout
@@ -169,7 +169,7 @@ def drives(wishes: list[LineWish]) -> list[tuple[str, list[int], list[str | None
         (("tcp:[::1]:502,timeout=2@4",), [("tcp:[::1]:502,timeout=2", [4], [None])]),
     ],
 )  # fmt: skip
-def test_the_drives_that_are_meant(
+def test_the_drives_that_are_selected(
     words: tuple[str, ...], intended: list[tuple[str, list[int], list[str | None]]]
 ) -> None:
     settings("tcp:10.0.0.1", "tcp:10.0.0.2")
@@ -211,7 +211,7 @@ def test_an_at_within_a_port_or_a_simulated_line_names_no_address(tmp_path: Path
     assert split_addresses(f"{port}@4") == (str(port), "4")
 
 
-def test_2_what_cannot_be_a_line_opens_none(named: tuple[str, str]) -> None:
+def test_impossible_line_opens_nothing_exits_with_2(named: tuple[str, str]) -> None:
     assert "1 to 247" in refused(2, "watch", "pump@300", "fan", *SHORT, "1")
     refused(2, "watch", "pump", "tcp:host:port", *SHORT, "1")
     assert "no parameter 'NOSUCH'" in refused(2, "watch", "pump", "fan", "NOSUCH", *SHORT, "1")

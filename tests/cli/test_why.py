@@ -95,12 +95,12 @@ def test_a_gateway() -> None:
     assert (reported["rung"], reported["seen"]["exceptions"][0]) == ("gateway", 11)
 
 
-def test_what_is_no_line_is_a_fault_of_usage() -> None:
+def test_invalid_line_is_a_usage_error() -> None:
     assert "is not a line" in ended(2, "why", "nosuch").stderr
     assert "no profile" in ended(2, "why", "sim:atv71", "-p", "nosuch").stderr
 
 
-def test_what_the_drive_does_that_is_asked_no_more_is_told() -> None:
+def test_pending_timeout_is_reported() -> None:
     with tcp_line("atv21@1", "--set", "F803=30") as line:
         assert "F803" in ended(0, "why", line).stderr
 

@@ -49,13 +49,13 @@ def test_lines_break_at_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert " ".join(" ".join(lines).split()) == f"Timeout {LONG}"
 
 
-def test_a_word_longer_than_the_terminal_is_told_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_word_longer_than_the_terminal_is_reported_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
     say("/tmp/" + "x" * 100)
     assert out.getvalue().replace("\n", "") == "/tmp/" + "x" * 100
 
 
-def test_what_fits_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fitting_text_is_unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
     say("  a   b\n\nc")
     assert out.getvalue() == "  a   b\n\nc\n"
@@ -101,7 +101,7 @@ def test_no_color_is_plain_text(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "\x1b" not in out.getvalue()
 
 
-def test_what_has_one_reason_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+def test_shared_reason_is_reported_once(capsys: pytest.CaptureFixture[str]) -> None:
     why = "Device 2 refused function 3, register {} with exception 2."
     absent = {f"P{n}": why.format(n) for n in range(24)} | {"ACC": "no answer"}
     messages = Messages(as_json=False)

@@ -298,7 +298,7 @@ DEFECTS = (
         "if 0.0 < state.copies_within < SHORT_WAIT:",
         "if False:",
         "Each new owner of a line that repeats replies takes one of each drive for an answer.",
-        (f"{QUEUE}::test_who_takes_a_line_over_knows_that_it_repeats_the_replies_of_all",),
+        (f"{QUEUE}::test_new_owner_knows_that_line_repeats_replies",),
     ),
     Defect(
         "unit-of-a-gateway-not-in-stops",

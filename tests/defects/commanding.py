@@ -221,7 +221,7 @@ DEFECTS = (
         "if code in fresh or (turns and since):",
         "if code in trusted:",
         "After a change at the keypad a stop sends a word that starts the motor.",
-        (f"{STOP}::test_what_somebody_changed_at_rest_is_read_anew",),
+        (f"{STOP}::test_value_changed_at_rest_is_read_again",),
     ),
     Defect(
         "standstill-by-the-state-alone",
@@ -301,7 +301,7 @@ DEFECTS = (
         "STOP_TRIES = 5",
         "STOP_TRIES = 1",
         "One disturbed frame, and the motor runs on.",
-        ("tests/session/test_stop.py::test_a_dead_drive_is_tried_again_and_told_of",),
+        ("tests/session/test_stop.py::test_a_dead_drive_is_tried_again_and_reported_of",),
     ),
     Defect(
         "broadcast-to-all-families",
@@ -386,7 +386,7 @@ DEFECTS = (
         "            self._check_rest(state)\n",
         "",
         "A motor that the terminals start during a proof is left alone on the run, unasked.",
-        (f"{PROVER}::test_a_motor_that_begins_to_turn_meanwhile_is_asked_on",),
+        (f"{PROVER}::test_a_motor_that_begins_to_turn_meanwhile_is_still_polled",),
     ),
     Defect(
         "proved-against-another-setting",
@@ -394,7 +394,7 @@ DEFECTS = (
         "            await self._check_same(rules, readings)\n",
         "",
         "A drive whose timeout was changed meanwhile is said not to react as set.",
-        (f"{PROVER}::test_what_is_set_otherwise_meanwhile_proves_nothing",),
+        (f"{PROVER}::test_foreign_change_during_test_proves_nothing",),
     ),
     Defect(
         "proof-on-the-run-unasked",
@@ -426,6 +426,6 @@ DEFECTS = (
         "            await look_for_drive(reader.session, error)\n",
         "",
         "A drive without a port's words counts as silent: polls and its feeding wait.",
-        (f"{TIMEOUT}::test_a_drive_is_asked_for_what_it_has_after_a_silence",),
+        (f"{TIMEOUT}::test_a_drive_is_requested_what_it_has_after_a_silence",),
     ),
 )

@@ -16,7 +16,7 @@ DEFECTS = (
         "return bool(heard.requested) and heard.nothing and not heard.echoed",
         "return bool(heard.requested) and heard.nothing and bool(sight.neighbors)",
         "A script takes a line on which nobody answers for a good one.",
-        (f"{LADDER}::test_a_drive_that_has_not_answered_is_never_said_to_be_well",),
+        (f"{LADDER}::test_a_drive_that_has_not_answered_is_never_reported_to_be_well",),
     ),
     Defect(
         "echo-taken-for-an-answer",
@@ -48,7 +48,7 @@ DEFECTS = (
         "return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT",
         "return not sight.heard.damaged",
         "An adapter that holds nothing back is blamed.",
-        (f"{LADDER}::test_latency_is_told_where_it_is_set_and_measured",),
+        (f"{LADDER}::test_latency_is_reported_where_it_is_set_and_measured",),
     ),
     Defect(
         "old-counts-taken-for-new",
@@ -56,7 +56,7 @@ DEFECTS = (
         "grown = [now - then for now, then in zip(self, before, strict=True)]",
         "grown = [now + 0 * then for now, then in zip(self, before, strict=True)]",
         "What the port counted last week is taken for a wrong baud today.",
-        (f"{PORTS}::test_what_was_added_is_counted_where_an_answer_fails",),
+        (f"{PORTS}::test_added_request_is_counted_if_a_reply_fails",),
     ),
     Defect(
         "asked-at-a-stops-priority",
@@ -91,7 +91,7 @@ DEFECTS = (
         "yield from wiring_hints(sight, answers=True)",
         "yield from wiring_hints(sight)",
         "A person changes over the wires of a drive that answers by them.",
-        ("tests/session/test_diagnosis.py::test_who_answers_has_the_right_wires",),
+        ("tests/session/test_diagnosis.py::test_answering_drive_has_correct_wires",),
     ),
     Defect(
         "copies-taken-for-a-second-drive",

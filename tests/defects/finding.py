@@ -34,7 +34,7 @@ DEFECTS = (
         "elif frame.time < since or frame.data in ours:",
         "elif frame.time < since:",
         "With an adapter that echoes late, no drive is ever found.",
-        (f"{MASTERS}::test_what_is_no_master",),
+        (f"{MASTERS}::test_frames_of_no_master",),
     ),
     Defect(
         "empty-address-waited-for",
@@ -50,7 +50,7 @@ DEFECTS = (
         "            if late:\n",
         "            if late and not self._once:\n",
         "A drive with a long response delay is not found.",
-        (f"{SEARCH}::test_who_answers_too_late_is_heard_and_asked_again",),
+        (f"{SEARCH}::test_late_answer_is_heard_and_requested_again",),
     ),
     Defect(
         "family-inferred-from-damage",
@@ -90,7 +90,7 @@ DEFECTS = (
         "            refused, register = True, probe.register or register\n",
         "            pass\n",
         "Altivar drives, which refuse the read that finds Leroy-Somer, are not found.",
-        (f"{FIND}::test_who_refuses_the_read_says_who_it_is",),
+        (f"{FIND}::test_refusal_of_a_read_identifies_the_drive",),
     ),
     Defect(
         "likely-drive-left-alone",
@@ -98,7 +98,7 @@ DEFECTS = (
         "on_request = within is not None or priority < Priority.POLL",
         "on_request = priority < Priority.POLL",
         "A drive without function 43 is not asked by 17, and not polled for a second once found.",
-        ("tests/bus/test_api.py::test_who_looks_whether_a_silent_device_is_there_waits_for_no_back_off",),
+        ("tests/bus/test_api.py::test_probe_of_silent_device_waits_for_no_back_off",),
     ),
     Defect(
         "slow-settings-first",
@@ -146,7 +146,7 @@ DEFECTS = (
         "self._strangers.keep(identity.device)",
         "pass",
         "A drive of no known family trips while a person looks up which one it is.",
-        (f"{SETTINGS}::test_drives_are_asked_on_while_the_person_decides_known_or_not",),
+        (f"{SETTINGS}::test_drives_are_still_polled_while_the_person_decides_known_or_not",),
     ),
     Defect(
         "unclear-answer-passed-by",
@@ -154,7 +154,7 @@ DEFECTS = (
         "if self.found or self.search.answered:",
         "if self.found:",
         "Two drives at one address are asked once and left alone, unasked.",
-        (f"{SETTINGS}::test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked",),
+        (f"{SETTINGS}::test_unexpected_answer_tries_no_other_setting_unasked",),
     ),
     Defect(
         "families-not-named",
@@ -162,7 +162,7 @@ DEFECTS = (
         "self.families = await asyncio.to_thread(_families)",
         'self.families = ""',
         "Nobody knows before the search that a drive will watch the line from then on.",
-        (f"{SETTINGS}::test_who_may_be_there_is_named_before_the_first_request",),
+        (f"{SETTINGS}::test_possible_drives_are_named_before_first_request",),
     ),
     Defect(
         "second-round-not-counted",
@@ -170,7 +170,7 @@ DEFECTS = (
         "return first + LATE_WAIT + (self._silent.times + still) * self._cost_again",
         "return first",
         "A search that says that a second is left takes ten.",
-        (f"{SEARCH}::test_what_is_left_counts_the_silent_ones_once_more_and_what_they_really_take",),
+        (f"{SEARCH}::test_remaining_estimate_counts_silent_addresses_again",),
     ),
     Defect(
         "slow-settings-unannounced",
@@ -178,7 +178,7 @@ DEFECTS = (
         "if self.costs is None or not later[0].slow or any(one.slow for one in self.tried[1:]):",
         "if True:",
         "A search that is as good as done goes on for a minute and a half, and nobody knows why.",
-        (f"{SCAN}::test_what_is_slow_is_told_before_it_is_tried",),
+        (f"{SCAN}::test_slow_setting_is_reported_before_it_is_tried",),
     ),
     Defect(
         "drive-being-proved-told-silent",
@@ -194,6 +194,6 @@ DEFECTS = (
         "if not self.found and self.search is not None and self.search.answered:",
         "if False:",
         "It is said that nobody answers where two drives answer at once.",
-        (f"{SETTINGS}::test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked",),
+        (f"{SETTINGS}::test_unexpected_answer_tries_no_other_setting_unasked",),
     ),
 )  # fmt: skip

@@ -218,7 +218,7 @@ DEFECTS = (
         try:
             pdu =""",
         "The journal says that a drive took a value, and nobody knows.",
-        (f"{GATEWAY}::test_what_the_end_of_serve_cuts_short_is_not_kept_as_done",),
+        (f"{GATEWAY}::test_write_cut_by_end_of_serve_is_not_recorded_as_done",),
     ),
     Defect(
         "foreign-start-unrecorded",
@@ -338,7 +338,7 @@ DEFECTS = (
         "if self._request.stale:",
         "if False:",
         "A gateway that was frozen starts the motor of a client that has given up long ago.",
-        (f"{GATEWAY}::test_what_came_while_the_gateway_stood_still_only_stops",),
+        (f"{GATEWAY}::test_requests_from_a_suspension_only_stop",),
     ),
     Defect(
         "stale-bytes-taken-for-new",
@@ -346,7 +346,7 @@ DEFECTS = (
         "if self._awake.just_woke:",
         "if False:",
         "What a client sent while the gateway was frozen counts as sent just now.",
-        ("tests/bus/test_gateway.py::test_what_waited_while_the_loop_stood_still_is_told_apart",),
+        ("tests/bus/test_gateway.py::test_requests_delayed_by_a_suspended_loop_are_recognized",),
     ),
     Defect(
         "foreign-start-for-nobody",

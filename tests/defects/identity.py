@@ -91,7 +91,7 @@ DEFECTS = (
         "    if session.contradiction:\n",
         "    if False:\n",
         "A setting of one family is written into another.",
-        (f"{IDENTITY}::test_5_a_drive_that_is_another_is_told_and_not_written",),
+        (f"{IDENTITY}::test_another_drive_is_reported_and_not_written_exits_with_5",),
     ),
     Defect(
         "first-word-of-one-family-only",
@@ -115,7 +115,9 @@ DEFECTS = (
         "journal.add(_entry(line, device, what, answer))",
         "pass",
         "Nobody finds out what stopped, or moved, a motor.",
-        ("tests/session/test_first_stop.py::test_it_is_in_the_journal_with_what_was_said_to_it",),
+        (
+            "tests/session/test_first_stop.py::test_it_is_in_the_journal_with_what_was_reported_to_it",
+        ),
     ),
     Defect(
         "timeout-of-the-other-port-ignored",
@@ -139,7 +141,7 @@ DEFECTS = (
         "        finally:\n            try:",
         "        else:\n            try:",
         "A command that fails leaves a timeout running and says nothing of it.",
-        (f"{LEFT}::test_it_is_told_where_the_command_failed",),
+        (f"{LEFT}::test_it_is_reported_where_the_command_failed",),
     ),
     Defect(
         "signal-takes-what-was-done",
@@ -147,7 +149,9 @@ DEFECTS = (
         "                if not came:\n                    raise\n",
         "                raise\n",
         "A command that has written all ends with a traceback and status 1 by a late SIGTERM.",
-        (f"{LEFT}::test_a_signal_that_comes_while_it_is_said_takes_nothing_from_what_was_done",),
+        (
+            f"{LEFT}::test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done",
+        ),
     ),
     Defect(
         "silent-address-of-a-stop-counts-as-stopped",

@@ -16,7 +16,7 @@ DEFECTS = (
         "own = bool(usb.serial) and not _has_twin(usb, os.path.basename(real), system)",
         "own = True",
         "Settings are written to the drive on the other of two adapters of one make.",
-        (f"{NAMES}::test_two_with_one_serial_number_are_told_apart",),
+        (f"{NAMES}::test_two_with_one_serial_number_are_distinguished",),
     ),
     Defect(
         "another-adapter-not-noticed",
@@ -123,6 +123,6 @@ DEFECTS = (
         "if isinstance(opts, MutableMapping) and self._is_left_out(ctx, opts):",
         "if False:",
         "With DRIVEPANEL_LINE a code is taken for the line, and the command refused.",
-        (f"{COMMANDS}::test_the_environment_says_which_line_is_meant",),
+        (f"{COMMANDS}::test_the_environment_says_which_line_is_selected",),
     ),
 )

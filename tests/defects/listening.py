@@ -55,7 +55,7 @@ DEFECTS = (
         "frame.device != requested.device or frame.function",
         "frame.function",
         "A late reply of one drive is told as the values of another.",
-        ("tests/wire/test_heard.py::test_what_becomes_of_requests",),
+        ("tests/wire/test_heard.py::test_results_of_requests",),
     ),
     Defect(
         "write-again-taken-for-its-reply",
@@ -71,7 +71,7 @@ DEFECTS = (
         "if same and last is not None",
         "if False and last is not None",
         "Nobody learns that two drives have one address.",
-        ("tests/session/test_listening.py::test_two_drives_at_one_address_are_told",),
+        ("tests/session/test_listening.py::test_two_drives_at_one_address_are_reported",),
     ),
     Defect(
         "refused-write-told-as-a-value",

@@ -62,7 +62,7 @@ DEFECTS = (
         "if why and not before:\n                self._cry()",
         "if before and not why:\n                self._cry()",
         "A run of an hour says at its end only that nothing of it is on record.",
-        ("tests/session/test_journal_file.py::test_trouble_is_told_at_once_and_once",),
+        ("tests/session/test_journal_file.py::test_trouble_is_reported_at_once_and_once",),
     ),
     Defect(
         "lost-answer-not-completed",
@@ -86,7 +86,7 @@ DEFECTS = (
         "answer, lost = CUT_SHORT, True",
         "pass",
         "Words of a block that a stop cut short stand in the journal as taken.",
-        ("tests/session/test_exchange.py::test_what_a_stop_cuts_short_is_not_kept_as_done",),
+        ("tests/session/test_exchange.py::test_write_cut_by_stop_is_not_recorded_as_done",),
     ),
     Defect(
         "lost-answer-completed-by-another-write",
@@ -107,7 +107,7 @@ DEFECTS = (
         "A full disk answers a stop that worked with six tracebacks.",
         (
             "tests/cli/test_journal_trouble.py"
-            "::test_a_full_disk_is_said_in_a_sentence_and_nothing_else_fails",
+            "::test_a_full_disk_is_reported_in_a_sentence_and_nothing_else_fails",
         ),
     ),
     Defect(
@@ -118,7 +118,7 @@ DEFECTS = (
         "A script takes a stop that worked for a failed one, as its disk is full.",
         (
             "tests/cli/test_journal_trouble.py"
-            "::test_what_was_done_is_not_said_to_have_failed_as_its_output_is_lost",
+            "::test_lost_output_does_not_report_done_work_as_failed",
         ),
     ),
     Defect(
@@ -135,7 +135,7 @@ DEFECTS = (
         "await self._transport.take_in()",
         "await asyncio.sleep(0)",
         "An answer that came before its question is shown as the present value.",
-        ("tests/bus/test_hostile_peers.py::test_what_came_before_a_request_is_not_its_answer",),
+        ("tests/bus/test_hostile_peers.py::test_bytes_before_a_request_are_not_its_reply",),
     ),
     Defect(
         "early-frame-taken-over-tcp",
@@ -145,7 +145,7 @@ DEFECTS = (
         "A gateway that counts along answers before it is asked, and is believed.",
         (
             "tests/bus/test_hostile_peers.py"
-            "::test_what_came_before_a_request_is_not_its_answer_by_a_guessed_number",
+            "::test_bytes_before_a_request_with_guessed_number_are_no_reply",
         ),
     ),
     Defect(

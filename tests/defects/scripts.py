@@ -13,7 +13,7 @@ DEFECTS = (
         "    return is_known_name(text, doubtful=True)",
         "    return True",
         "A misspelt command opens the panel, and a script hangs.",
-        ("tests/cli/test_usage.py::test_a_misspelt_command_is_told_and_opens_no_panel",),
+        ("tests/cli/test_usage.py::test_a_misspelt_command_is_reported_and_opens_no_panel",),
     ),
     Defect(
         "ctrl-c-counts-as-a-difference",
@@ -37,7 +37,7 @@ DEFECTS = (
         "    if len(given) > 1:",
         "    if not given:",
         "A write meant for one of two drives goes to the first that was named.",
-        ("tests/cli/test_watch.py::test_2_a_command_for_one_drive_takes_one",),
+        ("tests/cli/test_watch.py::test_one_drive_command_takes_one_exits_with_2",),
     ),
     Defect(
         "old-values-called-good",
@@ -71,7 +71,7 @@ DEFECTS = (
         "A gateway that is off keeps a recorder from all other lines.",
         (
             "tests/cli/test_watch_lines.py"
-            "::test_a_line_that_is_not_there_is_told_and_costs_the_others_nothing",
+            "::test_a_line_that_is_not_there_is_reported_and_costs_the_others_nothing",
         ),
     ),
     Defect(
@@ -80,7 +80,7 @@ DEFECTS = (
         "(not own or set(devices) == set(own)):",
         "(own or not set(devices) == set(own)):",
         "Another drive beside the named one is watched by its scales.",
-        ("tests/cli/test_watch_lines.py::test_the_drives_that_are_meant",),
+        ("tests/cli/test_watch_lines.py::test_the_drives_that_are_selected",),
     ),
     Defect(
         "csv-file-overwritten",
@@ -88,7 +88,7 @@ DEFECTS = (
         "    if path.exists() and not (append or force):",
         "    if path.exists() and append and force:",
         "The record of a night is overwritten by the same command in the morning.",
-        ("tests/cli/test_watch.py::test_a_file_is_replaced_or_continued_only_as_told",),
+        ("tests/cli/test_watch.py::test_a_file_is_replaced_or_continued_only_as_requested",),
     ),
     Defect(
         "row-behind-a-cut-one",
@@ -128,7 +128,7 @@ DEFECTS = (
         "if codes.count(code) > 1):",
         "if codes.count(code) > 2):",
         "Of two values for one parameter the second is written, and nobody says so.",
-        ("tests/cli/test_sets.py::test_2_a_code_that_is_given_twice",),
+        ("tests/cli/test_sets.py::test_repeated_code_exits_with_2",),
     ),
     Defect(
         "measurements-in-a-backup",
@@ -144,7 +144,7 @@ DEFECTS = (
         "    if values.absent:",
         "    if not values.raws:",
         "A backup without some parameters counts as done.",
-        ("tests/cli/test_sets.py::test_4_a_backup_that_is_not_whole",),
+        ("tests/cli/test_sets.py::test_incomplete_backup_exits_with_4",),
     ),
     Defect(
         "address-compared-with-the-factory",
@@ -160,7 +160,7 @@ DEFECTS = (
         'return {"schema": JSON_SCHEMA, "command": _command(), **data}',
         'return {"command": _command(), **data}',
         "A script cannot tell which fields it may count on.",
-        ("tests/cli/test_documents.py::test_what_a_command_prints_fits_the_schema",),
+        ("tests/cli/test_documents.py::test_printed_documents_fit_the_schema",),
     ),
     Defect(
         "bash-breaks-a-line-at-its-colon",

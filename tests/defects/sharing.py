@@ -249,7 +249,7 @@ DEFECTS = (
         "set(self._departed) <= set(before)",
         "len(self._departed) <= len(before) + 1",
         "A panel that has just come offers nobody the motor of a program that was killed.",
-        ("tests/session/test_handover.py::test_who_was_there_before_this_panel_is_missed_as_well",),
+        ("tests/session/test_handover.py::test_program_present_earlier_is_missed_too",),
     ),
     Defect(
         "motor-of-a-living-program-left",
@@ -267,7 +267,7 @@ DEFECTS = (
         "A fan that is to run on is stopped by a recorder when its panel is killed.",
         (
             "tests/line/test_shared_programs.py"
-            "::test_what_a_panel_was_told_of_a_hangup_holds_for_every_loss_of_it",
+            "::test_hangup_choice_applies_to_every_loss_of_the_panel",
         ),
     ),
     Defect(
@@ -484,7 +484,7 @@ DEFECTS = (
         "return result.turnaround + self._clock() - result.end > longest + STILL",
         "return False",
         "After a standstill of the program an old value has the time of now.",
-        (f"{STOPS}::test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew",),
+        (f"{STOPS}::test_an_answer_that_waited_for_a_stopped_program_is_requested_again",),
     ),
     Defect(
         "long-answer-asked-for-without-end",
@@ -508,7 +508,7 @@ DEFECTS = (
         "            raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost",
         "            raise lost from None",
         "A scanner is half written, and the person is told of one slot only.",
-        (f"{MAPPING}::test_what_was_written_before_the_line_was_lost_is_told",),
+        (f"{MAPPING}::test_writes_before_line_loss_are_reported",),
     ),
     Defect(
         "slots-cut-short-not-told",
@@ -516,7 +516,7 @@ DEFECTS = (
         "            complain(_cut_short(sent))",
         "            pass",
         "Ctrl-C leaves a scanner half written, without a word.",
-        (f"{BLOCK}::test_what_a_signal_cuts_short_is_told_by_slot",),
+        (f"{BLOCK}::test_write_cut_by_signal_is_reported_by_slot",),
     ),
     Defect(
         "lost-line-of-a-block-is-a-refusal",
@@ -548,7 +548,7 @@ DEFECTS = (
         "stopped = unseen = str(error)",
         "stopped = str(error)",
         "A restore whose line is lost at the end tells 0 not written, and status 4.",
-        ("tests/cli/test_sets.py::test_3_a_restore_that_cannot_look_again_says_why",),
+        ("tests/cli/test_sets.py::test_restore_that_cannot_compare_again_says_why_exits_with_3",),
     ),
     Defect(
         "motor-of-another-user-unguarded",
@@ -688,7 +688,7 @@ DEFECTS = (
         "                direct_at = now + AGAIN_AFTER\n",
         "                direct_at = now + 1e9\n",
         "The keeper was busy for half a second: a motor runs on while the panel hangs.",
-        ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_asked_again",),
+        ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_requested_again",),
     ),
     Defect(
         "stop-that-nobody-took-counts",

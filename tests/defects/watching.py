@@ -62,9 +62,7 @@ DEFECTS = (
         "if held[c].time >= since}",
         "if held[c].time >= 0}",
         "A stop is chosen by what the drive held before somebody else set it up.",
-        (
-            "tests/session/test_owners.py::test_what_may_have_changed_since_is_known_but_not_trusted",
-        ),
+        ("tests/session/test_owners.py::test_possibly_changed_value_is_known_but_not_trusted",),
     ),
     Defect(
         "slots-of-before-the-block-believed",
@@ -80,10 +78,7 @@ DEFECTS = (
         "        return max((since, *(image.changed(place.code) for place in request.places)))\n",
         "        return since\n",
         "A value that was read in the cycle before is told as not read now.",
-        (
-            "tests/session/test_slots.py"
-            "::test_what_was_read_by_oneself_is_read_again_and_by_another_is_not",
-        ),
+        ("tests/session/test_slots.py::test_own_value_is_read_again_and_foreign_is_not",),
     ),
     Defect(
         "block-of-before-its-slots-believed",

@@ -82,7 +82,9 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "reported"), BROKEN)
-def test_a_fault_is_told_with_its_line(folder: Path, right: str, wrong: str, reported: str) -> None:
+def test_a_fault_is_reported_with_its_line(
+    folder: Path, right: str, wrong: str, reported: str
+) -> None:
     text = example()
     assert text.count(right) == 1
     path = folder / "my-pump.toml"

@@ -73,7 +73,7 @@ def held(profile: Profile, raws: dict[str, int]) -> str:
 
 @pytest.mark.parametrize("family", SMALL)
 @pytest.mark.parametrize(("raws", "command", "reference"), CASES, ids=NAMES)
-def test_the_channel_that_counts_is_told(
+def test_the_channel_that_counts_is_reported(
     family: str, raws: dict[str, int], command: str, reference: str
 ) -> None:
     profile, held_raws = library.load(family), IDLE | raws
@@ -86,7 +86,7 @@ def test_the_channel_that_counts_is_told(
 
 
 @pytest.mark.parametrize("family", SMALL)
-def test_what_is_shown_and_what_is_refused_never_contradict(family: str) -> None:
+def test_allowed_and_refused_commands_never_contradict(family: str) -> None:
     profile = library.load(family)
     choices = product((1, 2), (AI1, MODBUS), (AI1, MODBUS), (FIRST, SECOND, LI4), (CCS_FIRST, LI4),
                       (TERMINALS, LINE), (TERMINALS, LINE), range(4), (0, 0x4000))  # fmt: skip
@@ -140,7 +140,7 @@ def test_an_altivar_71_tells_its_channels_itself(
     assert (held(profile, raws) == "") == by_line
 
 
-def test_what_can_bring_another_channel_into_force_is_told() -> None:
+def test_possible_channel_changes_are_reported() -> None:
     profile = library.load("atv312")
     assert switch_texts(profile, IDLE) == []
     raws = IDLE | {"FLO": LI4, "rFC": 134, "CCS": LI4, "COP": 2}

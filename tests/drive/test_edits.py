@@ -22,7 +22,7 @@ ATV71, ATV31, ATV312, ATV21 = (library.load(p) for p in ("atv71", "atv31", "atv3
 HELD = {"ACC": 30, "DEC": 30, "INR": 1, "HSP": 500, "LSP": 0, "TFR": 600, "AC2": 50, "DE2": 50}
 
 
-def test_what_is_typed_is_held_and_rounding_is_told() -> None:
+def test_typed_value_is_staged_and_rounding_reported() -> None:
     edits = Edits().stage(ATV71, "ACC", "3.14 s", HELD)
     (edit,) = edits
     assert (edit.old, edit.new, edit.old_text, edit.text) == (30, 31, "3.0 s", "3.1 s")
@@ -39,7 +39,7 @@ def test_the_held_value_is_no_edit() -> None:
 
 
 @pytest.mark.parametrize("typed", ["soon", "-1", "100000", ""])
-def test_what_cannot_be_held_is_not_staged(typed: str) -> None:
+def test_impossible_value_is_not_staged(typed: str) -> None:
     edits = Edits().stage(ATV71, "DEC", "7", HELD)
     with pytest.raises(ValueRefused):
         edits.stage(ATV71, "ACC", typed or "?", HELD)
@@ -84,7 +84,7 @@ def test_a_scale_under_which_a_staged_ramp_has_no_place_is_not_staged() -> None:
         edits.stage(ATV71, "INR", "0.01 s", HELD)
 
 
-def test_ramps_that_nobody_edits_change_with_their_scale_and_that_is_told() -> None:
+def test_ramps_that_nobody_edits_change_with_their_scale_and_that_is_reported() -> None:
     edits = Edits().stage(ATV71, "INR", "1 s", HELD).stage(ATV71, "ACC", "4", HELD)
     reported = consequences(ATV71, edits, HELD)
     assert reported == [
@@ -117,7 +117,7 @@ def test_lowering_begins_below() -> None:
     assert codes(stage(ATV71, {"LSP": "5", "HSP": "10"}, held), ATV71, held) == ["LSP", "HSP"]
 
 
-def test_the_order_of_different_things() -> None:
+def test_mixed_edits_are_written_in_order() -> None:
     held = {"Inr": 1, "ACC": 30, "LAC": 0, "Fr1": 0, "Add": 1, "tbr": 32, "ttO": 100, "SLL": 1,
             "tFO": 3, "CFG": 0, "bFr": 0}  # fmt: skip
     typed = {
@@ -132,7 +132,7 @@ def test_the_order_of_different_things() -> None:
     assert codes(edits, ATV31, held) == ["bFr", "LAC", "Inr", "ACC", "ttO", "tbr", "Add"]
 
 
-def test_a_value_past_another_is_told_with_both() -> None:
+def test_a_value_past_another_is_reported_with_both() -> None:
     edits = Edits().stage(ATV71, "LSP", "55", HELD)
     reported = edit_problems(ATV71, edits, HELD)
     assert reported == {

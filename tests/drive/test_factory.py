@@ -60,7 +60,7 @@ def test_a_ramp_left_the_factory_with_the_scale_of_the_factory() -> None:
     assert not not_factory(ATV31, acc, {"ACC": 31}), "its scale is not known"
 
 
-def test_what_the_drive_sets_itself_nobody_has_changed() -> None:
+def test_value_set_by_drive_is_not_foreign() -> None:
     assert not not_factory(ATV31, ATV31["tUn"], {"tUn": 113})
     assert not not_factory(ATV71, ATV71["TUN"], {"TUN": 2})
 
@@ -119,7 +119,7 @@ def test_a_limit_of_a_sister_family_says_so() -> None:
     assert own.text == "0.9 .. 7.2 A (INV)"
 
 
-def test_what_a_limit_follows_is_read_before_a_write() -> None:
+def test_limit_source_is_read_before_a_write() -> None:
     assert limit_sources(ATV31, ["ItH"]) == {"INV"}
     assert limit_sources(ATV31, ["tA1"]) == {"tA2"}
     assert limit_sources(ATV31, ["HSP"]) == {"LSP", "tFr"}

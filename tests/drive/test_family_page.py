@@ -91,7 +91,7 @@ def test_no_warning_stands_twice(family: str) -> None:
     assert len(texts) == len(set(texts))
 
 
-def test_what_is_not_from_the_familys_manual_is_marked() -> None:
+def test_fact_from_another_manual_is_marked() -> None:
     marks = {row.text: row.sure for row in section("atv312", "Warnings").rows}
     (gateway,) = [sure for text, sure in marks.items() if "gateway" in text]
     assert gateway == "sister family ?"
@@ -156,7 +156,7 @@ def test_control_characters_of_a_profile_are_not_sent_to_the_terminal() -> None:
 # Models
 
 
-def test_every_model_of_the_altivar_21_is_told_by_its_code_and_class() -> None:
+def test_every_model_of_the_altivar_21_has_its_code_and_class() -> None:
     profile = library.load("atv21")
     known = profile.data.identification
     assert model_codes(profile) == ["FB05", "FB72"]
@@ -177,7 +177,7 @@ def test_models_that_share_a_code_need_the_class() -> None:
     assert model_of(profile, {}) is None
 
 
-def test_what_a_model_is_called() -> None:
+def test_names_of_models() -> None:
     profile = library.load("atv21")
     assert model_read(profile, {"FB05": 6, "FB72": 0}) == "ATV21HU15M3X, 200 V, 1.5 kW"
     assert model_read(profile, {"FB05": 136, "FB72": 0x80}) == (

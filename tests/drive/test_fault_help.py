@@ -98,7 +98,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_wrong_help_file_is_told_with_its_line(case: str, tmp_path: Path) -> None:
+def test_a_wrong_help_file_is_reported_with_its_line(case: str, tmp_path: Path) -> None:
     text, output = BROKEN[case]
     profile = library.load_file(own_drive(tmp_path, text))
     with pytest.raises(ProfileError, match=r"help/mine\.toml:\d+: ") as caught:

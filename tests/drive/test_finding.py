@@ -35,7 +35,7 @@ def test_factory_settings_come_first_and_what_costs_most_last(families: list[Pro
     assert len(found) == len(set(found)) == 40
 
 
-def test_what_is_slow_is_a_step_of_its_own_behind_all_that_is_likely(
+def test_slow_settings_follow_all_likely_ones(
     families: list[Profile],
 ) -> None:
     found = likely_settings([one.data.link for one in families], longest_turnaround(families))
@@ -77,14 +77,14 @@ def test_one_read_finds_every_family(families: list[Profile]) -> None:
     assert probe == PresenceProbe(1039, ("powerdrive", "proxidrive", "varmeca"))
 
 
-def test_a_family_that_meets_an_unknown_word_with_silence_is_asked_who_it_is() -> None:
+def test_a_family_that_meets_an_unknown_word_with_silence_is_requested_who_it_is() -> None:
     functions = [{"code": 3, "name": "Read"}, {"code": 43, "name": "Identify"}]
     mute = profile_of(functions=functions, reading={"unknown_exception": None})
     assert presence_probes([mute]) == (PresenceProbe(None),)
     assert presence_probes([]) == (PresenceProbe(None),)
 
 
-def test_who_watches_the_line_from_the_first_request_on_is_named(families: list[Profile]) -> None:
+def test_drive_with_timeout_from_first_request_is_named(families: list[Profile]) -> None:
     found = watching_families(families)
     assert [one.id for one in found if one.sure] == ["atv21"]
     assert "atv71" not in {one.id for one in found}

@@ -33,7 +33,7 @@ def word(address: int, raws: dict[int, int], way: OrderId = "stop", *named: str)
 
 
 @pytest.mark.parametrize("one", FACTS, ids=lambda one: one.id)
-def test_what_is_picked_out_of_a_file_is_what_the_profile_says(one: StopFacts) -> None:
+def test_quick_head_equals_full_profile(one: StopFacts) -> None:
     profile = library.load(one.id)
     assert one.charts == tuple(profile.data.charts)
     assert one.names_itself is (profile.function(43) is not None)

@@ -94,7 +94,7 @@ def test_a_scanner_word_that_passes_a_command_on_is_a_command() -> None:
         assert kind(ATV71, code, 15) is WordKind.COMMAND
 
 
-def test_a_setting_is_told_from_what_nobody_knows() -> None:
+def test_a_setting_is_distinguished_from_what_nobody_knows() -> None:
     assert kind(ATV71, "ACC", 30) is WordKind.SETTING
     assert kind(ATV71, "RFR", 30) is WordKind.UNKNOWN
     (found,) = foreign_words(ATV71, {64000: 1}, {})

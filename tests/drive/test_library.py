@@ -82,7 +82,7 @@ def test_a_small_profile_loads(tmp_path: Path) -> None:
         ('group = "All"', 'group = "All"\nenumeration = "no"', 32, "no enumeration 'no'"),
     ],
 )
-def test_a_fault_is_told_with_file_line_and_words(
+def test_a_fault_is_reported_with_file_line_and_words(
     tmp_path: Path, old: str, new: str, line: int, words: str
 ) -> None:
     assert old in SMALL
@@ -237,7 +237,7 @@ def test_a_profile_is_begun_from_another(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("family", [one.id for one in library.listings()])
-def test_what_families_share_stands_once(family: str) -> None:
+def test_shared_rows_are_stored_once(family: str) -> None:
     path = library.packaged_folder() / f"{family}.toml"
     tables = tomli.loads(path.read_text("utf-8"))
     names = tables["profile"].get("rows_from", [])

@@ -44,13 +44,13 @@ def test_the_own_limit_counts_where_the_other_is_wider_or_not_known() -> None:
     assert wide.high_by == ""
 
 
-def test_what_is_no_number_has_no_limits() -> None:
+def test_non_number_has_no_limits() -> None:
     assert limits_in_force(ATV71, ATV71["STT"], HELD) is None
     assert limits_in_force(ATV71, ATV71["RFR"], HELD) is None
     assert limits_in_force(ATV71, ATV71["ACC"], {}) is None  # its scale is not known
 
 
-def test_an_edit_past_a_limit_is_told_with_its_name_and_a_staged_limit_counts() -> None:
+def test_an_edit_past_a_limit_is_reported_with_its_name_and_a_staged_limit_counts() -> None:
     empty = Edits()
     past = empty.stage(ATV71, "HSP", "70", HELD)
     assert "above TFR = 60.0 Hz" in limit_passed(ATV71, empty, past, HELD)
@@ -96,7 +96,7 @@ def staged(**typed: str) -> Edits:
         ("ACC", [], ""),
     ],
 )
-def test_what_builds_on_a_missed_edit(code: str, missed: list[str], base: str) -> None:
+def test_edits_that_depend_on_a_missed_edit(code: str, missed: list[str], base: str) -> None:
     edits = staged(TFR="80", HSP="75", LSP="10", INR="16#0000", ACC="4.55 s", BFR="16#0001")
     edit = edits.get(code)
     assert edit is not None

@@ -124,7 +124,7 @@ def test_families_without_blocks_say_so(family: str) -> None:
         ("atv21", "write", "", 0),
     ],
 )
-def test_what_a_person_may_type(family: str, direction: str, typed: str, raw: int) -> None:
+def test_typed_numbers_are_accepted(family: str, direction: str, typed: str, raw: int) -> None:
     assert raw_named(library.load(family), block(family, direction), typed) == raw
 
 
@@ -140,7 +140,7 @@ def test_what_a_person_may_type(family: str, direction: str, typed: str, raw: in
         ("atv71", "read", "nonsense", "no parameter"),
     ],
 )
-def test_what_a_slot_cannot_stand_for(family: str, direction: str, typed: str, says: str) -> None:
+def test_targets_a_slot_cannot_have(family: str, direction: str, typed: str, says: str) -> None:
     profile = library.load(family)
     if typed == "FE18" and profile.get("FE18") is None:
         typed = next(p.code for p in profile.parameters if p.code.startswith("FE1"))
@@ -171,7 +171,7 @@ def test_a_write_block_whose_first_slot_is_unused_is_refused_by_the_drive() -> N
     assert [p.refuses for p in assignment_problems(ATV21, hole)] == [False]
 
 
-def test_a_parameter_that_this_drive_lacks_is_told() -> None:
+def test_a_parameter_that_this_drive_lacks_is_reported() -> None:
     (wrong,) = assignment_problems(ATV71, made("atv71", "read", ["LCR"]), {"LCR"})
     assert "says that it has no LCR" in wrong.text
 

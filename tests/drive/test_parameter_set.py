@@ -88,7 +88,7 @@ def test_a_line_a_parameter_in_a_stable_order() -> None:
     assert [("ETA", "RFR", "ACC", "CHCF")[places.index(p)] for p in sorted(places)] == wanted
 
 
-def test_what_could_not_be_read_is_listed_with_why() -> None:
+def test_unread_parameters_are_listed_with_reason() -> None:
     profile = library.load("powerdrive")
     values = ParameterSet(SetHead("powerdrive"), {"15.07": 50}, {"15.03": 'no "answer"'})
     text = dump_set(profile, values)
@@ -125,7 +125,9 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "place", "expected"), FAULTS)
-def test_a_fault_is_told_with_its_line(right: str, wrong: str, place: str, expected: str) -> None:
+def test_a_fault_is_reported_with_its_line(
+    right: str, wrong: str, place: str, expected: str
+) -> None:
     text = small().replace(right, wrong, 1)
     assert text != small()
     start = "[set]" if place == "[set]" else f"{place} = "
@@ -243,7 +245,7 @@ def test_a_difference_behind_the_point_is_one() -> None:
     assert [(row.a, row.b) for row in compare_settings(profile, a, b)] == [("3.0 s", "3.1 s")]
 
 
-def test_what_one_side_could_not_read_differs_and_what_it_does_not_know_does_not() -> None:
+def test_unread_side_differs_and_unknown_side_does_not() -> None:
     profile = library.load("atv71")
     a = Side("a", SMALL)
     b = Side("b", {k: v for k, v in SMALL.items() if k != "ACC"}, {"ACC": "refused"})

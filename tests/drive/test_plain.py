@@ -25,7 +25,7 @@ def test_signs_stand_for_what_commands_a_terminal(text: str, shown: str) -> None
     assert plain(text) == shown
 
 
-def test_line_feeds_stay_where_lines_are_meant() -> None:
+def test_line_feeds_stay_where_lines_are_selected() -> None:
     assert plain("one\ntwo\x1b[2J", lines=True) == "one\ntwo␛[2J"
 
 

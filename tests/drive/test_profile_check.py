@@ -344,7 +344,7 @@ def test_the_profile_that_is_broken_below_is_right(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_is_told_where_it_stands(tmp_path: Path, name: str) -> None:
+def test_a_fault_is_reported_where_it_stands(tmp_path: Path, name: str) -> None:
     changes, reported, at = FAULTS[name]
     text = COMMANDED
     for right, wrong in changes:
@@ -356,7 +356,7 @@ def test_a_fault_is_told_where_it_stands(tmp_path: Path, name: str) -> None:
     assert fault.startswith(f"{tmp_path / 'own.toml'}:{line}: "), fault
 
 
-def test_all_faults_are_told_in_one_run(tmp_path: Path) -> None:
+def test_all_faults_are_reported_in_one_run(tmp_path: Path) -> None:
     """Those of the form do not hide those of the rest."""
     some = ("a field that is none", "a number out of range", "no stop", "one fault twice",
             "a word that is not there", "a field too few", "a hidden state")  # fmt: skip

@@ -300,14 +300,14 @@ def test_line_fault(profile: Profile) -> None:
 
 
 @pytest.mark.parametrize("code", ["F829", "F603", "tyP"])
-def test_what_must_never_be_written(profile: Profile, code: str) -> None:
+def test_parameters_that_must_never_be_written(profile: Profile, code: str) -> None:
     assert profile[code].forbidden
 
 
 SURE_BY_NUMBER_ONLY = "FMSL FM vLv F171 F300 F856 FE70"
 
 
-def test_what_has_no_sure_scale_is_raw_and_read_only(profile: Profile) -> None:
+def test_uncertain_scale_is_raw_and_read_only(profile: Profile) -> None:
     for code in SURE_BY_NUMBER_ONLY.split():
         parameter = profile[code]
         assert not is_verified(parameter)

@@ -131,7 +131,7 @@ def test_the_access_code_is_never_offered(profile: Profile) -> None:
     [("UnS", "400 V"), ("nCr", "22.5 A"), ("ItH", "22.5 A"), ("Ctd", "22.5 A"), ("SdC1", "9.0 A"),
      ("CLI", "30.0 A"), ("HSP", "60.0 Hz"), ("tdC1", "0.5 s")],
 )  # fmt: skip
-def test_what_a_large_drive_needs_can_be_typed(profile: Profile, code: str, typed: str) -> None:
+def test_inputs_of_a_large_drive_can_be_typed(profile: Profile, code: str, typed: str) -> None:
     parameter = profile[code]
     scale = profile.scale(parameter, {})
     assert encode(parameter, typed, profile.names(parameter), scale).rounded is False

@@ -502,7 +502,7 @@ def test_names_differ_within_a_group(atv71: Profile) -> None:
     assert len(seen) == len(set(seen))
 
 
-def test_what_no_source_confirms_is_marked(atv71: Profile) -> None:
+def test_unconfirmed_fact_is_marked(atv71: Profile) -> None:
     assert not is_verified(atv71["NPR"])
     assert not is_verified(atv71["LAC"])
     assert is_verified(atv71["ETA"])

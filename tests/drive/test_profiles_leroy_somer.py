@@ -199,7 +199,7 @@ def test_every_status_word_has_a_state(profile: Profile) -> None:
     assert all(read_chart(profile, {"10.40": w}).kind != "unknown" for w in range(0x8000))
 
 
-def test_what_the_manual_does_not_list_is_raw_and_read_only(profile: Profile) -> None:
+def test_undocumented_parameter_is_raw_and_read_only(profile: Profile) -> None:
     unlisted = [p for p in profile.parameters if p.group == "Unverified"]
     assert len(unlisted) >= 30
     for parameter in unlisted:
@@ -208,7 +208,7 @@ def test_what_the_manual_does_not_list_is_raw_and_read_only(profile: Profile) ->
     assert {"5.01", "4.01", "10.20"} <= {p.code for p in unlisted}
 
 
-def test_what_is_writable_stands_in_the_manual(profile: Profile) -> None:
+def test_writable_parameters_are_in_the_manual(profile: Profile) -> None:
     for parameter in profile.parameters:
         if parameter.access != "r":
             assert parameter.source.startswith("px-modbus")

@@ -39,7 +39,7 @@ def test_the_example_is_a_parameter_set() -> None:
         ("format = 1\n", ""),
     ],
 )
-def test_what_the_page_says_is_refused_is_refused(old: str, new: str) -> None:
+def test_refusals_match_the_profile_page(old: str, new: str) -> None:
     assert old in example()
     with pytest.raises(SetError, match=r"page\.toml"):
         load_set(example().replace(old, new), "page.toml", library.load)

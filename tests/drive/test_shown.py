@@ -54,7 +54,7 @@ def test_words_of_bits_and_names() -> None:
     assert shown_text(ATV71, ATV71["CMD"], None, NOTHING) == ""
 
 
-def test_what_a_value_depends_on() -> None:
+def test_dependencies_of_values() -> None:
     assert depends_on(ATV31["ACC"]) == ("Inr",)
     assert depends_on(ATV71["RTH"]) == ("UNT",)
     assert depends_on(ATV71["CMD"]) == ()

@@ -33,7 +33,7 @@ def test_every_measurement_of_a_leroy_somer_drive_can_be_taught(family: Profile)
 
 
 @pytest.mark.parametrize("id", ["atv21", "atv31", "atv312", "atv71"])
-def test_what_a_family_knows_is_not_taught(id: str) -> None:
+def test_known_scale_of_family_is_not_taught(id: str) -> None:
     family = library.load(id)
     reported = [p for p in family.parameters if p.unit or p.values or p.bits or p.scale != "1"]
     assert reported
@@ -42,7 +42,7 @@ def test_what_a_family_knows_is_not_taught(id: str) -> None:
     assert not {p.code for p in written} & {*teachable_codes(family)}, "no measurements"
 
 
-def test_a_taught_value_is_told_with_its_sign_and_mark(family: Profile) -> None:
+def test_a_taught_value_is_reported_with_its_sign_and_mark(family: Profile) -> None:
     own = with_taught(family, {"5.01": HERTZ, "1.21": RPM})
     value = shown(own, own["5.01"], 65236, {})
     assert (value.display, value.taught) == ("-30.0 Hz", True)
@@ -55,7 +55,7 @@ def test_a_taught_value_is_told_with_its_sign_and_mark(family: Profile) -> None:
     assert not shown(family, family["5.01"], 300, {}).taught
 
 
-def test_what_was_taught_is_still_written_by_no_editor(family: Profile) -> None:
+def test_taught_value_stays_read_only_in_editor(family: Profile) -> None:
     own = with_taught(family, {"1.21": RPM}, "1.21")
     refused = write_refusal(own, own["1.21"], "ready", ("1.21",))
     assert refused is not None
@@ -90,7 +90,7 @@ def test_nothing_known_is_the_family_itself(family: Profile) -> None:
     assert with_taught(family, {"NOSUCH": HERTZ, "10.40": HERTZ}, "1.21") is family
 
 
-def test_who_has_the_control(family: Profile) -> None:
+def test_commander_of_a_drive(family: Profile) -> None:
     unknown, line, terminals = (
         control_taking(family, raws) for raws in ({}, {"6.43": 1}, {"6.43": 0})
     )

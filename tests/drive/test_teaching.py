@@ -142,7 +142,7 @@ def test_small_values_ask_for_a_larger_one() -> None:
     assert learn("4.01", lesson.looks, look(84, "8.4", "A")).kind is LessonKind.TAUGHT
 
 
-def test_a_unit_may_be_told_later() -> None:
+def test_a_unit_may_be_reported_later() -> None:
     two = taught(look(300, "30.0"), look(503, "50.3"))
     assert two.scale is not None
     assert two.scale.unit == ""
@@ -175,7 +175,7 @@ def test_without_a_look_nothing_fits() -> None:
         ("80 %", "%", "80", "%"),
     ],
 )
-def test_what_a_person_types(typed: str, unit: str, number: str, means: str) -> None:
+def test_typed_display_values(typed: str, unit: str, number: str, means: str) -> None:
     assert parse_display(typed, unit) == (Decimal(number), means)
 
 
@@ -187,6 +187,6 @@ def test_what_a_person_types(typed: str, unit: str, number: str, means: str) -> 
         ("5 Hz", "rpm"), ("5", "\x1b[2J"), ("5", "Hertzhertz"),
     ],
 )  # fmt: skip
-def test_what_is_no_number_of_a_display(typed: str, unit: str) -> None:
+def test_invalid_display_numbers(typed: str, unit: str) -> None:
     with pytest.raises(ValueRefused):
         parse_display(typed, unit)

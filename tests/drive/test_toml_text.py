@@ -37,12 +37,12 @@ DEEP = {
 
 @pytest.mark.timeout(30)
 @pytest.mark.parametrize("name", DEEP)
-def test_what_is_nested_too_deep(name: str) -> None:
+def test_too_deeply_nested_file_is_refused(name: str) -> None:
     with pytest.raises(tomli.TOMLDecodeError, match=r"too deep \(at line \d+, column \d+\)"):
         toml_tables(DEEP[name])
 
 
-def test_what_a_profile_needs_is_not_too_deep() -> None:
+def test_profiles_are_not_nested_too_deep() -> None:
     for text in (lists(DEEPEST - 2), tables(DEEPEST // 2), "[a.b.c.d]\ne.f = [[1], [{ g = 1 }]]"):
         assert toml_tables(text) == tomli.loads(text)
     for path in library.packaged_folder().rglob("*.toml"):
@@ -61,7 +61,7 @@ def test_values_that_cannot_be(value: str) -> None:
 
 @pytest.mark.parametrize("odd", ['["ACC"]', "{ a = 1 }", "[]", "1979-05-27"])
 @pytest.mark.parametrize("key", ["code", "id", "raw"])
-def test_a_row_whose_name_is_none_is_told(key: str, odd: str, tmp_path: Path) -> None:
+def test_a_row_whose_name_is_none_is_reported(key: str, odd: str, tmp_path: Path) -> None:
     """It hid every other profile behind a traceback."""
     text = (library.packaged_folder() / "varmeca.toml").read_text("utf-8")
     table = {"code": "parameters", "id": "sources", "raw": "faults.codes"}[key]

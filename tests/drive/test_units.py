@@ -75,7 +75,7 @@ def test_every_unit_of_the_profiles_is_its_own() -> None:
         ("3.5", False, False),
     ],
 )
-def test_what_rounding_makes_another_value_of(typed: str, rounded: bool, lossy: bool) -> None:
+def test_values_changed_by_rounding(typed: str, rounded: bool, lossy: bool) -> None:
     found = encode(ATV312["LSP"], typed, {}, TENTH)
     assert (found.rounded, found.lossy) == (rounded, lossy)
 

@@ -158,7 +158,7 @@ def test_words_of_32_bits(low_first: bool, raw: int) -> None:
     [("13", 130, False), ("13.05", 131, True), ("13.04 s", 130, True), ("0,5", 5, False),
      ("1.25s", 13, True), ("999.9", 9999, False)],
 )  # fmt: skip
-def test_rounding_is_half_away_from_zero_and_told(typed: str, raw: int, rounded: bool) -> None:
+def test_rounding_is_half_away_from_zero_and_reported(typed: str, raw: int, rounded: bool) -> None:
     p = parameter(unit="s", scale="0.1", min=1, max=9999)
     found = encode(p, typed, {}, Decimal("0.1"))
     assert (found.raw, found.rounded) == (raw, rounded)

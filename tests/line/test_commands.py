@@ -202,7 +202,7 @@ def test_leave_running_leaves_it_running_and_says_what_the_drive_does() -> None:
 # run: what goes wrong
 
 
-def test_a_trip_ends_it_and_is_told() -> None:
+def test_a_trip_ends_it_and_is_reported() -> None:
     with bench() as (simulation, line), running(line) as program:
         wait_until(lambda: turns(simulation), "the motor turns")
         simulation.drive(1).provoke("OCF")
@@ -225,7 +225,7 @@ def test_a_motor_that_others_stop_ends_it() -> None:
 
 
 @pytest.mark.parametrize("order", [[], ["--quick"], ["--freewheel"]])
-def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None:
+def test_a_stop_by_another_program_ends_it_and_is_reported(order: list[str]) -> None:
     with Simulation([DriveSpec("atv71", 1)]) as simulation:
         host, port = simulation.serve_tcp()
         line = f"tcp:{host}:{port}"
@@ -239,7 +239,7 @@ def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None
             assert stands(simulation)
 
 
-def test_what_others_meant_is_void_before_the_first_word_goes_out(
+def test_run_discards_pending_commands_of_other_programs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     counts = []
@@ -267,7 +267,7 @@ LOSSES = {"unplugged": (Simulation.unplug, Simulation.replug), "silent": (silenc
 
 
 @pytest.mark.parametrize("loss", LOSSES)
-def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(
+def test_a_lost_line_is_reported_and_the_motor_is_stopped_when_it_is_back(
     loss: str, tmp_path: Path
 ) -> None:
     lose, give_back = LOSSES[loss]
@@ -298,7 +298,7 @@ NOT_ARMED = [("run",), ("reference", "30Hz"), ("reset",)]
 
 
 @pytest.mark.parametrize("command", NOT_ARMED, ids=lambda command: command[0])
-def test_5_nothing_is_commanded_without_arming(command: tuple[str, ...]) -> None:
+def test_unarmed_commands_exit_with_5(command: tuple[str, ...]) -> None:
     done = drivepanel(command[0], "sim:atv71", *command[1:])
     assert (done.returncode, done.stdout) == (5, "")
     assert "Not armed" in done.stderr
@@ -306,7 +306,7 @@ def test_5_nothing_is_commanded_without_arming(command: tuple[str, ...]) -> None
 
 
 @pytest.mark.parametrize("command", [*NOT_ARMED, ("stop",)], ids=lambda command: command[0])
-def test_5_a_read_only_line_is_not_written(command: tuple[str, ...]) -> None:
+def test_read_only_line_is_not_written_exits_with_5(command: tuple[str, ...]) -> None:
     arm = () if command == ("stop",) else ("--arm",)
     done = drivepanel(command[0], "sim:atv71", *command[1:], *arm, "--read-only")
     assert done.returncode == 5
@@ -324,7 +324,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_5_the_commander_refuses(case: str) -> None:
+def test_refusal_by_commander_exits_with_5(case: str) -> None:
     family, sets, command, text = REFUSED[case]
     with bench(DriveSpec(family, 1, sets=sets)) as (simulation, line):
         done = drivepanel(command[0], line, *command[1:], "-p", family, "--arm")
@@ -338,13 +338,13 @@ COMMANDS = [("run", "--arm"), ("reference", "30Hz", "--arm"), ("reset", "--arm")
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, ("status",)], ids=lambda command: command[0])
-def test_3_nobody_answers(command: tuple[str, ...]) -> None:
+def test_unanswered_command_exits_with_3(command: tuple[str, ...]) -> None:
     done = drivepanel(command[0], "sim:atv71@2", *command[1:], "-p", "atv71", "-d", "9")
     assert done.returncode == 3, done.stderr
     assert "evice 9" in done.stderr
 
 
-def test_4_the_drive_refuses_the_reference() -> None:
+def test_refused_reference_exits_with_4() -> None:
     with bench() as (simulation, line):
         simulation.drive(1).registers.protect([simulation.drive(1).profile["LFR"]])
         done = drivepanel("reference", line, "30Hz", "--arm")
@@ -352,7 +352,7 @@ def test_4_the_drive_refuses_the_reference() -> None:
         assert "xception" in done.stderr
 
 
-def test_4_the_drive_refuses_the_run_order_and_stands() -> None:
+def test_refused_run_command_leaves_motor_at_standstill_exits_with_4() -> None:
     with bench() as (simulation, line):
         simulation.drive(1).registers.protect([simulation.drive(1).profile["CMD"]])
         done = drivepanel("run", line, "--reference", "30Hz", "--arm")
@@ -387,7 +387,7 @@ def test_reset_ends_a_fault_whose_cause_is_gone() -> None:
         assert drive.fault is None
 
 
-def test_4_a_fault_whose_cause_stays() -> None:
+def test_fault_with_lasting_cause_exits_with_4() -> None:
     with bench() as (simulation, line):
         drive = simulation.drive(1)
         drive.provoke("OCF", persists=True)
@@ -414,7 +414,7 @@ def test_stop_needs_no_arming(way: tuple[str, ...]) -> None:
         assert stands(simulation)
 
 
-def test_4_a_motor_at_0_hz_that_is_still_enabled_is_not_stopped() -> None:
+def test_enabled_motor_at_0_hz_is_not_stopped_exits_with_4() -> None:
     """Run at the terminals with reference 0: the next turn of the potentiometer turns it."""
     with bench(DriveSpec("atv71", 1, sets={"FR1": 1})) as (simulation, line):
         simulation.drive(1).run(0.0)
@@ -481,7 +481,7 @@ def test_drives_that_answer_are_stopped_before_silent_addresses_are_waited_for()
             program.kill()
 
 
-def test_3_stop_all_where_nobody_answers() -> None:
+def test_stop_all_without_answer_exits_with_3() -> None:
     done = drivepanel("stop", "sim:atv71@2", "--all", "--addresses", "5,6")
     assert done.returncode == 3
     assert "no answer at 5, 6." in done.stderr
@@ -502,7 +502,7 @@ def test_silent_addresses_of_a_search_are_no_failures() -> None:
         assert stands(simulation, 2)
 
 
-def test_3_a_motor_started_from_here_that_no_search_finds_is_a_failure() -> None:
+def test_started_motor_that_no_scan_finds_exits_with_3() -> None:
     """Its start is on record; it lies past the addresses that are searched by themselves."""
     with bench(DriveSpec("atv71", 31)) as (simulation, line):
         left = ("--for", "1", "--leave-running")
@@ -580,7 +580,7 @@ def test_stop_with_named_profile_uses_no_other(own: bool) -> None:
         assert "Altivar 21" not in done.stdout + done.stderr
 
 
-def test_3_a_drive_that_answers_nothing_is_not_told_as_stopped() -> None:
+def test_silent_drive_is_not_reported_as_stopped_exits_with_3() -> None:
     with bench(DriveSpec("atv312", 1, run_hz=20.0)) as (simulation, line):
         silence(simulation)
         for named in ([], ["-p", "atv312"]):
@@ -625,7 +625,7 @@ def test_stop_of_a_guessed_family_reports_not_stopped() -> None:
 @pytest.mark.parametrize(
     "extra", [("--quick", "--freewheel"), ("--addresses", "1"), ("--all", "--addresses", "x")]
 )
-def test_2_stop_usage(extra: tuple[str, ...]) -> None:
+def test_stop_usage_exits_with_2(extra: tuple[str, ...]) -> None:
     assert drivepanel("stop", "sim:atv71", *extra).returncode == 2
 
 

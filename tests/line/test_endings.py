@@ -40,7 +40,7 @@ def test_simulate_ends_cleanly_and_takes_its_link_away(
 
 
 @pytest.mark.parametrize("way", ["--tcp", "--rtu-tcp"])
-def test_simulate_listens_on_loopback_unless_told_otherwise(way: str) -> None:
+def test_simulate_listens_on_loopback_by_default(way: str) -> None:
     with simulated("atv71@2", way, "0") as simulation:
         port = port_of(simulation.ready)
         scheme = way.removeprefix("--")

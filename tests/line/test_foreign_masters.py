@@ -83,7 +83,7 @@ def test_mbpoll_reads_what_the_drive_holds(reached: Reached) -> None:
     assert reached.mbpoll.words(ACCELERATION) == {ACCELERATION: 57}
 
 
-def test_what_mbpoll_writes_is_what_both_read_back(reached: Reached) -> None:
+def test_write_by_mbpoll_is_read_back_by_both(reached: Reached) -> None:
     assert reached.mbpoll.run(ACCELERATION, "61").returncode == 0
     assert reached.mbpoll.words(ACCELERATION) == {ACCELERATION: 61}
     assert ours(reached.line, "ACC", "ETA", "RFR") == {"ACC": 61, "ETA": 0x0637, "RFR": 425}

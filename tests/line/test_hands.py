@@ -114,7 +114,7 @@ def test_a_paste_with_brackets_does_nothing_at_all(panel: PtyPanel) -> None:
     panel.shows("Output", "a arm")
 
 
-def test_keys_that_were_not_taken_are_told_of(fresh_panel: PtyPanel) -> None:
+def test_keys_that_were_not_taken_are_reported(fresh_panel: PtyPanel) -> None:
     fresh_panel.type("bar")
     fresh_panel.shows("3 keys came at once and were not")
 
@@ -146,7 +146,7 @@ def test_a_paste_into_a_text_is_text_and_submits_nothing(fresh_panel: PtyPanel) 
 
 
 @pytest.mark.parametrize("options", [(), ("--mouse",)], ids=["without mouse", "with mouse"])
-def test_a_terminal_is_asked_for_its_mouse_only_with_the_option(options: tuple[str, ...]) -> None:
+def test_a_terminal_is_requested_its_mouse_only_with_the_option(options: tuple[str, ...]) -> None:
     with panel_on_a_pty(*options) as panel:
         panel.type("q")
         wait_until(lambda: not panel.look(), "the panel ends")

@@ -97,7 +97,7 @@ def test_a_stop_that_was_seen_withdraws_the_offer(
 
 
 @pytest.mark.usefixtures("holder")
-def test_a_motor_left_running_on_purpose_is_told_of(
+def test_a_motor_left_running_on_purpose_is_reported(
     terminal_with: Start, second_terminal: Start
 ) -> None:
     with running(terminal_with) as made:
@@ -111,9 +111,7 @@ def test_a_motor_left_running_on_purpose_is_told_of(
         again(second_terminal, made.line).wait_for("Runs since", "left running on purpose")
 
 
-def test_where_a_start_cannot_be_recorded_the_panel_asks(
-    terminal_with: Start, tmp_path: object
-) -> None:
+def test_panel_asks_if_start_cannot_be_recorded(terminal_with: Start, tmp_path: object) -> None:
     simulation = Simulation([DriveSpec("atv71", 1)])
     simulation.start()
     try:

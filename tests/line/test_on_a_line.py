@@ -243,7 +243,7 @@ async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
         opened.close()
 
 
-async def test_who_cannot_be_fed_is_told_of_before_it_acts(tmp_path: Path) -> None:
+async def test_drive_without_keep_alive_is_reported_before_it_trips(tmp_path: Path) -> None:
     simulation = Simulation([DriveSpec("atv21", 1, run_hz=35.0)])
     simulation.start()
     # a name of its own: the number of a pseudo-terminal may be taken by others meanwhile
@@ -270,7 +270,7 @@ async def test_who_cannot_be_fed_is_told_of_before_it_acts(tmp_path: Path) -> No
         opened.close()
 
 
-async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> None:
+async def test_a_watch_that_begins_with_a_command_is_not_reported_before() -> None:
     opened = demo_line({"atv71": 0.0})
     line_watch = LineWatch(opened.line)
     drive = DriveSession(opened.line, 1, library.load("atv71"))

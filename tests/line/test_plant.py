@@ -189,7 +189,7 @@ def test_the_last_will_comes_within_one_and_a_half_keep_alives(
     made.program.process.kill()
 
 
-def test_a_broker_that_comes_back_is_told_everything_anew(
+def test_a_broker_that_comes_back_is_informed_everything_anew(
     programs: ExitStack, broker: RealBroker
 ) -> None:
     made = publishing(programs, broker)
@@ -222,7 +222,7 @@ def test_publish_beside_serve_takes_the_codes_that_are_named(
     assert broker.status == "offline"
 
 
-def test_a_wrong_password_is_told(
+def test_a_wrong_password_is_reported(
     programs: ExitStack, broker: RealBroker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(PASSWORD_SETTING, "another")

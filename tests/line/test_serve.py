@@ -202,7 +202,7 @@ def test_it_warns_where_other_computers_reach_it() -> None:
 # Its end, and the end of others
 
 
-def test_sigterm_ends_it_with_0_and_systemd_is_told(
+def test_sigterm_ends_it_with_0_and_systemd_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:

@@ -88,7 +88,7 @@ def end(*programs: subprocess.Popen[str]) -> None:
         one.communicate("\n", timeout=20.0)
 
 
-def test_a_member_attaches_without_being_told_and_a_stranger_does_not(
+def test_a_member_attaches_without_setup_and_a_stranger_does_not(
     folder: Path, tcp_line: str
 ) -> None:
     number = str(grp.getgrnam(GROUP).gr_gid)
@@ -102,7 +102,7 @@ def test_a_member_attaches_without_being_told_and_a_stranger_does_not(
     assert not list(folder.glob("*.sock"))
 
 
-def test_nobody_of_another_user_attaches_unless_it_was_asked_for(
+def test_nobody_of_another_user_attaches_unless_it_was_requested(
     folder: Path, tcp_line: str
 ) -> None:
     number = str(grp.getgrnam(GROUP).gr_gid)
@@ -113,7 +113,7 @@ def test_nobody_of_another_user_attaches_unless_it_was_asked_for(
     end(other, owner)
 
 
-def test_a_group_without_a_folder_is_told_what_to_do(tmp_path: Path, tcp_line: str) -> None:
+def test_a_group_without_a_folder_is_informed_what_to_do(tmp_path: Path, tcp_line: str) -> None:
     if os.geteuid() != 0:
         pytest.skip(ROOT_NEEDED)
     one = program(tcp_line, 0, "", tmp_path / "none", DRIVEPANEL_SHARE_GROUP=GROUP)
@@ -126,7 +126,7 @@ def test_a_group_without_a_folder_is_told_what_to_do(tmp_path: Path, tcp_line: s
     assert "There is no group no-such-group" in reported
 
 
-def test_serve_opens_its_socket_for_the_group_that_it_is_told(
+def test_serve_opens_its_socket_for_the_group_that_is_configured(
     tmp_path: Path, tcp_line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One user is enough: the group is one of his own, the rest is what the system does."""

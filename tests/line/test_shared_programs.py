@@ -96,7 +96,7 @@ def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("first", ["watch", "run"])
-def test_a_motor_that_is_meant_to_be_left_running_runs_on(programs: ExitStack, first: str) -> None:
+def test_a_motor_that_should_be_left_running_runs_on(programs: ExitStack, first: str) -> None:
     with motor_run(programs, first, "--leave-running") as (simulation, _, runner, recorder):
         runner.process.kill()
         time.sleep(3)
@@ -271,7 +271,7 @@ def test_nobody_feeds_the_motor_of_an_owner_that_is_frozen(programs: ExitStack) 
 
 
 @pytest.mark.usefixtures("holder")
-def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None:
+def test_a_stop_beside_run_ends_it_and_names_that_program(programs: ExitStack) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, recorder):
         assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
         assert stopped_by_commands(simulation)
@@ -325,7 +325,7 @@ def on_record() -> list[bool]:
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGKILL])
-def test_what_a_panel_was_told_of_a_hangup_holds_for_every_loss_of_it(
+def test_hangup_choice_applies_to_every_loss_of_the_panel(
     programs: ExitStack, terminal_with: Start, number: signal.Signals
 ) -> None:
     """The recorder takes the line over, feeds the drive, and leaves the motor as registered."""
@@ -347,7 +347,7 @@ def test_what_a_panel_was_told_of_a_hangup_holds_for_every_loss_of_it(
 
 
 @pytest.mark.usefixtures("holder")
-def test_unless_it_was_told_otherwise_the_motor_of_a_killed_panel_is_stopped(
+def test_by_default_the_motor_of_a_killed_panel_is_stopped(
     programs: ExitStack, terminal_with: Start
 ) -> None:
     with panel_run(programs, terminal_with) as (made, recorder):

@@ -48,7 +48,7 @@ class FakeClock(Clock):
         while (left := end - self.monotonic()) > 0:  # noqa: ASYNC110 - any thread advances it
             await asyncio.sleep(min(left, TURN))
 
-    def of_line(self, reported: float) -> float:
+    def line_time(self, reported: float) -> float:
         """A real moment on this clock: what was advanced since then is not in it."""
         return reported + self._ahead[bisect_right(self._since, reported) - 1]
 

@@ -87,7 +87,7 @@ def test_a_drive_that_is_not_known_now_keeps_its_fault(bench: Bench) -> None:
     assert bench.alarms.active == ()
 
 
-def test_a_code_that_comes_later_is_told_and_rings_no_second_time(bench: Bench) -> None:
+def test_a_code_that_comes_later_is_reported_and_rings_no_second_time(bench: Bench) -> None:
     assert bench.take({3: tripped(None)})
     assert not bench.take({3: tripped(OBF)})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]

@@ -30,7 +30,7 @@ class Lacking(OneDrive):
         return await super().read(device, address, count, **how)
 
 
-async def test_the_others_are_told_and_the_silent_one_is_named() -> None:
+async def test_the_others_are_reported_and_the_silent_one_is_named() -> None:
     line = Lacking("powerdrive", "15.07")
     found = await read_apart(
         Reader(DriveSession(line, 1, line.profile)), ["15.06", "15.07", "10.40"]

@@ -64,7 +64,7 @@ def test_the_page_names_all_of_it() -> None:
                 assert f"`{owner.__name__}.{part}`" in text, part
 
 
-def test_values_go_by_what_was_asked_for(drive: Drive) -> None:
+def test_values_go_by_what_was_requested(drive: Drive) -> None:
     found = drive.read("hsp", "W3201", "NMA1")
     assert list(found) == ["hsp", "W3201", "NMA1"]
     assert (found["hsp"].code, found["hsp"].number, found["hsp"].unit) == ("HSP", Decimal(50), "Hz")
@@ -112,7 +112,7 @@ def test_nothing_is_written_without_arming(drive: Drive) -> None:
     assert drive.read("HSP")["HSP"].number == Decimal(50)
 
 
-def test_what_is_written_is_read_back_and_on_record(drive: Drive) -> None:
+def test_confirmed_write_is_read_back_and_recorded(drive: Drive) -> None:
     with drive.armed():
         reported = drive.write({"HSP": 40.5, "ACC": "3500ms"})
     assert reported["HSP"] == "HSP: 50.0 Hz -> 40.5 Hz"
@@ -129,7 +129,7 @@ def test_the_journal_has_what_a_script_wrote() -> None:
     assert ['"HSP"' in entry and '"script"' in entry for entry in entries] == [True]
 
 
-def test_a_refused_value_is_told_with_its_code(drive: Drive) -> None:
+def test_a_refused_value_is_reported_with_its_code(drive: Drive) -> None:
     with drive.armed(), pytest.raises(NotWritten) as refused:
         drive.write({"HSP": 700, "ACC": 4})
     assert list(refused.value.why) == ["HSP"]

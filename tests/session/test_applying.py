@@ -72,7 +72,7 @@ async def test_a_value_past_another_is_not_sent() -> None:
         assert 3105 not in [register for register, _ in made.writes()]
 
 
-async def test_what_builds_on_a_refused_edit_is_held_back() -> None:
+async def test_edits_that_depend_on_a_refused_one_are_held_back() -> None:
     """A limit that was to be raised first was not: what would pass it is not sent."""
     with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
         edits = await made.stage(TFR="80", HSP="75", LSP="10", ACC="4 s")
@@ -89,7 +89,7 @@ async def test_what_builds_on_a_refused_edit_is_held_back() -> None:
         assert made.drive.raw("HSP") == 500
 
 
-async def test_what_counts_by_a_refused_scale_is_held_back() -> None:
+async def test_edits_scaled_by_a_refused_one_are_held_back() -> None:
     with bench("atv71", sets={"INR": 1, "ACC": 30}) as made:
         edits = await made.stage(INR="0.01", ACC="4.55 s")
         made.refuse("INR")
@@ -101,7 +101,7 @@ async def test_what_counts_by_a_refused_scale_is_held_back() -> None:
         assert made.drive.raw("ACC") == 30
 
 
-async def test_after_a_failure_the_rest_waits_for_an_answer_where_one_can_be_asked() -> None:
+async def test_after_a_failure_the_rest_waits_for_an_answer_where_one_can_be_requested() -> None:
     with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
         edits = await made.stage(TFR="80", HSP="75", LSP="10", ACC="4 s")
         made.refuse("TFR")
@@ -140,7 +140,7 @@ async def test_a_scale_that_somebody_else_changes_is_seen() -> None:
         assert left.new == 500
 
 
-async def test_what_the_drive_holds_already_is_not_written() -> None:
+async def test_unchanged_value_is_not_written() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.set("ACC", 50)
@@ -259,7 +259,7 @@ async def test_a_line_that_goes_on_at_another_owner_is_gone_on_with(taken: bool)
 
 
 @pytest.mark.parametrize("end", ["a stop", "disarmed"])
-async def test_what_lets_nothing_more_through_ends_it_and_keeps_the_rest(end: str) -> None:
+async def test_blocked_line_ends_writing_and_keeps_the_rest(end: str) -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
         permit = made.permit()

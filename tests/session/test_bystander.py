@@ -16,7 +16,7 @@ from tui.session.sharing.bystander import (
     UNKNOWN_TIMEOUT_ACTED,
     Bystander,
 )
-from tui.session.timeout_told import Timeout, TimeoutWatch
+from tui.session.timeout_report import Timeout, TimeoutWatch
 
 TTO = 10.0
 
@@ -59,12 +59,12 @@ class Bench:
         self.latest = SimpleNamespace(state=state, error=error, time=self.time)
 
 
-def test_a_drive_that_nobody_commands_is_asked() -> None:
+def test_a_drive_that_nobody_commands_is_requested() -> None:
     bench = Bench()
     assert all(bench.asks() for _ in range(5))
 
 
-def test_a_drive_is_asked_a_while_after_each_sign_of_its_commander() -> None:
+def test_a_drive_is_requested_a_while_after_each_sign_of_its_commander() -> None:
     bench = Bench()
     bench.saw("running")
     for _ in range(3):
@@ -78,7 +78,7 @@ def test_a_drive_is_asked_a_while_after_each_sign_of_its_commander() -> None:
     assert not bench.asks()
 
 
-def test_a_slow_commander_has_its_drive_asked_once_for_each_sign() -> None:
+def test_a_slow_commander_has_its_drive_requested_once_for_each_sign() -> None:
     bench = Bench()
     bench.saw("running")
     for _ in range(3):
@@ -87,7 +87,7 @@ def test_a_slow_commander_has_its_drive_asked_once_for_each_sign() -> None:
         assert not bench.asks()
 
 
-def test_a_motor_that_was_seen_to_stand_is_asked_on() -> None:
+def test_a_motor_that_was_seen_to_stand_is_still_polled() -> None:
     bench = Bench()
     bench.sign = bench.time
     assert bench.asks()
@@ -117,7 +117,7 @@ def test_a_time_out_that_is_not_known_is_taken_for_long(
     assert bench.asks(2.0)
 
 
-def test_a_drive_without_a_time_out_is_asked_on() -> None:
+def test_a_drive_without_a_time_out_is_still_polled() -> None:
     bench = Bench(timeout=Timeout(known=True), sign=0.0)
     assert bench.asks()
     assert bench.asks()

@@ -93,15 +93,15 @@ def test_arming_ends_after_a_minute_without_a_key(session: DriveSession) -> None
     assert "No key for a minute" in session.arming.why_disarmed
 
 
-def test_what_is_known_grows_old(session: DriveSession) -> None:
+def test_known_value_grows_stale(session: DriveSession) -> None:
     clock = clock_of(session)
-    session.image.confirm("ACC", 30, clock.of_line(time.monotonic()))
+    session.image.confirm("ACC", 30, clock.line_time(time.monotonic()))
     assert session.image.fresh(5.0) == {"ACC": 30}
     clock.advance(60)
     assert session.image.fresh(5.0) == {}
     assert session.image.age("ACC") >= 60
     # what the line has told before is as old as it is, however late it is asked for
-    session.image.confirm("DEC", 40, clock.of_line(time.monotonic()))
+    session.image.confirm("DEC", 40, clock.line_time(time.monotonic()))
     assert session.image.age("DEC") < 60
 
 

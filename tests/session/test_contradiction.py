@@ -32,7 +32,7 @@ def output(reference: str) -> DriveIdentity:
     return DriveIdentity(1, "", reference, "", "", fits[0] if fits else None, fits)
 
 
-def of_kinds(*prefixes: str) -> Profile:
+def profile_of_kinds(*prefixes: str) -> Profile:
     known = {"reference_prefixes": list(prefixes)}
     return profile_of(parameter("A", 1), identification=known)
 
@@ -49,7 +49,7 @@ def of_kinds(*prefixes: str) -> Profile:
         ("ATV12H018M2", "atv312"),
     ],
 )
-def test_another_kind_is_told_by_both_names(reference: str, profile: str) -> None:
+def test_another_kind_is_reported_by_both_names(reference: str, profile: str) -> None:
     reported = contradiction(output(reference), library.load(profile))
     assert reported.startswith(f"Device 1 says it is {reference}")
     assert library.load(profile).name in reported
@@ -68,16 +68,16 @@ def test_another_kind_is_told_by_both_names(reference: str, profile: str) -> Non
         ("VFD055CP43B", "powerdrive"),  # names no kinds: nothing to compare
     ],
 )
-def test_what_may_be_is_no_contradiction(reference: str, profile: str) -> None:
+def test_possible_identity_is_no_contradiction(reference: str, profile: str) -> None:
     assert contradiction(output(reference), library.load(profile)) == ""
     assert contradiction(None, library.load(profile)) == ""
 
 
 def test_a_profile_of_the_users_own_is_compared_by_what_it_claims() -> None:
-    assert contradiction(output("PUMP 7"), of_kinds("PUMP")) == ""
-    assert contradiction(output("FAN 7"), of_kinds("PUMP"))
-    assert contradiction(output("FAN 7"), of_kinds()) == ""
-    assert contradiction(output("ATV71HU15M3"), of_kinds()), "another profile claims it"
+    assert contradiction(output("PUMP 7"), profile_of_kinds("PUMP")) == ""
+    assert contradiction(output("FAN 7"), profile_of_kinds("PUMP"))
+    assert contradiction(output("FAN 7"), profile_of_kinds()) == ""
+    assert contradiction(output("ATV71HU15M3"), profile_of_kinds()), "another profile claims it"
 
 
 class Answering(OneDrive):
@@ -103,7 +103,7 @@ class Answering(OneDrive):
 
 
 @pytest.mark.parametrize("error", [NoAnswer(1, 43, 0), DeviceException(1, 43, 0, code=1)])
-async def test_who_says_nothing_is_asked_once_and_believed(error: Exception) -> None:
+async def test_silent_identity_is_requested_once_and_believed(error: Exception) -> None:
     line = Answering(error)
     assert await own_words(line, 1, library.load("powerdrive")) is None
     assert line.priorities == [Priority.BACKGROUND], "a silent family is not waited for long"
@@ -127,7 +127,7 @@ async def test_silence_of_a_drive_that_answers_its_status_is_no_contradiction() 
     assert len(line.priorities) == 2
 
 
-async def test_a_lost_line_is_told() -> None:
+async def test_a_lost_line_is_reported() -> None:
     with pytest.raises(LineLost):
         await own_words(Answering(LineLost("unplugged")), 1, library.load("atv71"))
 

@@ -70,7 +70,7 @@ def reported(before: DriveCount, now: DriveCount) -> dict[str, int]:
         (count(120, 0, sent=20, answered=20), {"counted-anew": 0}),
     ],
 )  # fmt: skip
-def test_what_differs_is_told(now: DriveCount, shown: dict[str, int]) -> None:
+def test_counter_differences_are_reported(now: DriveCount, shown: dict[str, int]) -> None:
     assert reported(count(100, 3), now) == shown
 
 
@@ -80,7 +80,7 @@ def test_frames_roll_over_and_errors_stay() -> None:
     assert reported(before, count(14, 65535, sent=20, answered=20)) == {}
 
 
-def test_what_is_not_certain_is_not_told() -> None:
+def test_uncertain_difference_is_not_reported() -> None:
     """Another request may have been on its way at the moment of the look."""
     before = DriveCount(100, 0, Bounds(50, 51), Bounds(49, 51))
     now = DriveCount(120, 0, Bounds(70, 72), Bounds(69, 71))
@@ -89,7 +89,7 @@ def test_what_is_not_certain_is_not_told() -> None:
     assert reported(before, late) == {"not-answered": 6}
 
 
-def test_a_program_that_takes_the_line_over_counts_anew_and_no_difference_is_told() -> None:
+def test_a_program_that_takes_the_line_over_counts_anew_and_no_difference_is_reported() -> None:
     first = count(100, 0, sent=500, answered=500)
     found = Comparison(first, first).with_look(count(140, 0, sent=2, answered=2))
     assert differences(found) == []
@@ -238,7 +238,7 @@ async def test_the_drives_counters_are_reset_and_compared_from_there(tmp_path: P
         assert now.total.requests > now.since.requests
 
 
-async def test_counters_that_somebody_else_reset_are_told() -> None:
+async def test_counters_that_somebody_else_reset_are_reported() -> None:
     with simulated() as (_, line):
         session = DriveSession(line, 2, library.load("atv71"))
         watch = CounterWatch(session)
@@ -281,7 +281,7 @@ async def test_a_drive_without_counters_has_ours_alone() -> None:
         assert now.drive == ()
 
 
-async def test_a_silent_drive_is_told_and_hides_nothing() -> None:
+async def test_a_silent_drive_is_reported_and_hides_nothing() -> None:
     with simulated() as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         simulation.faults.rates = FaultRates(lost=1.0)

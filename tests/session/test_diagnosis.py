@@ -117,7 +117,7 @@ def test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed
     assert any("open serial:/dev/ttyUSB0,38400,8E1" in step for step in faster.steps)
 
 
-def test_who_answers_has_the_right_wires() -> None:
+def test_answering_drive_has_correct_wires() -> None:
     damaged = of(heard(answered=2, damaged=1))
     assert damaged.rung == "checksum"
     output = " ".join(damaged.steps)
@@ -126,7 +126,7 @@ def test_who_answers_has_the_right_wires() -> None:
     assert "Pins" not in output
 
 
-def test_what_is_not_as_it_left_the_factory_is_looked_at_first() -> None:
+def test_first_suspects_differ_from_factory_settings() -> None:
     other = replace(heard(), link=SerialLink(PORT, 9600, "8E1"))
     assert "this line has 9600 8E1" in of(other).steps[0]
     assert of(heard()).steps[0].startswith("Address")
@@ -136,7 +136,7 @@ def test_what_is_not_as_it_left_the_factory_is_looked_at_first() -> None:
 @pytest.mark.parametrize(
     ("code", "step"), [(2, "what was asked is not known"), (6, "Ask again"), (4, "has a trouble")]
 )
-def test_a_refusal_is_told_by_its_code(code: int, step: str) -> None:
+def test_a_refusal_is_reported_by_its_code(code: int, step: str) -> None:
     found = of(heard(exceptions=(code,)))
     assert found.rung == "exception"
     assert step in found.steps[0]
@@ -270,7 +270,7 @@ def test_a_host_that_is_not_reached() -> None:
     [(16, 0.017, "slow-adapter"), (1, 0.017, "answers"), (16, 0.005, "answers"),
      (None, 0.017, "answers")],
 )  # fmt: skip
-def test_latency_is_told_where_it_is_set_and_measured(
+def test_latency_is_reported_where_it_is_set_and_measured(
     latency: int | None, turnaround: float, rung: str
 ) -> None:
     heard = Heard(requested=5, answered=5)
@@ -544,7 +544,7 @@ def steps_in_silence(family: str, device: int = 2) -> str:
         ("powerdrive", "not isolated, and shared with the keypad"),
     ],
 )
-def test_what_the_manual_says_of_silence(family: str, says: str) -> None:
+def test_manual_advice_on_communication_loss(family: str, says: str) -> None:
     assert says in steps_in_silence(family)
 
 
@@ -602,7 +602,7 @@ EXAMPLES = {
 
 
 @pytest.mark.parametrize("rung", EXAMPLES)
-def test_what_is_seen_leads_to_its_rung(rung: str) -> None:
+def test_evidence_leads_to_its_check(rung: str) -> None:
     assert of(EXAMPLES[rung]).rung == rung
 
 
@@ -628,7 +628,7 @@ CODES = st.lists(st.sampled_from([1, 2, 10, 11]), max_size=2).map(tuple)
     ),
     st.sampled_from([*map(library.load, ("atv71", "powerdrive")), None]),
 )  # fmt: skip
-def test_a_drive_that_has_not_answered_is_never_said_to_be_well(
+def test_a_drive_that_has_not_answered_is_never_reported_to_be_well(
     heard: Heard, profile: Profile | None
 ) -> None:
     found = of(Sight(LINK, 2, profile, heard=heard))

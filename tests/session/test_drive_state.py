@@ -102,7 +102,7 @@ def test_alarms_are_the_set_bits_marked_as_such() -> None:
     assert [bit.name for bit in state.alarms] == ["warning"]
 
 
-def test_a_channel_word_is_told_by_its_bits() -> None:
+def test_a_channel_word_is_reported_by_its_bits() -> None:
     bits = [{"bit": 0, "name": "terminals"}, {"bit": 3, "name": "Modbus"}]
     profile = profile_of(parameter("CCC", 8442, bits=bits))
     reading = readings(profile, CCC=8)["CCC"]

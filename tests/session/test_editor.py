@@ -122,7 +122,7 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         assert made.drive.raw("TFR") == 600
 
 
-async def test_what_somebody_else_changes_is_noticed_and_not_overwritten() -> None:
+async def test_foreign_change_is_noticed_and_not_overwritten() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "ACC")
         editor.staging.stage("ACC", "7")
@@ -213,7 +213,7 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
         assert (made.drive.raw("ACC"), made.drive.raw("HSP")) == (30, 500)
 
 
-async def test_what_a_set_has_alike_is_not_staged_by_a_later_change(tmp_path: Path) -> None:
+async def test_equal_value_of_set_is_not_staged_by_later_change(tmp_path: Path) -> None:
     async with editing("atv71") as (made, editor):
         session = made.session
         upload = Upload(session, ["ACC", "DEC", "LSP", "INR"])
@@ -237,7 +237,7 @@ async def test_what_a_set_has_alike_is_not_staged_by_a_later_change(tmp_path: Pa
         assert made.drive.raw("DEC") == 77
 
 
-async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
+async def test_change_that_needs_reset_is_reported_until_power_off() -> None:
     # a line that does not wait long for late replies: how long it does is not the matter here
     timing = Timing(first_timeout=0.3, late_reply=0.3)
     async with editing("atv21", timing=timing) as (made, editor):

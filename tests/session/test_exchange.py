@@ -132,7 +132,7 @@ async def test_an_exchange_needs_arming_and_the_interlocks_of_an_order() -> None
         assert sent(here, 23) == []
 
 
-async def test_outputs_moved_during_an_exchange_are_told() -> None:
+async def test_outputs_moved_during_an_exchange_are_reported() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
         honest = here.session.line.read_write
@@ -159,7 +159,7 @@ async def test_only_what_was_named_is_written() -> None:
         assert reported == {("ACC", "4.5 s"), ("DEC", "5.5 s")}
 
 
-async def test_what_stands_between_two_named_ones_keeps_its_value() -> None:
+async def test_value_between_two_named_ones_is_kept() -> None:
     with bench("atv71", sets={"CHCF": 1, "LSP": 41}) as here:
         _, outputs = await both(here)
         assert reach(here.profile, outputs, ["ACC", "HSP"]) == range(2, 5)
@@ -200,7 +200,7 @@ async def test_nothing_named_is_nothing_written() -> None:
         assert sent(here, 16) == []
 
 
-async def test_a_value_that_the_drive_does_not_keep_is_told() -> None:
+async def test_a_value_that_the_drive_does_not_keep_is_reported() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         honest = here.session.line.write
@@ -264,7 +264,7 @@ async def test_a_write_block_that_stands_for_something_else_is_found_out() -> No
 # A stop
 
 
-async def test_what_a_stop_cuts_short_is_not_kept_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_write_cut_by_stop_is_not_recorded_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         task = await unanswered(monkeypatch, here, exchange(here, outputs, {"ACC": 45}))
@@ -384,7 +384,7 @@ async def at_desk(here: Bench) -> AsyncIterator[BlockEditor]:
     monitor.stop()
 
 
-async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
+async def test_write_cut_by_stop_is_reported_as_remaining() -> None:
     with bench("atv71") as here:
         async with at_desk(here) as block_editor:
             here.after_writes(2, lambda: here.session.work.stop("F12"))
@@ -394,7 +394,7 @@ async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
             assert len(here.writes()) == 2
 
 
-async def test_where_nothing_was_written_nothing_is_said_to_stay() -> None:
+async def test_nothing_written_reports_nothing_remaining() -> None:
     with bench("atv71", run_hz=20.0) as here:
         async with at_desk(here) as block_editor:
             block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
@@ -450,7 +450,7 @@ def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
         )
 
 
-def test_a_value_whose_scale_is_not_known_is_told_raw() -> None:
+def test_a_value_whose_scale_is_not_known_is_reported_raw() -> None:
     with bench("atv71") as here:
         outputs = plan_of(here, "write", EXAMPLE_OUT)
         reported = intended(here.profile, 1, outputs, None, {"LFRD": 900}, "acc=16#0032")
@@ -470,7 +470,7 @@ def test_a_value_whose_scale_is_not_known_is_told_raw() -> None:
         ("ACC=99999", "out of range"),
     ],
 )
-def test_what_cannot_be_meant_is_told(text: str, says: str) -> None:
+def test_impossible_output_is_reported(text: str, says: str) -> None:
     with bench("atv71") as here, pytest.raises(DriveError, match=says):
         intended_of(here, plan_of(here, "write", EXAMPLE_OUT), text)
 

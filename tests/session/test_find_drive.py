@@ -30,14 +30,14 @@ async def found(line: FakeLine, probes: tuple[PresenceProbe, ...] = PROBES) -> S
     )
 
 
-async def test_nobody_is_asked_by_one_read() -> None:
+async def test_nobody_is_requested_by_one_read() -> None:
     line = FakeLine()
     with pytest.raises(NoAnswer):
         await found(line)
     assert line.requests == [Read(1, STATUS, 1)]
 
 
-async def test_who_refuses_the_read_says_who_it_is() -> None:
+async def test_refusal_of_a_read_identifies_the_drive() -> None:
     line = FakeLine({1: {}})
     line.devices[1].identity = {0: b"Telemecanique", 1: b"ATV71HU15M3", 2: b"0201", 6: b"FAN"}
     result = await found(line)
@@ -50,7 +50,7 @@ async def test_who_refuses_the_read_says_who_it_is() -> None:
     assert line.requests == [Read(1, STATUS, 1), Identify(1)]
 
 
-async def test_who_has_no_function_43_is_asked_by_17() -> None:
+async def test_drive_without_function_43_is_identified_by_17() -> None:
     line = FakeLine({1: {}})
     line.devices[1].called = b"ATV312HU09M3"
     result = await found(line)
@@ -59,7 +59,7 @@ async def test_who_has_no_function_43_is_asked_by_17() -> None:
     assert line.requests == [Read(1, STATUS, 1), Identify(1), ReportId(1)]
 
 
-async def test_who_tells_its_state_and_nothing_else_is_likely() -> None:
+async def test_drive_that_only_reports_its_state_is_likely() -> None:
     line = FakeLine({1: {STATUS: 0}})
     line.fail_identify(1, NoAnswer(1, 43, 0))
     result = await found(line)
@@ -74,13 +74,13 @@ async def test_who_tells_its_state_and_nothing_else_is_likely() -> None:
     assert line.device_state(1).answers
 
 
-async def test_who_only_refuses_is_there_and_unknown() -> None:
+async def test_drive_that_only_refuses_is_present_and_unknown() -> None:
     result = await found(FakeLine({1: {}}))
     assert result.identity is not None
     assert (result.identity.candidates, result.by) == ((), "")
 
 
-async def test_families_at_several_words_are_asked_one_after_the_other() -> None:
+async def test_families_at_several_words_are_still_pollede_after_the_other() -> None:
     line = FakeLine({1: {7: 0}})
     line.fail_identify(1, 1)
     result = await found(line, (*PROBES, PresenceProbe(7, ("mine",))))
@@ -88,7 +88,7 @@ async def test_families_at_several_words_are_asked_one_after_the_other() -> None
     assert result.identity.candidates == ("mine",)
 
 
-async def test_where_nothing_is_sure_to_be_refused_function_43_finds_it() -> None:
+async def test_function_43_finds_drive_without_sure_refusal() -> None:
     line = FakeLine({1: {}})
     line.devices[1].identity = {1: b"ATV71HU15M3"}
     line.fail_read(1, None, NoAnswer(1, 3, STATUS))

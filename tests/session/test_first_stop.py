@@ -37,7 +37,7 @@ def frames(line: Line) -> list[bytes]:
     ("family", "named"),
     [*((one, "") for one in FAMILIES), *((one, "atv312") for one in FAMILIES), ("atv21", "atv71")],
 )
-async def test_it_stops_each_family_before_that_was_asked_what_it_is(
+async def test_it_stops_each_family_before_that_was_requested_what_it_is(
     start: Start, journal: Journal, family: str, named: str
 ) -> None:
     simulation, line = start(running(family))
@@ -72,7 +72,7 @@ async def test_a_ramp_stop_of_the_family_named_does_not_start_another(
     await wait_for(lambda: drive.motor.frequency == 0)
 
 
-async def test_it_is_in_the_journal_with_what_was_said_to_it(
+async def test_it_is_in_the_journal_with_what_was_reported_to_it(
     start: Start, journal: Journal
 ) -> None:
     _, line = start(running("atv31"))
@@ -94,7 +94,7 @@ async def test_nothing_is_sent_blind_to_who_was_not_named(start: Start, journal:
     assert writes(line) == []
 
 
-async def test_who_was_named_is_stopped_blind_by_what_starts_no_other(
+async def test_named_drive_is_stopped_by_a_word_that_starts_no_other(
     start: Start, journal: Journal
 ) -> None:
     simulation, line = start(running("atv312"))

@@ -117,7 +117,7 @@ async def test_a_drive_that_is_not_there_does_not_take_the_line(bench: Make) -> 
     assert len(requested) < 4
 
 
-async def test_a_stop_while_the_drive_is_asked_who_it_is_voids_the_command(bench: Make) -> None:
+async def test_a_stop_while_the_drive_is_requested_who_it_is_voids_the_command(bench: Make) -> None:
     made = bench(commands=True)
     under_way = asyncio.create_task(made.write(LFR, 300))
     await asyncio.sleep(0)
@@ -152,7 +152,7 @@ async def test_a_setting_that_is_allowed_is_written_and_in_the_journal(bench: Ma
     assert made.written() == [(ACC, 57)]
 
 
-async def test_what_the_end_of_serve_cuts_short_is_not_kept_as_done(
+async def test_write_cut_by_end_of_serve_is_not_recorded_as_done(
     bench: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = bench(writes=allowed_codes("ACC"))
@@ -335,7 +335,7 @@ async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Ma
     assert await made.write(LFR, 100) == 0
 
 
-async def test_a_client_that_is_gone_commands_nothing_and_all_are_told(bench: Make) -> None:
+async def test_a_client_that_is_gone_commands_nothing_and_all_are_reported(bench: Make) -> None:
     made = bench(commands=True)
     output: list[str] = []
     made.line.facts.on_text(lambda _, text: output.append(text))
@@ -375,7 +375,7 @@ async def test_a_client_that_goes_while_its_start_is_put_on_record_starts_nothin
     assert made.written() == [(LFR, 300)]
 
 
-async def test_what_came_while_the_gateway_stood_still_only_stops(bench: Make) -> None:
+async def test_requests_from_a_suspension_only_stop(bench: Make) -> None:
     """A client that has given up long ago would have its motor started."""
     made = bench(commands=True, writes=allowed_codes("ACC"))
 
@@ -389,7 +389,7 @@ async def test_what_came_while_the_gateway_stood_still_only_stops(bench: Make) -
     assert (await late(CMD, 0x0007))[0] == 6
 
 
-async def test_a_second_client_that_commands_the_drive_is_told_of(bench: Make) -> None:
+async def test_a_second_client_that_commands_the_drive_is_reported(bench: Make) -> None:
     made = bench(commands=True)
     output: list[str] = []
     made.line.facts.on_text(lambda _, text: output.append(text))
@@ -457,7 +457,7 @@ async def test_a_profile_that_the_drive_contradicts_writes_nothing(bench: Make) 
     assert made.written() == []
 
 
-async def test_what_was_read_just_now_is_not_read_again(bench: Make) -> None:
+async def test_recent_value_is_not_read_again(bench: Make) -> None:
     made = bench(fresh=30.0)
     first = await made.read(ETA, 2)
     count = len(made.line.trace)

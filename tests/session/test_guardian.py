@@ -188,7 +188,7 @@ async def test_the_motor_of_another_user_of_the_group_is_stopped(
     assert theirs.close(5.0)
 
 
-async def test_a_motor_that_is_meant_to_run_on_runs_on(bench: Bench) -> None:
+async def test_a_motor_that_should_run_on_runs_on(bench: Bench) -> None:
     bench.started(1, left_running=True)
     bench.guardian()
     bench.gone()
@@ -326,7 +326,7 @@ async def test_the_motor_of_a_program_that_comes_back_in_time_runs_on(bench: Ben
     assert bench.line.facts.stops.stamp(1) == 0
 
 
-async def test_one_that_was_let_go_for_a_moment_only_is_not_told_of(bench: Bench) -> None:
+async def test_one_that_was_let_go_for_a_moment_only_is_not_reported(bench: Bench) -> None:
     bench.started(1, pid=LIVING)
     bench.guardian()
     bench.gone(FROZEN)
@@ -363,7 +363,7 @@ async def test_a_motor_that_a_frozen_program_means_to_leave_running_runs_on(benc
 # Trouble
 
 
-async def test_a_drive_whose_profile_is_not_here_is_told_of(bench: Bench) -> None:
+async def test_a_drive_whose_profile_is_not_here_is_reported(bench: Bench) -> None:
     bench.started(1)
     guardian = bench.guardian()
     guardian._session_of = lambda _: None

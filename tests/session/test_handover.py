@@ -127,7 +127,7 @@ async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench)
     ]
 
 
-async def test_a_drive_commanded_elsewhere_is_not_armed_and_says_by_whom(
+async def test_a_drive_commanded_elsewhere_is_not_armed_and_names_that_program(
     bench: Bench,
 ) -> None:
     commanded_there(bench)
@@ -157,7 +157,7 @@ async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Benc
     assert bench.session.arming.armed
 
 
-async def test_a_stop_of_another_program_ends_arming_and_work_and_is_told(bench: Bench) -> None:
+async def test_a_stop_of_another_program_ends_arming_and_work_and_is_reported(bench: Bench) -> None:
     bench.session.arming.arm()
     before = bench.session.work.stops
     bench.facts.hear_stop((1,), "the stop key", REMOTE)
@@ -299,7 +299,7 @@ async def test_a_motor_that_nobody_took_stays_this_programs_to_stop(bench: Bench
 # Asked elsewhere
 
 
-async def test_what_another_program_commands_does_not_run_by_a_command_from_here(
+async def test_drive_of_another_commander_does_not_run(
     bench: Bench,
 ) -> None:
     bench.session.note_command()
@@ -316,7 +316,7 @@ async def test_what_another_program_commands_does_not_run_by_a_command_from_here
     assert not bench.session.commanded
 
 
-async def test_asking_is_told_there_and_the_answer_here(bench: Bench) -> None:
+async def test_asking_is_reported_there_and_the_answer_here(bench: Bench) -> None:
     commanded_there(bench)
     bench.handover.ask_for(1)
     assert bench.voice.output == [("ask", 1)]
@@ -346,7 +346,7 @@ async def test_a_motor_that_runs_is_this_programs_once_it_was_given(
     await asyncio.to_thread(eventually, lambda: len(bench.starts_files()) == adopted)
 
 
-async def test_who_comes_and_goes_and_who_commands_is_told_once(bench: Bench) -> None:
+async def test_arrivals_and_commanders_are_reported_once(bench: Bench) -> None:
     other = Program("other", "watch", 78)
     bench.facts.set_programs((bench.facts.me, REMOTE, other))
     bench.facts.note_commander(1, REMOTE.id)
@@ -359,7 +359,7 @@ async def test_who_comes_and_goes_and_who_commands_is_told_once(bench: Bench) ->
     ]
 
 
-async def test_who_was_there_before_this_panel_is_missed_as_well(
+async def test_program_present_earlier_is_missed_too(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The motor that it leaves is looked for, whoever came to the line first."""

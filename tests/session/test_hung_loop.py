@@ -60,7 +60,7 @@ async def test_the_keeper_stops_drives_whose_stop_does_not_begin() -> None:
     assert await direct_stop(voice) == ("directly", DRIVES)
 
 
-async def test_a_keeper_that_does_not_answer_is_asked_again(
+async def test_a_keeper_that_does_not_answer_is_requested_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(under_way, "AGAIN_AFTER", 0.05)

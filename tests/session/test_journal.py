@@ -102,7 +102,7 @@ def kept(journal: Journal) -> list[int]:
     return [json.loads(line)["new_raw"] for line in lines]
 
 
-def test_what_is_never_used_leaves_nothing(disk: Disk, tmp_path: Path) -> None:
+def test_unused_events_leave_nothing(disk: Disk, tmp_path: Path) -> None:
     made = Journal(tmp_path / "state")
     assert made.flush(0)
     assert made.close(0)
@@ -135,7 +135,7 @@ def test_an_entry_that_comes_once_the_thread_has_ended_is_kept_too(
     assert kept(journal) == [0, 1, 2]
 
 
-def test_a_disk_that_hangs_is_told(
+def test_a_disk_that_hangs_is_reported(
     journal: Journal, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "SLOW", 0.01)
@@ -259,7 +259,7 @@ def test_a_disk_that_comes_back_gets_what_it_missed(
     assert "written again" in caplog.text
 
 
-def test_what_is_too_much_to_keep_is_lost_and_counted(
+def test_events_beyond_the_limit_are_lost_and_counted(
     journal: Journal,
     disk: Disk,
     monkeypatch: pytest.MonkeyPatch,
@@ -302,7 +302,7 @@ def test_a_line_that_was_cut_off_damages_no_other(journal: Journal) -> None:
     assert [one.new_raw for one in entries_of(journal, "line", 1)] == [1]
 
 
-def test_who_reads_gets_what_was_just_added(journal: Journal) -> None:
+def test_reader_sees_latest_entry(journal: Journal) -> None:
     for number in range(30):
         journal.add(entry(number))
         assert entries_of(journal, "line", 1)[-1].new_raw == number

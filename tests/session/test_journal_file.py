@@ -169,7 +169,7 @@ def test_files_are_moved_by_one_program_at_a_time(
 
 
 @posix
-def test_what_a_full_disk_took_of_a_line_is_taken_back(tmp_path: Path) -> None:
+def test_partial_line_on_full_disk_is_removed(tmp_path: Path) -> None:
     done = program(FULL, tmp_path / "state")
     assert done.returncode == 0, done.stderr
     assert "File too large" in done.stdout
@@ -211,7 +211,7 @@ def nowhere(*_: object, **__: object) -> Path:
 
 
 @posix
-def test_what_is_no_file_is_told_and_holds_nobody_up(tmp_path: Path) -> None:
+def test_invalid_file_is_reported_and_blocks_nobody(tmp_path: Path) -> None:
     state = tmp_path / "state"
     state.mkdir()
     os.mkfifo(state / JOURNAL_NAME)
@@ -225,7 +225,7 @@ def test_what_is_no_file_is_told_and_holds_nobody_up(tmp_path: Path) -> None:
         os.close(reader)
 
 
-def test_trouble_is_told_at_once_and_once(tmp_path: Path) -> None:
+def test_trouble_is_reported_at_once_and_once(tmp_path: Path) -> None:
     output: list[str] = []
     (tmp_path / "state").touch()
     journal = Journal(tmp_path / "state", on_trouble=output.append)
@@ -239,7 +239,7 @@ def test_trouble_is_told_at_once_and_once(tmp_path: Path) -> None:
     assert journal.unkept == 2
 
 
-def test_who_cannot_be_told_costs_no_entry(tmp_path: Path) -> None:
+def test_unreportable_trouble_costs_no_entry(tmp_path: Path) -> None:
     def gone(text: str) -> None:
         raise OSError(text)
 

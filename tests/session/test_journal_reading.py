@@ -55,7 +55,7 @@ ODD = {
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_odd_lines_are_told_and_hide_nothing(name: str, tmp_path: Path) -> None:
+def test_odd_lines_are_reported_and_hide_nothing(name: str, tmp_path: Path) -> None:
     file = tmp_path / "journal.jsonl"
     file.write_bytes(line_of(entry(1)) + ODD[name] + b"\n" + line_of(entry(2)) + b"half")
     one, odd, two, half = reported(file)
@@ -99,7 +99,7 @@ def test_a_pipe_in_its_place_holds_nobody_up(tmp_path: Path) -> None:
         reported(tmp_path / "journal.jsonl")
 
 
-def test_what_was_read_back_completes_its_own_write_only() -> None:
+def test_read_back_completes_only_its_own_write() -> None:
     one = replace(entry(1), time="t1", answer="no answer.")
     two = replace(entry(1), time="t2", answer="no answer.", device=2)
     back = replace(one, time="t3", kind="read-back", of="t1", answer="Taken.", read_back=1)

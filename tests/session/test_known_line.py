@@ -174,7 +174,7 @@ def test_a_new_drive_and_one_that_is_away_hold_nothing(adapters: Adapters) -> No
     assert {*load_memory().lines[line_key(port)].drives} == {2, 3}
 
 
-def test_what_comes_after_the_yes_is_right_as_well(adapters: Adapters) -> None:
+def test_value_after_yes_is_correct_too(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     line = on(port)

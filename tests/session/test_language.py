@@ -84,7 +84,7 @@ async def test_a_field_is_written_without_the_others(journal: Journal) -> None:
     assert line.registers[10] == 0x9F00
 
 
-async def test_a_field_that_the_drive_does_not_take_is_told(journal: Journal) -> None:
+async def test_a_field_that_the_drive_does_not_take_is_reported(journal: Journal) -> None:
     line = OneDrive({10: 0x8015})
     session = armed(line, FIELDS)
     taking = line.devices[1].take
@@ -196,7 +196,7 @@ confidence = "manual"
 """
 
 
-async def test_the_order_of_words_is_said_once(tmp_path: Path) -> None:
+async def test_word_order_is_reported_once(tmp_path: Path) -> None:
     path = tmp_path / "long.toml"
     path.write_text(LONG.format(head=""), encoding="utf-8")
     session = armed(OneDrive({1: 1, 2: 2, 3: 0xFFFF, 4: 0xFFFF}), library.load_file(path))
@@ -257,14 +257,14 @@ def test_a_shared_row_can_be_left_out(tmp_path: Path) -> None:
         library.load_file(path)
 
 
-def test_a_fault_of_a_shared_row_is_told_where_it_stands(tmp_path: Path) -> None:
+def test_a_fault_of_a_shared_row_is_reported_where_it_stands(tmp_path: Path) -> None:
     path = shared(tmp_path, '[[parameters]]\ncode = "ACC"\nscale = "no"\n')
     (tmp_path / "ramps.rows").write_text(ROWS.replace("address = 10", "address = 9"), "utf-8")
-    own, of_both = library.faults_of(path)
+    own, both = library.faults_of(path)
     line = path.read_text("utf-8").splitlines().index('scale = "no"') + 1
     assert own.startswith(f"{path}:{line}: ")
-    assert of_both.startswith(f"{tmp_path / 'ramps.rows'}:21: ")
-    assert "address 9 is already that of ACC" in of_both
+    assert both.startswith(f"{tmp_path / 'ramps.rows'}:21: ")
+    assert "address 9 is already that of ACC" in both
 
 
 @pytest.mark.parametrize("name", ["none.rows", "../ramps.rows", "/etc/hosts"])

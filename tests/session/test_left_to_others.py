@@ -45,7 +45,7 @@ def test_a_motor_that_is_not_left_on_purpose_is_stopped_by_the_others() -> None:
     assert reported.startswith("Other programs are on the line, too: ")
 
 
-def test_a_motor_that_is_left_on_purpose_runs_on_while_it_is_asked() -> None:
+def test_a_motor_that_is_left_on_purpose_runs_on_while_it_is_requested() -> None:
     reported = left_to_others(on_a_line(WATCH), on_purpose=True)
     assert reported == f"Watch (pid 78) asks it on: while it does, {RUNS_ON}"
     assert left_to_others(on_a_line(WATCH, requested=False), on_purpose=True) == ""

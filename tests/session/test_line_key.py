@@ -79,5 +79,5 @@ def test_a_name_of_the_hosts_file_is_its_number(
 
 
 @pytest.mark.parametrize("text", ["", "  ", "sim:", "sim:atv71@2,atv21@2", "tcp:", "nonsense:1"])
-def test_what_is_no_line_is_its_own_key(text: str) -> None:
+def test_invalid_line_is_its_own_key(text: str) -> None:
     assert line_key(text) == text.strip()

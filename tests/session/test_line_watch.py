@@ -16,7 +16,7 @@ from tui.bus.keep_alive import KeepAlive
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
-from tui.session.monitor.strangers_asked import StrangersAsked
+from tui.session.monitor.unknown_drive_poller import UnknownDrivePoller
 from tui.session.read.presence import UNKNOWN_TIMEOUT
 
 from .fakes import OneDrive, parameter, profile_of
@@ -122,7 +122,7 @@ async def test_drive_is_kept_alive_by_its_own_timeout(keep: Callable[[int], Kept
 
 
 @pytest.mark.parametrize(("silent", "reported"), [(40.0, False), (60.0, True), (150.0, True)])
-async def test_a_drive_that_was_not_heard_for_half_its_time_is_told_of(
+async def test_a_drive_that_was_not_heard_for_half_its_time_is_reported(
     keep: Callable[[int], Kept], silent: float, reported: bool
 ) -> None:
     kept = keep(1000)
@@ -136,7 +136,7 @@ async def test_a_drive_that_was_not_heard_for_half_its_time_is_told_of(
         assert warning.left == pytest.approx(100.0 - silent, abs=10.0)
 
 
-async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
+async def test_a_drive_that_watches_nothing_is_neither_fed_nor_reported_of(
     keep: Callable[[int], Kept],
 ) -> None:
     kept = keep(0)
@@ -150,7 +150,7 @@ async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
 
 async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None:
     line = HeardLine(20)
-    strangers = StrangersAsked(line)
+    strangers = UnknownDrivePoller(line)
     strangers.keep(7)
     await until(lambda: kept_alive(line) != [])
     assert [(one.device, one.timeout) for one in kept_alive(line)] == [(7, UNKNOWN_TIMEOUT)]

@@ -104,7 +104,7 @@ def test_an_exchange_in_words(readings: tuple[bytes, ...], text: str) -> None:
     assert any(one.startswith(text) for one in found), found
 
 
-def test_what_a_drive_says_of_itself_commands_no_terminal() -> None:
+def test_identity_text_does_not_control_terminal() -> None:
     identity = frame(2, bytes.fromhex("2b0e0102000001010a") + b"\x1b[2JATV71H")
     (text,) = Heard().say(IDENTIFY, identity).texts
     assert "\x1b" not in text
@@ -134,7 +134,7 @@ def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() 
     assert (remembered.how, remembered.profile.id) == ("remembered", "atv312")
 
 
-def test_what_is_remembered_of_a_line_names_its_drives(tmp_path: object) -> None:
+def test_stored_line_names_its_drives(tmp_path: object) -> None:
     link = SerialLink("/dev/ttyS9")
     drives = {1: DriveMark(profile="atv312"), 2: DriveMark(reference="ATV71HU15M3")}
     keep_memory(LinesMemory({"serial:/dev/ttyS9": LineMark(drives={**drives, 3: DriveMark()})}))
@@ -202,7 +202,7 @@ def cycle(heard: Heard, times: int, *readings: bytes, every: float = 0.02) -> He
     return heard
 
 
-def test_who_commands_and_who_only_reads() -> None:
+def test_commanding_and_reading_masters() -> None:
     heard = Heard(named("atv71", "atv71"))
     run = [write_one(1, 8501, 0x000F)] * 2 + [write_one(1, 8502, 425)] * 2
     cycle(heard, 3, *run, READ, WORDS)
@@ -219,7 +219,7 @@ def test_a_setting_is_written_and_commands_nothing() -> None:
     assert "  written: ACC 30 raw once" in heard.lines
 
 
-def test_how_often_a_drive_is_asked() -> None:
+def test_how_often_a_drive_is_requested() -> None:
     heard = cycle(Heard(named("atv71", "atv71")), 11, READ, WORDS, every=0.05)
     (drive,) = heard.summary.drives
     assert drive.pace == pytest.approx(10.0)
@@ -260,20 +260,18 @@ def test_a_request_that_is_not_answered_feeds_nobody() -> None:
 
 
 @pytest.mark.parametrize(("waited", "answers"), [(0.6, ["none"]), (0.2, [])])
-def test_what_is_open_at_the_end_is_told_where_it_waits_since_long(
-    waited: float, answers: list[str]
-) -> None:
+def test_open_request_is_reported_with_its_wait(waited: float, answers: list[str]) -> None:
     heard = Heard().say(READ)
     found = heard.listener.end(heard.now + waited)
     assert [one.exchange.answer for one in found] == answers
 
 
-def test_two_drives_at_one_address_are_told() -> None:
+def test_two_drives_at_one_address_are_reported() -> None:
     heard = cycle(Heard(named("atv71", "atv71")), 3, READ, WORDS, WORDS)
     assert "ANSWERED TWICE 3 times: do two devices have the address 2?" in heard.lines
 
 
-def test_exceptions_and_silence_are_told() -> None:
+def test_exceptions_and_silence_are_reported() -> None:
     heard = Heard(named("atv71", "atv71")).say(READ, WORDS, READ, REFUSED, READ, REFUSED)
     heard.say(read_frame(9, 3201, 1)).rest()
     assert "refused 2 times: exception 2, " in heard.lines
@@ -287,7 +285,7 @@ def test_a_second_master_is_suspected_where_requests_cross() -> None:
     assert "SECOND MASTER" not in patient.lines
 
 
-def test_broken_frames_and_silences_are_told() -> None:
+def test_broken_frames_and_silences_are_reported() -> None:
     heard = Heard()
     heard.say(READ, WORDS[:4], WORDS[4:], every=0.02)
     assert "Broken frames: 1 frame with a pause inside of up to 17.1 ms" in heard.lines
@@ -322,7 +320,7 @@ def test_a_shorter_plan_for_the_master() -> None:
     assert "its cycle reads ETA, RFR, LCR in 3 requests" in heard.lines
 
 
-def test_no_plan_is_told_where_the_master_reads_well() -> None:
+def test_no_plan_is_reported_where_the_master_reads_well() -> None:
     heard = cycle(
         Heard(named("atv71", "atv71")), 3, read_frame(2, 3201, 4), reply_words(2, *[1] * 4)
     )
@@ -338,7 +336,7 @@ def test_reads_that_are_seldom_are_no_part_of_the_cycle() -> None:
     assert drive.shorter is None
 
 
-def test_nothing_and_noise_are_told() -> None:
+def test_nothing_and_noise_are_reported() -> None:
     assert "Nothing was heard" in Heard().rest().lines
     noise = Heard().say(b"\xff\x00\xff").rest()
     assert "3 bytes and no frame: are baud and format those of the line?" in noise.lines

@@ -210,7 +210,7 @@ async def test_slots_changed_between_two_comparisons_prove_nothing() -> None:
 
 
 @pytest.mark.parametrize("between", [False, True], ids=["under way", "between two rounds"])
-async def test_what_was_compared_before_a_change_counts_no_more(between: bool) -> None:
+async def test_comparison_before_a_change_no_longer_applies(between: bool) -> None:
     codes = ["ACC", "DEC"]
     with bench("atv71", sets={"ACC": 37, "DEC": 59}) as here:
         line, honest, reads = here.session.line, here.session.line.read, itertools.count()
@@ -234,7 +234,7 @@ async def test_what_was_compared_before_a_change_counts_no_more(between: bool) -
         assert [s.verdict for s in view.slots[:2]] == [SlotMatch.SAME] * 2
 
 
-async def test_what_was_written_waits_for_a_reset_even_where_all_values_are_zero() -> None:
+async def test_written_slots_wait_for_reset_with_zero_values() -> None:
     with bench("atv21") as here:
         mapper, read = Mapper(here.session), block(here, "read")
         text = await write(here, plan_of(here, "read", ["FE03", "FD00"]))
@@ -302,7 +302,7 @@ async def test_a_write_block_that_selects_nothing_is_refused_by_the_drive() -> N
 # Writing an assignment
 
 
-async def test_what_moves_is_taken_out_first() -> None:
+async def test_moved_slot_is_taken_out_first() -> None:
     with bench("atv71") as here:
         plan = plan_of(here, "read", ["RFRD", "ETA", "LCR"])
         assert "NMA1, NMA2, NMA3" in await write(here, plan)
@@ -343,7 +343,7 @@ async def test_nothing_is_written_once_the_drive_is_disarmed_or_stopped(
         assert len(here.writes()) == 2
 
 
-async def test_what_somebody_else_changed_is_not_overwritten() -> None:
+async def test_foreign_slot_change_is_not_overwritten() -> None:
     with bench("atv71") as here:
         seen = await Mapper(here.session).slots(block(here, "read"))
         here.drive.set("NMA4", 9001)
@@ -390,7 +390,7 @@ async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
         assert sent == [3204]
 
 
-async def test_what_was_written_before_the_line_was_lost_is_told() -> None:
+async def test_writes_before_line_loss_are_reported() -> None:
     with bench("atv71") as here:
         here.lose_answer("NMA4", LOST["line"], taken=True)
         plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
@@ -414,7 +414,7 @@ async def test_a_read_only_line_writes_nothing() -> None:
         await write(here, plan_of(here, "read", ["LCR"]))
 
 
-async def test_what_cannot_be_is_refused_before_anything_is_asked() -> None:
+async def test_impossible_mapping_is_refused_before_any_request() -> None:
     with bench("atv71") as here:
         outputs = block(here, "write")
         with pytest.raises(AssignmentRefused, match="NCA1 already"):
@@ -450,7 +450,7 @@ async def test_damaged_user_words_are_none(text: str, own_folders: Path) -> None
         assert load_words(here.session) == NO_WORDS
 
 
-async def test_a_drive_that_meets_the_unknown_with_silence_is_not_asked_for_it() -> None:
+async def test_a_drive_that_meets_the_unknown_with_silence_is_not_requested_again() -> None:
     with bench("powerdrive") as here:
         words = (UserWord(60000), *NO_WORDS[1:])
         assert await read_words(here.session, words) == [None] * 4

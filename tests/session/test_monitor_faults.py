@@ -154,7 +154,7 @@ async def test_a_failed_cycle_shows_its_error_and_nothing_new(bench: Bench) -> N
 
 
 @pytest.mark.parametrize("fault", [LineLost("gone"), None], ids=["line lost", "many failures"])
-async def test_what_another_drive_may_answer_is_read_anew(
+async def test_value_possibly_of_another_drive_is_read_again(
     bench: Bench, fault: Exception | None
 ) -> None:
     await bench.run(12)
@@ -209,7 +209,7 @@ def one_each(codes: Iterable[str]) -> list[tuple[str, ...]]:
     return [(code,) for code in codes]
 
 
-def test_what_failed_comes_in_halves_and_then_in_doubles() -> None:
+def test_failed_range_is_halved_then_doubled() -> None:
     due, codes = Rotation(10), tuple("abcdefgh")
     due.add(codes)
     requested = []
@@ -247,7 +247,7 @@ def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
     assert due.turn("ab", lambda codes: []) == ()
 
 
-async def test_a_drive_that_is_held_back_is_not_asked_and_says_why(bench: Bench) -> None:
+async def test_a_drive_that_is_held_back_is_not_requested_and_says_why(bench: Bench) -> None:
     await bench.run(2)
     bench.monitor.held_back = lambda: "Left alone."
     reported = await bench.run(FORGOTTEN_AFTER + 2)

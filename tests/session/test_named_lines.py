@@ -58,7 +58,7 @@ def test_a_name_stands_for_a_line_and_its_drive() -> None:
 
 
 @pytest.mark.parametrize("text", ["other", "tcp:192.168.0.10", "/dev/ttyUSB0", "COM3", "factory"])
-def test_what_is_no_name_is_left_alone(text: str) -> None:
+def test_invalid_name_is_ignored(text: str) -> None:
     settings(GOOD)
     assert line_named(text) is None
 
@@ -99,7 +99,7 @@ def test_the_file_lies_beside_the_profiles(monkeypatch: pytest.MonkeyPatch, tmp_
         ("[line]", "3: line: only a table [lines]"),
     ],
 )
-def test_a_fault_is_told_with_file_line_and_key_and_hinders_no_other_name(
+def test_a_fault_is_reported_with_file_line_and_key_and_hinders_no_other_name(
     row: str, fault: str
 ) -> None:
     path = settings(f'[lines]\npump = "tcp:gateway"\n{row}\n')

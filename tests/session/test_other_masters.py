@@ -33,7 +33,7 @@ WRITE = frame(7, bytes.fromhex("06 2135 0006"))
 LATE = "late or repeated, device 4"
 
 
-def test_who_asks_is_told_with_what_it_asks_of_whom() -> None:
+def test_other_master_is_reported_with_its_requests() -> None:
     heard = overheard([came(READ, LATE), came(WRITE, "of device 7"), came(READ, LATE)], 0.0)
     assert heard.text == (
         "Another master asks drives on this line. Address 4: read of register 3201 on, 8 words;"
@@ -41,7 +41,7 @@ def test_who_asks_is_told_with_what_it_asks_of_whom() -> None:
     )
 
 
-def test_of_many_requests_to_one_address_some_are_told() -> None:
+def test_of_many_requests_to_one_address_some_are_reported() -> None:
     frames = [came(read_frame(4, register, 1), LATE) for register in range(5)]
     assert "read of register 2 and 2 more." in overheard(frames, 0.0).text
 
@@ -57,7 +57,7 @@ def test_of_many_requests_to_one_address_some_are_told() -> None:
     ],
     ids=["before", "our own, late", "echo", "a reply to us", "a spark"],
 )
-def test_what_is_no_master(frames: list[Frame]) -> None:
+def test_frames_of_no_master(frames: list[Frame]) -> None:
     assert overheard(frames, 0.0).text == ""
 
 

@@ -96,7 +96,7 @@ async def test_an_older_reply_never_takes_the_place_of_a_newer_one() -> None:
         assert image.raws["ACC"] == 50
 
 
-async def test_what_may_have_changed_since_is_known_but_not_trusted() -> None:
+async def test_possibly_changed_value_is_known_but_not_trusted() -> None:
     async with bench("atv71", watch=False) as here:
         image = here.session.image
         await Reader(here.session).read(["CHCF"])
@@ -312,7 +312,7 @@ async def test_a_motor_that_runs_by_the_line_is_watched_whoever_started_it() -> 
         assert 1 in line_watch.left_alone()
 
 
-async def test_arming_that_a_command_asked_for_does_not_run_out() -> None:
+async def test_arming_that_a_command_requested_does_not_run_out() -> None:
     async with bench("atv71") as here:
         here.session.arming.arm(seconds=math.inf)
         assert here.session.arming.armed_for == math.inf

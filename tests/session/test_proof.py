@@ -89,7 +89,7 @@ APART = {code: Signal(1000 + 1000 * place) for place, code in enumerate(CODES)}
 CHOSEN = dict(zip(BLOCK.slots, CODES, strict=False))
 
 
-def test_what_fits_only_one_parameter_is_proved() -> None:
+def test_unique_match_is_confirmed() -> None:
     proof = compared(CHOSEN, APART, 3, random.Random(1))
     assert all(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
     assert proof.open_codes({slot: RAWS[code] for slot, code in CHOSEN.items()}) == []
@@ -100,7 +100,7 @@ def test_two_comparisons_are_not_enough() -> None:
     assert not any(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
 
 
-def test_what_is_brought_in_place_of_a_choice_is_told() -> None:
+def test_replacement_for_a_choice_is_reported() -> None:
     behind = dict.fromkeys(BLOCK.slots, CODES[2])
     proof = compared(behind, APART, 2, random.Random(1), CHOSEN)
     assert {proof.brings(slot) for slot in BLOCK.slots} == {""}

@@ -45,7 +45,7 @@ class OwnTime(Clock):
         await asyncio.sleep(0)
         self.now += seconds
 
-    def of_line(self, reported: float) -> float:
+    def line_time(self, reported: float) -> float:
         """The line has no other time."""
         return self.now
 
@@ -114,7 +114,7 @@ async def test_a_drive_that_reacts_as_set_is_bracketed(timeout: float) -> None:
 
 
 @pytest.mark.parametrize(("timeout", "held"), [(1.0, 2.0), (4.0, 2.0)])
-async def test_a_time_out_that_is_not_the_one_set_is_told(timeout: float, held: float) -> None:
+async def test_a_time_out_that_is_not_the_one_set_is_reported(timeout: float, held: float) -> None:
     clock = OwnTime()
     result = await bench(clock, WatchingDrive(clock, timeout, held=held)).prove()
     assert not result.as_set
@@ -161,7 +161,7 @@ async def test_line_that_stays_lost_ends_the_proof() -> None:
     assert not drive.facts.paused
 
 
-async def test_a_drive_that_never_reacts_is_told_in_capitals() -> None:
+async def test_a_drive_that_never_reacts_is_reported_in_capitals() -> None:
     clock = OwnTime()
     result = await bench(clock, WatchingDrive(clock, math.inf, held=1.0)).prove()
     assert not result.as_set
@@ -198,7 +198,7 @@ async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards
     await drive.read(1, STATUS)
 
 
-async def test_a_stop_ends_the_proof_and_lets_the_drive_be_asked() -> None:
+async def test_a_stop_ends_the_proof_and_lets_the_drive_be_requested() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 5.0)
     prover = bench(clock, drive)
@@ -209,7 +209,7 @@ async def test_a_stop_ends_the_proof_and_lets_the_drive_be_asked() -> None:
     assert not drive.facts.paused
 
 
-async def test_a_motor_that_turns_is_proved_only_where_that_was_said() -> None:
+async def test_a_motor_that_turns_is_proved_only_where_that_was_reported() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     drive.registers[STATUS] = RUNNING
@@ -222,7 +222,7 @@ async def test_a_motor_that_turns_is_proved_only_where_that_was_said() -> None:
         await bench(clock, drive, turning=True).prove()
 
 
-async def test_a_motor_that_begins_to_turn_meanwhile_is_asked_on() -> None:
+async def test_a_motor_that_begins_to_turn_meanwhile_is_still_polled() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 5.0)
 
@@ -236,7 +236,7 @@ async def test_a_motor_that_begins_to_turn_meanwhile_is_asked_on() -> None:
     assert not drive.facts.paused
 
 
-async def test_what_is_set_otherwise_meanwhile_proves_nothing() -> None:
+async def test_foreign_change_during_test_proves_nothing() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
 
@@ -257,7 +257,7 @@ async def test_a_long_time_out_gets_silences_that_are_longer() -> None:
     assert max(found) == 160.0
 
 
-async def test_what_shows_nothing_at_rest_and_a_fault_before_are_refused() -> None:
+async def test_without_visible_reaction_or_with_fault_is_refused() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     drive.registers[REACTION] = 0
@@ -277,7 +277,7 @@ async def test_a_watch_that_is_off_is_nothing_to_prove() -> None:
     assert not drive.facts.paused
 
 
-async def test_a_reaction_that_was_changed_behind_the_panels_back_is_told() -> None:
+async def test_a_reaction_that_was_changed_behind_the_panels_back_is_reported() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     prover = bench(clock, drive)
@@ -326,7 +326,7 @@ async def test_ports_that_the_drive_does_not_have_are_named(
     assert not drive.facts.paused
 
 
-async def test_a_drive_that_answers_nothing_is_told_as_such() -> None:
+async def test_a_drive_that_answers_nothing_is_reported_as_such() -> None:
     clock = OwnTime()
     drive = WithoutModule(clock, "15.07", "6.42", "6.43")
     session = DriveSession(drive, 1, drive.profile, clock=clock)

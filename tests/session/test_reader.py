@@ -56,7 +56,7 @@ async def test_a_poll_does_not_ask_again_for_what_was_refused() -> None:
     assert line.requested == [(11, 1)]
 
 
-async def test_the_word_for_no_value_is_asked_for_alone() -> None:
+async def test_the_word_for_no_value_is_requested_alone() -> None:
     """16#8000 in a block may be a value or may mean none: only a single read tells."""
     profile = profile_of(
         *(parameter(f"P{a}", a) for a in (8400, 8401, 8402)),

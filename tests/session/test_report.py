@@ -42,7 +42,7 @@ async def test_every_family_has_its_report(family: str) -> None:
     assert tables
 
 
-async def test_what_was_changed_with_what_was_before() -> None:
+async def test_changed_settings_are_listed_with_old_values() -> None:
     with bench("atv312", sets={"ttO": 33}) as made:
         made.session.identity = await identify_drive(made.session.line, 1)
         await made.apply(SP2="7", ttO="5")
@@ -75,7 +75,7 @@ async def test_what_was_changed_with_what_was_before() -> None:
         ("powerdrive", "15.07", 30, "3.0 s"),
     ],
 )
-async def test_a_watch_that_is_off_is_told_so(
+async def test_a_watch_that_is_off_is_reported(
     family: str, code: str, raw: int, reported: str
 ) -> None:
     with bench(family, sets={code: raw}) as made:
@@ -85,7 +85,7 @@ async def test_a_watch_that_is_off_is_told_so(
     assert f"- Timeout ({code}): {reported}" in text.splitlines()
 
 
-async def test_what_the_drive_stored_with_a_fault() -> None:
+async def test_values_stored_with_a_fault() -> None:
     with bench("atv71", run_hz=35.0) as made:
         await asyncio.to_thread(wait_until, lambda: made.drive.motor.frequency > 20, "it turns")
         made.drive.provoke("OCF")

@@ -55,7 +55,7 @@ def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:
     assert reported.endswith("Closed at the terminals now: F.")
 
 
-async def test_the_reference_is_told_and_not_brought_back() -> None:
+async def test_the_reference_is_reported_and_not_brought_back() -> None:
     line = TrippedDrive()
     made = access(line)
     line.registers.update({STATUS: STANDBY, FAULT: 0})

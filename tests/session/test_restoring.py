@@ -69,7 +69,7 @@ async def to_factory(made: Bench) -> None:
 
 
 def skipped(plan: RestorePlan) -> dict[str, str]:
-    return {item.code: item.reason for item in plan.of_kind("skip")}
+    return {item.code: item.reason for item in plan.items_of_kind("skip")}
 
 
 async def restored(made: Bench, values: ParameterSet, options: Options) -> Restored:
@@ -246,7 +246,7 @@ NOW = {"INR": 1, "ACC": 30, "HSP": 500, "LSP": 0, "TFR": 600, "NCR": 40, "UNS": 
        "TBR": 32, "FRY": 0, "PAN0": 1, "CMD": 0, "RFR": 0}  # fmt: skip
 
 
-def test_what_is_left_out_and_why() -> None:
+def test_omitted_settings_and_reasons() -> None:
     values = ParameterSet(
         SetHead("atv71"),
         {**NOW, "ACC": 50, "ADD": 9, "TBR": 28, "FRY": 3, "CMD": 15, "RFR": 99, "DEC": 4},
@@ -288,7 +288,7 @@ def test_another_rating_keeps_its_motor_data() -> None:
     assert plan("atv71", NOW, values).same_rating is None
 
 
-def test_models_are_told_by_their_own_word_too() -> None:
+def test_models_are_reported_by_their_own_word_too() -> None:
     values = values_of("atv21", {"FB05": 20, "F803": 5})
     assert plan("atv21", {"FB05": 20, "F803": 3}, values).same_rating is True
     assert plan("atv21", {"FB05": 24, "F803": 3}, values).same_rating is False

@@ -125,7 +125,7 @@ async def test_a_single_drive_says_who_it_is_before_any_profile_is_read(
     assert line.requested == []
 
 
-async def test_a_single_drive_that_does_not_say_it_is_asked_as_any_other() -> None:
+async def test_a_single_drive_that_does_not_say_it_is_requested_as_any_other() -> None:
     line = Replies(present={7}, errors={7: DeviceException(7, 43, 0, 1)})
     search = Search([7], line.no_time)
     (result,) = await searched(search, line)
@@ -138,7 +138,7 @@ def devices(results: Iterable[ScanResult]) -> list[int]:
     return [result.device for result in results]
 
 
-async def test_a_drive_missed_once_is_asked_again_with_more_patience() -> None:
+async def test_a_drive_missed_once_is_requested_again_with_more_patience() -> None:
     line, texts = Replies({1, 4}, late={3}), list[str]()
     search = Search(range(1, 6), line.no_time)
     assert devices(await searched(search, line, texts)) == [1, 4, 3]
@@ -172,7 +172,7 @@ async def test_a_network_is_waited_for_as_ever() -> None:
     assert line.waits == [None, None]
 
 
-async def test_what_is_left_counts_the_silent_ones_once_more_and_what_they_really_take() -> None:
+async def test_remaining_estimate_counts_silent_addresses_again() -> None:
     line = Replies({1})
     clock, left = [0.0], list[float]()
 
@@ -215,7 +215,7 @@ async def test_silent_addresses_that_take_longer_tell_more_time() -> None:
     assert left == [pytest.approx(3 * search.cost), 4.0, 2.0]
 
 
-async def test_who_answers_too_late_is_heard_and_asked_again() -> None:
+async def test_late_answer_is_heard_and_requested_again() -> None:
     line = Replies({1}, late={3}, heard_late={3})
     assert devices(await searched(Search(range(1, 5), line.no_time, once=True), line)) == [1, 3]
     assert (line.background(), line.patiently()) == ([1, 2, 3, 4], [3])
@@ -239,7 +239,7 @@ async def test_a_drive_with_a_long_response_delay_is_found() -> None:
     assert [one.by for one in results] == ["read of register 1039", "function 43"]
 
 
-async def test_what_is_called_between_two_addresses_may_end_the_search() -> None:
+async def test_address_text_between_two_addresses_can_end_search() -> None:
     line, requested = Replies({1, 2}), list[int]()
 
     def look() -> None:
@@ -253,7 +253,7 @@ async def test_what_is_called_between_two_addresses_may_end_the_search() -> None
     assert (line.background(), search.text) == ([1], "stopped, 1 found")
 
 
-async def test_who_polls_has_the_line_between_two_waits_in_vain() -> None:
+async def test_polls_run_between_two_probes() -> None:
     rests: list[float] = []
 
     async def rest(seconds: float) -> None:
@@ -324,7 +324,7 @@ async def test_a_second_search_finds_drives_without_function_43_and_those_behind
     ],
     ids=lambda error: type(error).__name__,
 )
-async def test_what_is_wrong_with_one_address_ends_no_search(error: LineError) -> None:
+async def test_error_at_one_address_does_not_end_search(error: LineError) -> None:
     results = await searched(Search(range(1, 4), patient=True), Replies({1, 3}, errors={2: error}))
     assert devices(results) == [1, 2, 3]
     assert [result.error for result in results] == ["", str(error), ""]

@@ -85,7 +85,7 @@ def test_whatever_the_runtime_folder_is_two_programs_meet(
             first.close()
 
 
-def test_where_no_folder_can_be_made_the_line_works_unshared(
+def test_line_works_unshared_if_folder_cannot_be_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")

@@ -180,7 +180,7 @@ async def test_a_block_that_was_read_before_its_slots_is_read_again(shared: Shar
     assert await shared.read() == {}
 
 
-async def test_what_was_read_by_oneself_is_read_again_and_by_another_is_not(
+async def test_own_value_is_read_again_and_foreign_is_not(
     shared: Shared,
 ) -> None:
     reads = len(shared.line.trace)
@@ -288,7 +288,7 @@ async def test_a_pending_choice_is_never_proved(start: Start) -> None:
     monitor.stop()
 
 
-async def test_what_a_comparison_has_proved_counts_before_the_slots_are_read_again() -> None:
+async def test_comparison_applies_before_slots_are_read_again() -> None:
     profile = library.load("atv21")
     block = block_of(profile, "read")
     raws = {choice.parameter: choice.raw for choice in block.choices}

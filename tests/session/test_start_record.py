@@ -36,7 +36,7 @@ EXITED = "process 7, which has exited; no program commands it"
 TODAY = f"runs since 17:34, started by panel, {EXITED}"
 
 
-def test_a_motor_that_runs_is_told() -> None:
+def test_a_motor_that_runs_is_reported() -> None:
     assert offer(RECORD, IDENTITY, True, NOW) == TODAY
 
 
@@ -48,16 +48,16 @@ def test_a_motor_that_is_not_seen_may_run() -> None:
     assert offer(RECORD, IDENTITY, None, NOW) == f"may {TODAY.replace('runs', 'run')}"
 
 
-def test_the_date_is_told_where_it_is_not_today() -> None:
+def test_the_date_is_reported_where_it_is_not_today() -> None:
     tomorrow = NOW + timedelta(days=1)
     assert "since 2026-03-05 17:34, started by" in offer(RECORD, IDENTITY, True, tomorrow)
 
 
-def test_the_time_is_told_in_the_zone_of_now() -> None:
+def test_the_time_is_reported_in_the_zone_of_now() -> None:
     assert "since 15:34, started by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
 
 
-def test_a_motor_that_was_left_running_is_told_so() -> None:
+def test_a_motor_that_was_left_running_is_reported() -> None:
     text = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW)
     assert text == f"runs since 17:34, left running on purpose by panel, {EXITED}"
 
@@ -91,7 +91,7 @@ def test_another_drive_withdraws_the_offer(other: dict[str, Any]) -> None:
     assert offer(RECORD, replace(IDENTITY, **other), True, NOW) == ""
 
 
-def test_what_was_not_said_is_no_difference() -> None:
+def test_missing_identity_field_is_no_difference() -> None:
     nameless = DriveIdentity(2, "", "", "", "", None, ())
     assert offer(RECORD, nameless, True, NOW) == TODAY
     assert offer(RECORD, None, True, NOW) == TODAY

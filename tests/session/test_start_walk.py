@@ -66,7 +66,7 @@ async def test_a_rest_shown_behind_the_run_word_ends_no_record(here: SlowBench) 
     assert len(here.records) == 1
 
 
-async def test_what_cannot_be_put_on_record_is_not_started(here: SlowBench) -> None:
+async def test_unrecordable_start_is_refused(here: SlowBench) -> None:
     here.starts.folder.parent.mkdir(exist_ok=True)
     here.starts.folder.write_text("no folder")
     kind, text = await here.start()

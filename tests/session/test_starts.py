@@ -527,7 +527,7 @@ def test_a_damaged_file_is_set_aside(
     assert starts.found(LINE, 2) is not None
 
 
-def test_what_is_no_record_is_left_alone(starts: Starts) -> None:
+def test_foreign_file_is_ignored(starts: Starts) -> None:
     starts.begin(start())
     (starts.folder / "folder.json").mkdir()
     (starts.folder / "notes.txt").write_text("mine")
@@ -641,7 +641,7 @@ def test_a_start_is_on_record_for_the_other_users_of_the_group(
     assert one.found(LINE, 2) is None
 
 
-def test_a_group_that_cannot_be_told_keeps_no_motor_from_its_start(
+def test_a_group_that_cannot_be_reported_keeps_no_motor_from_its_start(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "own"))

@@ -171,7 +171,7 @@ async def test_values_have_the_time_at_which_they_were_on_the_wire(steady: Stead
     assert snapshot.time == reading.time
 
 
-async def test_what_was_written_meanwhile_is_read_again(steady: Steady) -> None:
+async def test_value_written_in_the_meantime_is_read_again(steady: Steady) -> None:
     await steady.start()
     await steady.cycle()
     await asyncio.sleep(0.15)
@@ -184,7 +184,7 @@ async def test_what_was_written_meanwhile_is_read_again(steady: Steady) -> None:
     assert snapshot.readings["SPEED"].time > snapshot.readings["OTHER"].time
 
 
-async def test_what_a_cycle_lacks_is_read_from_here(steady: Steady) -> None:
+async def test_values_missing_from_cycle_are_read_here(steady: Steady) -> None:
     await steady.start()
     steady.holder.without = {OTHER}
     snapshot = await steady.cycle()

@@ -158,7 +158,7 @@ async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(
     assert writes(line) == [(641, 0x0000)]
 
 
-async def test_a_drive_commanded_from_elsewhere_is_told_of(start: Start, journal: Journal) -> None:
+async def test_a_drive_commanded_from_elsewhere_is_reported(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("powerdrive", 1, run_hz=20.0))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
     stopper, clock = Stopper(line, journal), FakeClock()
@@ -168,7 +168,7 @@ async def test_a_drive_commanded_from_elsewhere_is_told_of(start: Start, journal
     assert "commanded from elsewhere" in report.text
 
 
-async def test_a_dead_drive_is_tried_again_and_told_of(start: Start, journal: Journal) -> None:
+async def test_a_dead_drive_is_tried_again_and_reported_of(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv21", 1))
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 9, library.load("atv21"))])

@@ -17,7 +17,7 @@ from .test_stop import FAMILIES
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("way", ["emergency-stop", "quick-stop", "stop"])
-def test_what_takes_the_place_of_a_stop_never_coasts_nor_brakes(family: str, way: OrderId) -> None:
+def test_replacement_of_a_stop_never_coasts_or_brakes(family: str, way: OrderId) -> None:
     for chart in library.load(family).data.charts:
         if not chart.orders:
             continue
@@ -26,7 +26,7 @@ def test_what_takes_the_place_of_a_stop_never_coasts_nor_brakes(family: str, way
         assert found in ("emergency-stop", "quick-stop", "stop")
 
 
-def test_what_coasts_is_never_put_in_place_of_another() -> None:
+def test_coasting_word_never_replaces_another() -> None:
     chart = library.load("varmeca").data.charts[0]
     assert nearest_stop(chart, "freewheel") == "freewheel"
     assert nearest_stop(chart, "dc-braking") == "dc-braking"
@@ -57,7 +57,7 @@ async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
         assert commander.given.lost_orders() == ""
 
 
-async def test_another_programs_stop_is_told_with_the_word() -> None:
+async def test_another_programs_stop_is_reported_with_the_word() -> None:
     async with bench("atv71") as here:
         commander = here.console.commander
         await here.arm()

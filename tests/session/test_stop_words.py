@@ -56,7 +56,7 @@ async def test_a_refused_write_of_the_profile_does_not_choose_the_next_stop_word
     assert drive.motor.frequency == 0
 
 
-async def test_what_somebody_changed_at_rest_is_read_anew(start: Start, journal: Journal) -> None:
+async def test_value_changed_at_rest_is_read_again(start: Start, journal: Journal) -> None:
     """At rest the profile may be changed at the keypad: 16#0007 would start the motor then."""
     simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}))
     drive = simulation.drive(1)

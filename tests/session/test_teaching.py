@@ -70,7 +70,7 @@ async def two_looks(line: OneDrive, teacher: Teacher) -> None:
     assert (await teacher.look("HZ", "50.3")).kind is LessonKind.TAUGHT
 
 
-async def test_from_the_second_look_on_the_value_is_told_in_its_unit() -> None:
+async def test_from_the_second_look_on_the_value_is_reported_in_its_unit() -> None:
     line, teacher = drive()
     assert await shown(teacher) == "0"
     await two_looks(line, teacher)
@@ -120,7 +120,7 @@ async def test_a_third_look_that_disagrees_ends_it_for_good() -> None:
     assert await shown(later) == "250"
 
 
-async def test_a_sign_that_no_look_has_told_leaves_the_word_raw() -> None:
+async def test_a_sign_that_no_look_has_reported_leaves_the_word_raw() -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     line.registers[500] = 65036
@@ -129,14 +129,14 @@ async def test_a_sign_that_no_look_has_told_leaves_the_word_raw() -> None:
     assert await shown(teacher) == "-50.0 Hz taught"
 
 
-async def test_what_has_a_scale_is_not_taught() -> None:
+async def test_scaled_value_is_not_taught() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="nothing is to be taught"):
         await teacher.look("KNOWN", "12")
     assert line.requested == []
 
 
-async def test_a_text_that_is_no_number_is_refused_before_the_drive_is_asked() -> None:
+async def test_a_text_that_is_no_number_is_refused_before_the_drive_is_requested() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="no number of a display"):
         await teacher.look("HZ", "fast")
@@ -153,7 +153,7 @@ async def test_forgetting() -> None:
     assert await shown(later) == "250"
 
 
-async def test_what_two_programs_teach_is_all_kept() -> None:
+async def test_lessons_of_two_programs_are_kept() -> None:
     line, teacher = drive()
     other_line, other = drive()
     await two_looks(line, teacher)
@@ -209,7 +209,7 @@ async def test_a_preset_in_another_unit_takes_none(unit: str, why: str) -> None:
         teacher.confirm_reference("PRESET")
 
 
-async def test_what_was_not_taught_or_is_no_preset_takes_none() -> None:
+async def test_untaught_or_non_preset_value_is_refused() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="not taught yet"):
         teacher.confirm_reference("PRESET")
@@ -279,7 +279,7 @@ async def test_a_reference_whose_word_could_mean_a_negative_one_is_refused() -> 
     ("taught", "says"),
     [(False, "teach PRESET: L in the panel"), (True, "R in the panel, or drivepanel teach PRESET")],
 )
-async def test_where_no_reference_goes_yet_the_way_is_told(taught: bool, says: str) -> None:
+async def test_missing_reference_names_next_step(taught: bool, says: str) -> None:
     teacher = await preset() if taught else drive()[1]
     with pytest.raises(ValueRefused, match="no manual at hand") as reported:
         await parsed(teacher, "20")
@@ -309,7 +309,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
-async def test_a_damaged_file_is_told_and_nothing_is_lost(folder: Path, text: str) -> None:
+async def test_a_damaged_file_is_reported_and_nothing_is_lost(folder: Path, text: str) -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     path = kept(folder)
@@ -350,7 +350,7 @@ async def test_a_code_that_the_profile_does_not_have_is_kept_and_not_used(folder
     assert set(json.loads(path.read_text("utf-8"))["looks"]) == {"GONE", "KNOWN"}
 
 
-async def test_a_folder_that_cannot_be_written_is_told_and_the_scale_is_used(
+async def test_a_folder_that_cannot_be_written_is_reported_and_the_scale_is_used(
     folder: Path,
 ) -> None:
     (folder / "taught").write_text("in the way")

@@ -14,7 +14,7 @@ from tui.session.drive import DriveSession
 from tui.session.monitor.timeout import has_begun, left_alone_text, read_timeout, timeout_now
 from tui.session.read.presence import presence_read
 from tui.session.read.reader import ASK_AGAIN, Reader
-from tui.session.timeout_told import Timeout
+from tui.session.timeout_report import Timeout
 
 from .fake_clock import FakeClock
 from .fakes import OneDrive, parameter, profile_of
@@ -116,7 +116,7 @@ async def test_the_shortest_of_several_ports_counts() -> None:
         assert watch.timeout == shortest
 
 
-async def test_a_port_that_is_not_there_is_asked_for_once() -> None:
+async def test_a_port_that_is_not_there_is_requested_once() -> None:
     line = Ports({PORT: 20}, silent=TTO)
     session = session_of(line, other_timeouts=["PORT"])
     for _ in range(2):
@@ -126,7 +126,7 @@ async def test_a_port_that_is_not_there_is_asked_for_once() -> None:
     assert line.read_so_far.count(TTO) == 1
 
 
-async def test_a_word_that_met_silence_twice_is_asked_for_no_more() -> None:
+async def test_a_word_that_met_silence_twice_is_no_longer_requested() -> None:
     """One lost reply is no missing word; and each silence keeps a drive from being asked."""
     clock = FakeClock()
     line = Ports({PORT: 20}, silent=TTO)
@@ -143,7 +143,7 @@ async def test_a_word_that_met_silence_twice_is_asked_for_no_more() -> None:
     assert watch.code == "TTO"
 
 
-async def test_a_drive_is_asked_for_what_it_has_after_a_silence() -> None:
+async def test_a_drive_is_requested_what_it_has_after_a_silence() -> None:
     """Else it counts as silent, and polls and its feeding wait."""
     line = Ports({PORT: 20}, silent=TTO)
     await read_timeout(Reader(session_of(line, other_timeouts=["PORT"])), Priority.POLL)
@@ -161,13 +161,13 @@ async def test_a_family_that_refuses_by_silence_may_tell_nothing() -> None:
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
-def test_what_shows_that_a_drive_is_there_is_no_late_reply_to_a_single_word(family: str) -> None:
+def test_proof_of_presence_is_not_a_late_reply(family: str) -> None:
     ask = presence_read(library.load(family))
     assert ask is not None
     assert ask.count == 2
 
 
-async def test_a_drive_that_answers_nothing_is_told() -> None:
+async def test_a_drive_that_answers_nothing_is_reported() -> None:
     with pytest.raises(NoAnswer):
         await reported(session_of(Ports({TTO: 30}, silent=TTO)))
 

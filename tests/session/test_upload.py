@@ -35,7 +35,7 @@ async def test_every_readable_parameter_is_read_and_right(family: str) -> None:
         assert single or requests < len(codes)
 
 
-async def test_what_the_drive_refuses_is_absent_with_why() -> None:
+async def test_refused_parameter_is_absent_with_reason() -> None:
     with bench("atv71", protects=frozenset({"ACC", "NMA1"})) as made:
         upload = Upload(made.session)
         await upload.run()
@@ -66,7 +66,7 @@ async def test_a_lost_line_and_on_where_it_was() -> None:
         assert {code: upload.retrying.raws[code] for code in before} == before
 
 
-async def test_lost_and_damaged_replies_are_asked_for_again() -> None:
+async def test_lost_and_damaged_replies_are_requested_again() -> None:
     with bench("atv312", faults=FaultRates(lost=0.02, corrupted=0.02)) as made:
         upload = Upload(made.session)
         await upload.run()

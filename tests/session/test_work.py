@@ -135,7 +135,7 @@ async def test_whose_work_it_is(reported: Notified) -> None:
     assert not reported.queue.busy_for(other)
 
 
-async def test_what_is_being_done_is_told(reported: Notified) -> None:
+async def test_current_work_is_reported(reported: Notified) -> None:
     reported.put("a", 0.02, working="Writing")
     assert reported.outcome() == (OutcomeKind.WORKING, "Writing")
     await reported.idle()
@@ -327,7 +327,7 @@ async def test_a_task_asks_before_each_frame(reported: Notified, end: str) -> No
 # Tasks that fail
 
 
-async def test_what_waits_behind_a_failed_task_is_dropped(reported: Notified) -> None:
+async def test_tasks_after_a_failed_one_are_dropped(reported: Notified) -> None:
     refused = OrderRefused("The drive is in fault.")
     reported.put("a", error=refused)
     reported.put("b")

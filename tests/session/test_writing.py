@@ -98,7 +98,7 @@ async def test_a_value_that_the_drive_keeps_is_known_and_recorded(
 
 
 @pytest.mark.parametrize("kept", [30, 49, 51, 0xFFFF])
-async def test_another_value_than_was_written_is_told_and_known(
+async def test_another_value_than_was_written_is_reported_and_known(
     line: WilfulLine, session: DriveSession, journal: Journal, kept: int
 ) -> None:
     line.drive.keeps = lambda _address, _word: kept
@@ -170,7 +170,7 @@ async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
     assert "ACC" not in session.image.raws
 
 
-async def test_what_cannot_be_read_back_is_not_known(
+async def test_unreadable_value_is_unknown(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     await writer(session, journal).write_parameter(PROFILE["CMD"], 7, why="command")
@@ -291,7 +291,7 @@ async def test_a_write_that_a_stop_cuts_short_is_not_kept_as_done(
     assert (cut.answer, later.answer) == (CUT_SHORT, "Not taken: it holds 3.0 s, read back later.")
 
 
-async def test_a_word_that_the_drive_may_change_is_told_and_not_judged(
+async def test_a_word_that_the_drive_may_change_is_reported_and_not_judged(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     line.fail_write(1, 11, NoAnswer(1, 6, 11), taken=True)

@@ -208,7 +208,7 @@ def test_sets_survive_a_power_cycle() -> None:
     assert bench.word("ACC") == 7
 
 
-def test_wrong_sets_are_told() -> None:
+def test_wrong_sets_are_reported() -> None:
     with pytest.raises(UnknownParameter):
         SimulatedDrive(PROFILES["atv71"], DriveSpec("atv71", sets={"NOPE": 1}))
     with pytest.raises(SimulatorError, match="does not fit"):

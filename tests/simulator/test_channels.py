@@ -319,7 +319,7 @@ def test_three_wires_start_by_a_pulse_and_not_again_by_themselves() -> None:
         (203, (), 0x0800, False),
     ],
 )
-def test_what_an_assignment_means(raw: int, closed: tuple[str, ...], word: int, on: bool) -> None:
+def test_meaning_of_an_assignment(raw: int, closed: tuple[str, ...], word: int, on: bool) -> None:
     """96 to 99 channels, from 129 inputs, from 160 bits of the line's word; 203 is CANopen's."""
     assert switch_is_on(raw, lambda name: name in closed, word) is on
 

@@ -183,7 +183,7 @@ def test_unit_255_is_the_only_drive() -> None:
 
 
 @pytest.mark.parametrize("head", ["12340001000602", "12340000000002", "123400000fff02"])
-def test_what_is_no_modbus_tcp_ends_the_connection(head: str) -> None:
+def test_non_modbus_tcp_bytes_end_the_connection(head: str) -> None:
     talk = tcp()
     talk.feed(bytes.fromhex(head), 1.0)
     assert talk.broken

@@ -38,7 +38,7 @@ def test_it_starts_with_the_factory_settings_of_its_profile(family: str) -> None
     ("family", "code", "times"),
     [("atv31", "CLI", 1.5), ("atv312", "IdC", 0.7), ("atv71", "SDC2", 0.5)],
 )
-def test_what_follows_the_rated_current_starts_with_its_share(
+def test_current_related_values_start_with_their_share(
     family: str, code: str, times: float
 ) -> None:
     simulated = drive(family)

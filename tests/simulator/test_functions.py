@@ -128,7 +128,7 @@ def test_altivar_21_takes_three_read_device_ids(read_id: int) -> None:
     assert reply.startswith(f"2B0E{read_id:02X}01000003000D54656C")
 
 
-def test_the_name_given_to_the_drive_is_told_up_to_16_characters() -> None:
+def test_the_name_given_to_the_drive_is_reported_up_to_16_characters() -> None:
     reply = Bench("atv71", name="PUMP NUMBER 1 BEHIND THE HALL").ask("2B0E0100")
     assert reply is not None
     assert bytes.fromhex(reply).endswith(b"\x06\x10PUMP NUMBER 1 BE")

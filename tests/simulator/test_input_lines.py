@@ -22,7 +22,7 @@ def test_a_line_sets_inputs_of_the_drive_that_it_names() -> None:
     assert made.drive(3).terminals.closed("F")
 
 
-def test_without_inputs_they_are_told() -> None:
+def test_without_inputs_they_are_reported() -> None:
     made = simulation("atv21")
     set_inputs(made, "2: F=1, VIA=4V")
     assert set_inputs(made, "2:") == "2: closed of F, R, RES: F; VIA 40 %, VIB 0 %"

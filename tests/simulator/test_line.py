@@ -170,7 +170,7 @@ def test_a_set_baud_of_another_line_makes_a_drive_deaf() -> None:
     assert requested(line(DriveSpec("atv71", 2, sets={"TBR": 28})), 2, read(9001)) is None
 
 
-def test_an_address_nobody_has_is_told() -> None:
+def test_an_address_nobody_has_is_reported() -> None:
     with pytest.raises(SimulatorError, match="Addresses: 2, 3"):
         line(*TWO).drive(9)
 

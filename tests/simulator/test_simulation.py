@@ -129,7 +129,7 @@ def test_tcp_connections_break_with_the_plug_and_the_port_comes_back() -> None:
             assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
 
 
-def test_a_port_that_is_taken_is_told() -> None:
+def test_a_port_that_is_taken_is_reported() -> None:
     with simulation() as running:
         place = running.serve_tcp()
         with pytest.raises(SimulatorError, match="Nothing can be served"):

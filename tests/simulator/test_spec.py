@@ -38,7 +38,7 @@ def test_drives_are_read_with_the_next_free_addresses() -> None:
         ("atv71@3,atv21@3", "each its own"),
     ],
 )
-def test_what_is_wrong_is_told(text: str, message: str) -> None:
+def test_invalid_sets_are_reported(text: str, message: str) -> None:
     with pytest.raises(SimulatorError, match=message):
         parse_drives(text)
 

@@ -46,7 +46,7 @@ def test_the_watch_needs_an_order_first() -> None:
     assert bench.drive.fault is not None
 
 
-def test_the_order_of_another_master_counts_once_somebody_has_asked() -> None:
+def test_command_of_another_master_applies_after_first_request() -> None:
     bench = Bench("atv71", {"TTO": 10, "SLL": 1}, run_hz=30.0)
     bench.run(3)
     assert bench.drive.fault is None
@@ -93,7 +93,7 @@ def test_fallback_speed_and_maintained_speed_and_stop_last_as_long_as_the_silenc
         assert bench.drive.motor.frequency == pytest.approx(20, abs=0.1)
 
 
-def test_altivar_312_leaves_the_line_unwatched_when_told_so() -> None:
+def test_altivar_312_leaves_the_line_unwatched_when_configured_so() -> None:
     bench = running(1, "atv312")
     bench.taken("CMI", 1 << 14)
     bench.run(3)

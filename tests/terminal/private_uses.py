@@ -47,7 +47,7 @@ def private_names(kind: type) -> frozenset[str]:
     """The private names of one class of Textual or Rich, without those of its bases."""
     names = set(vars(kind)) | set(vars(kind).get("__annotations__", ()))
     source = ast.parse(textwrap.dedent(inspect.getsource(kind)))
-    names |= {name for node in ast.walk(source) if (name := _of_self(node)) is not None}
+    names |= {name for node in ast.walk(source) if (name := _attribute_of_self(node)) is not None}
     return frozenset(filter(is_private, names))
 
 
@@ -68,10 +68,12 @@ def names_of_any() -> frozenset[str]:
     kinds = [App, ModalScreen, Static, Input, OptionList, TextArea, Compositor, Console]
     kinds += [Driver, LinuxDriver, Strip, Timer]
     kinds += [kind for module in (events, messages) for kind in _classes_of(module)]
-    return frozenset().union(*(private_names(base) for kind in kinds for base in of_textual(kind)))
+    return frozenset().union(
+        *(private_names(base) for kind in kinds for base in textual_bases(kind))
+    )
 
 
-def of_textual(kind: type) -> tuple[type, ...]:
+def textual_bases(kind: type) -> tuple[type, ...]:
     """The classes of Textual and Rich that a class is, or stands on."""
     return tuple(base for base in kind.__mro__ if base.__module__.partition(".")[0] in DRAWN_BY)
 
@@ -84,7 +86,7 @@ def _classes_of(module: object) -> Iterator[type]:
     )
 
 
-def _of_self(node: ast.AST) -> str | None:
+def _attribute_of_self(node: ast.AST) -> str | None:
     """The attribute of `self` or `cls` that this is."""
     if isinstance(node, ast.Attribute) and _is_own(node.value):
         return node.attr
@@ -101,7 +103,7 @@ def uses(source: str, bases: Bases) -> list[Use]:
     """Every use of a private part of Textual in a module, whose classes stand on these."""
     tree = ast.parse(source)
     nodes = list(ast.walk(tree))
-    return sorted({*_imports(nodes), *_of_others(nodes), *_of_own_classes(tree, bases)})
+    return sorted({*_imports(nodes), *_uses_on_others(nodes), *_uses_in_own_classes(tree, bases)})
 
 
 def _imports(nodes: Sequence[ast.AST]) -> Iterator[Use]:
@@ -118,7 +120,7 @@ def _imports(nodes: Sequence[ast.AST]) -> Iterator[Use]:
                 yield Use(found, node.lineno)
 
 
-def _of_others(nodes: Sequence[ast.AST]) -> Iterator[Use]:
+def _uses_on_others(nodes: Sequence[ast.AST]) -> Iterator[Use]:
     """Private attributes of anything but `self`, and what is set on a class of Textual."""
     modules, theirs = _imported(nodes)
     for node in nodes:
@@ -159,7 +161,7 @@ def _imported(nodes: Sequence[ast.AST]) -> tuple[set[str], set[str]]:
     return modules, theirs
 
 
-def _of_own_classes(tree: ast.Module, bases: Bases) -> Iterator[Use]:
+def _uses_in_own_classes(tree: ast.Module, bases: Bases) -> Iterator[Use]:
     """Private names that `self` has from Textual: read, set or defined anew."""
     for name, node in _classes(tree) if bases else ():
         known = frozenset().union(*(private_names(base) for base in bases.get(name, ())))
@@ -168,7 +170,7 @@ def _of_own_classes(tree: ast.Module, bases: Bases) -> Iterator[Use]:
                 if found in known:
                     yield Use(found, line)
         for inner in ast.walk(node):
-            found_on_self = _of_self(inner)
+            found_on_self = _attribute_of_self(inner)
             if found_on_self in known and isinstance(inner, ast.Attribute):
                 yield Use(inner.attr, inner.lineno)
 
@@ -204,7 +206,7 @@ def bases_in_project() -> Mapping[str, Bases]:
             if part.__module__.partition(".")[0] == tui.__name__:
                 below = found.setdefault(part.__module__, {})
                 known = below.get(part.__qualname__, ())
-                below[part.__qualname__] = tuple(dict.fromkeys([*known, *of_textual(kind)]))
+                below[part.__qualname__] = tuple(dict.fromkeys([*known, *textual_bases(kind)]))
     return found
 
 

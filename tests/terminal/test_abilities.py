@@ -124,7 +124,7 @@ def test_in_sixteen_colors_words_are_never_of_the_color_behind_them(style: Style
     assert shown.color is None or shown.color.number != shown.bgcolor.number  # type: ignore[union-attr]
 
 
-def test_what_is_raised_from_the_ground_stays_so() -> None:
+def test_ungrounded_input_stays_active() -> None:
     assert without_colors(palette.CURSOR).reverse
     assert without_colors(palette.FAULT_BLOCK).reverse
     assert without_colors(palette.ATTENTION_BLOCK).reverse

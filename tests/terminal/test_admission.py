@@ -128,7 +128,7 @@ async def test_a_key_alone_acts_and_one_of_a_piece_does_not() -> None:
         await until(pilot, lambda: app.done == ["run", "run"])
 
 
-async def test_each_piece_is_told_of_once() -> None:
+async def test_each_piece_is_reported_once() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send(*"rrr", stroke=piece())
@@ -173,7 +173,7 @@ async def test_an_arrow_of_a_piece_comes_through_and_tells_what_it_is() -> None:
         assert app.typed.stroke is None
 
 
-async def test_what_waits_behind_a_key_when_a_stop_comes_is_void() -> None:
+async def test_stop_discards_keys_waiting_after_another() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send("s", "r", "enter")
@@ -230,7 +230,7 @@ async def test_a_key_that_waited_long_does_no_more_than_one_of_a_piece() -> None
         await until(pilot, lambda: app.query_one("#text", Input).value == "r")
 
 
-async def test_what_is_typed_ahead_goes_into_the_dialog() -> None:
+async def test_keys_typed_ahead_reach_the_dialog() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send("f", *"30")
@@ -270,7 +270,7 @@ async def test_a_paste_goes_into_a_text_and_does_nothing_else(
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_what_a_field_takes(widget: Input | Static | None, text: bool, space: bool) -> None:
+def test_keys_a_field_accepts(widget: Input | Static | None, text: bool, space: bool) -> None:
     assert (takes_text(widget), takes_space(widget)) == (text, space)
 
 

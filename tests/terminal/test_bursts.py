@@ -167,7 +167,7 @@ def test_arrows_that_come_faster_than_any_keyboard_step_once() -> None:
     assert len(bench.found) == 300
 
 
-def test_what_a_link_gives_back_at_once_steps_once_a_read() -> None:
+def test_quick_link_steps_once_per_read() -> None:
     bench = Bench()
     bench.read(*["up"] * 60)
     for _ in range(3):
@@ -241,7 +241,7 @@ def _times(reads: Iterable[tuple[list[str], float]]) -> list[tuple[str, float]]:
 
 
 @given(READS)
-def test_what_is_given_out_is_true(reads: list[tuple[list[str], float]]) -> None:
+def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> None:
     bench = Bench()
     for names, gap in reads:
         bench.read(*names, after=gap)

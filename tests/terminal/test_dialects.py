@@ -214,7 +214,7 @@ def test_a_reply_without_end_gives_its_space_late() -> None:
 
 
 @pytest.mark.parametrize("rest", ["[", "[2", "[24", "[1;5", "O", "[200"])
-def test_what_follows_a_lone_escape_is_no_key_up_to_its_final(rest: str) -> None:
+def test_bytes_after_a_lone_escape_are_no_key_until_the_final(rest: str) -> None:
     for after in (0.1, 0.5, 0.95):
         tokenizer = Tokenizer()
         assert tokenizer.feed("\x1b", 0.0) == []
@@ -401,8 +401,8 @@ SEQUENCES = st.builds(
 def _is_more_than_one_sequence(sequence: str) -> bool:
     """Whether it is a key that came as the number of its character, Enter of the keypad, or two."""
     body = sequence.replace("\x1b\x1b[", "\x1b[").replace("\x9b", "\x1b[")
-    of_rxvt = re.match(r"\x1b\[\d{1,2}\$.", body)
-    return bool(body.endswith("u") or body.startswith("\x1b[27;") or body == "\x1bOM" or of_rxvt)
+    rxvt_reply = re.match(r"\x1b\[\d{1,2}\$.", body)
+    return bool(body.endswith("u") or body.startswith("\x1b[27;") or body == "\x1bOM" or rxvt_reply)
 
 
 @given(SEQUENCES, st.sampled_from(GAPS), st.data())

@@ -74,7 +74,7 @@ def made(app: Stops, **settings: Any) -> Any:
 ASKED = ["\x1b[?25l", "\x1b[?1004h", "\x1b[>25u", "\x1b]22;text\x07", "\x1b[1;1Htext", "\x1b[<u"]
 
 
-def test_without_mouse_less_is_asked_of_the_terminal() -> None:
+def test_without_mouse_less_is_requested_of_the_terminal() -> None:
     driver = made(Stops())
     for data in ASKED:
         driver.write(data)
@@ -82,7 +82,7 @@ def test_without_mouse_less_is_asked_of_the_terminal() -> None:
     assert not driver.mouse_enabled
 
 
-def test_with_mouse_all_is_asked_as_textual_does() -> None:
+def test_with_mouse_all_is_requested_as_textual_does() -> None:
     driver = made(Stops(mouse=True))
     for data in ASKED:
         driver.write(data)
@@ -91,7 +91,7 @@ def test_with_mouse_all_is_asked_as_textual_does() -> None:
     assert not made(Stops(mouse=True), mouse=False).mouse_enabled
 
 
-def test_where_textual_reads_the_keys_stop_keys_are_taken_early_all_the_same() -> None:
+def test_stop_keys_are_read_early_with_textual_reader() -> None:
     driver = made(stops := Stops())
     for key in ("r", "f12", "space", "f9", "f1"):
         driver.process_message(events.Key(key, None))

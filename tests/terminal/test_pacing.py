@@ -56,7 +56,7 @@ def test_a_frame_waits_for_the_answer_to_the_one_before() -> None:
     assert pacing.room(1.1) == WHOLE
 
 
-def test_what_hurries_follows_a_small_piece_and_no_large_one() -> None:
+def test_urgent_output_follows_small_pieces_only() -> None:
     pacing = Pacing()
     pacing.sent(AHEAD, 0.0)
     assert pacing.room(0.1, hurry=True)
@@ -89,7 +89,7 @@ def test_an_answer_that_is_lost_holds_nothing_up_for_ever() -> None:
     assert pacing.room(12.1), "the next answer is that of the next frame"
 
 
-def test_answers_that_come_late_are_no_more_than_was_asked() -> None:
+def test_answers_that_come_late_are_no_more_than_was_requested() -> None:
     pacing = Pacing()
     pacing.answered(0.0)
     assert pacing.room(0.0) == WHOLE

@@ -561,10 +561,10 @@ PLANTED = {
 def test_a_use_of_a_private_part_is_found(source: str) -> None:
     from textual.app import App
 
-    from .private_uses import of_textual
+    from .private_uses import textual_bases
 
     line = source.count("\n") + 1
-    assert uses(source, {"Panel": of_textual(App)}) == [Use(PLANTED[source], line)]
+    assert uses(source, {"Panel": textual_bases(App)}) == [Use(PLANTED[source], line)]
 
 
 OWN = [
@@ -583,6 +583,6 @@ OWN = [
 def test_a_private_name_of_ones_own_is_not_taken_for_textuals(source: str) -> None:
     from textual.app import App
 
-    from .private_uses import of_textual
+    from .private_uses import textual_bases
 
-    assert uses(f"import os\n{source}", {"Panel": of_textual(App)}) == []
+    assert uses(f"import os\n{source}", {"Panel": textual_bases(App)}) == []

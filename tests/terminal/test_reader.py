@@ -99,7 +99,7 @@ def test_keys_of_a_piece_know_how_many_they_are() -> None:
 
 
 @pytest.mark.parametrize("output", [*REPORTS.values(), *REPLIES.values()])
-def test_what_a_terminal_says_of_itself_is_no_part_of_a_piece(output: str) -> None:
+def test_terminal_reports_are_no_part_of_a_piece(output: str) -> None:
     for cut in range(len(output) + 1):
         first, second = output[:cut].encode(), output[cut:].encode()
         taken, keys, found = read((1.0, b"r" + first), (1.02, second))

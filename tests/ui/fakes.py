@@ -42,7 +42,7 @@ from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 from tui.terminal.abilities import EVERYTHING, Abilities
 
 NOW = 1000.0

@@ -25,7 +25,7 @@ from textual.widgets import Label
 from tui.terminal.lean import Picture, strips_of
 from tui.terminal.lean_app import LeanApp
 from tui.terminal.pacing import ASK, WHOLE
-from tui.terminal.sgr import of_blank
+from tui.terminal.sgr import blank_style
 from tui.widgets.lines import Lines, looks, runs
 
 from .bytes_per_second import compare
@@ -159,7 +159,7 @@ async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
 
 def _seen(character: str, color: str) -> str:
     """What is seen of a style: of a blank, what lies behind it."""
-    return of_blank(color) if character == " " else color
+    return blank_style(color) if character == " " else color
 
 
 class Dialog(ModalScreen[None]):
@@ -323,7 +323,7 @@ class Paced(LeanApp):
         return "".join(self.written)
 
 
-async def test_what_a_terminal_has_not_taken_is_left_out_and_the_newest_comes_then() -> None:
+async def test_unread_output_is_dropped_for_the_newest() -> None:
     app = Paced()
     async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
         await pilot.pause()
@@ -340,7 +340,7 @@ async def test_what_a_terminal_has_not_taken_is_left_out_and_the_newest_comes_th
         assert app.answer() == ""
 
 
-async def test_what_a_key_brings_goes_at_once() -> None:
+async def test_output_of_a_key_is_sent_at_once() -> None:
     app = Paced()
     async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
         await pilot.pause()

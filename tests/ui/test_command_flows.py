@@ -214,7 +214,7 @@ async def test_no_message_says_that_an_armed_drive_is_not() -> None:
         assert "Not armed" not in shown(made.app, "said")
 
 
-async def test_a_motor_that_stands_after_a_quick_stop_is_not_told_as_stopping() -> None:
+async def test_a_motor_that_stands_after_a_quick_stop_is_not_reported_as_stopping() -> None:
     """An Altivar 71 keeps the state of its quick stop at rest."""
     async with bench("atv71") as made:
         await made.running()
@@ -368,7 +368,7 @@ async def test_reference_by_steps_and_its_limit() -> None:
         assert made.drive().raw("LFR") == 160
 
 
-async def test_what_is_typed_ahead_reaches_the_line_but_commands_nothing(
+async def test_input_typed_ahead_reaches_line_but_commands_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("tui.screens.monitor.run_line.SETTLED", 60.0)

@@ -49,11 +49,11 @@ def reported(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
         ([(">", "02 2B 0E 01 00")], ["2 identify"]),
     ],
 )
-def test_what_frames_say(frames: list[tuple[str, str]], output: list[str]) -> None:
+def test_frames_are_explained(frames: list[tuple[str, str]], output: list[str]) -> None:
     assert reported(*frames) == output
 
 
-def test_a_reply_of_another_drive_is_not_told_by_the_last_request() -> None:
+def test_a_reply_of_another_drive_is_not_reported_by_the_last_request() -> None:
     assert reported((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 words"
 
 
@@ -65,6 +65,6 @@ def test_modbus_tcp_has_its_head_before_the_device() -> None:
     frames=st.lists(st.tuples(st.sampled_from(["out", "in"]), st.binary(max_size=40)), max_size=6),
     tcp=st.booleans(),
 )
-def test_any_bytes_are_told_or_left_alone(frames: list[tuple[str, bytes]], tcp: bool) -> None:
+def test_any_bytes_are_reported_or_left_alone(frames: list[tuple[str, bytes]], tcp: bool) -> None:
     made = [Frame(0.0, "out" if way == "out" else "in", data) for way, data in frames]
     assert len(decoded(made, lambda _: ATV71, no_raws, tcp=tcp)) == len(made)

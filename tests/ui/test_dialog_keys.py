@@ -313,7 +313,7 @@ CHECKS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("name", CHECKS)
-def test_what_is_typed_or_pasted_is_refused_and_ends_nothing(name: str) -> None:
+def test_typed_or_pasted_nonsense_is_refused_and_ends_nothing(name: str) -> None:
     check, texts = CHECKS[name]
     for text in texts:
         reported = check(text)

@@ -28,7 +28,7 @@ def reported(shown: DoctorView, width: int = 80, height: int = 20) -> str:
 
 
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71"])
-def test_every_fault_is_told_without_a_cut_at_80_columns(family: str) -> None:
+def test_every_fault_is_reported_without_a_cut_at_80_columns(family: str) -> None:
     profile = library.load(family)
     for fault in profile.data.faults.codes:
         help_ = profile.guide.fault(fault.raw)
@@ -42,7 +42,7 @@ def test_every_fault_is_told_without_a_cut_at_80_columns(family: str) -> None:
         assert all(line.cell_len <= 80 for line in doctor_lines(shown, 80, 40))
 
 
-def test_general_practice_is_said_to_be_so() -> None:
+def test_general_practice_is_reported_to_be_so() -> None:
     practice = reported(view(1))
     assert "practice" in practice.partition("Probably")[2].splitlines()[0]
     guide = reported(view(18))
@@ -77,7 +77,7 @@ def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None
         assert len(text.splitlines()) <= height
 
 
-def test_which_input_tripped_it_is_told_at_80_columns() -> None:
+def test_which_input_tripped_it_is_reported_at_80_columns() -> None:
     """'Logic input ...' and 16#000C told nobody where to look."""
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
@@ -98,7 +98,7 @@ def test_an_alarm_points_at_something_too() -> None:
     assert "UNDERVOLTAGE" not in reported(both)
 
 
-def test_a_help_file_that_cannot_be_read_is_told() -> None:
+def test_a_help_file_that_cannot_be_read_is_reported() -> None:
     profile = library.load_file(library.packaged_folder() / "atv71.toml")
     profile.guide.__dict__["_found"] = ({}, {})
     profile.guide.trouble = "mine.toml:3: there is no such fault."
@@ -123,7 +123,7 @@ async def test_the_line_of_keys_stays_at_the_foot() -> None:
         assert keys.y == made.app.size.height - 1
 
 
-def test_nothing_is_told_of_no_fault() -> None:
+def test_nothing_is_reported_no_fault() -> None:
     text = reported(view(None, present=False))
     assert "No fault now" in text
     assert "Probably" not in text
@@ -187,6 +187,6 @@ def test_the_cause_that_becomes_the_first_is_not_shown_as_surely_known() -> None
     assert text.partition("Probably")[2].splitlines()[0].endswith("practice")
 
 
-def test_what_rules_advice_out_is_read_with_it() -> None:
+def test_advice_that_is_excluded_is_read_with_its_fault() -> None:
     help_ = ATV71.guide.fault(18)
     assert {"BRA", "ULP0", "VCAL"} <= set(codes_to_read(ATV71, help_))

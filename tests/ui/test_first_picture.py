@@ -56,7 +56,7 @@ async def test_nothing_is_seen_of_the_fields_that_come_behind_the_first_picture(
         assert app.first == picture(app)
 
 
-async def test_what_is_asked_of_the_fields_does_not_wait_for_them() -> None:
+async def test_requests_for_fields_do_not_wait_for_them() -> None:
     app = DrivePanelApp()
     async with app.run_test() as pilot:
         form = app.connection.form
@@ -67,7 +67,7 @@ async def test_what_is_asked_of_the_fields_does_not_wait_for_them() -> None:
         assert form.query_one("#addresses", Input).value == "3, 5"
 
 
-async def test_a_field_that_is_asked_for_before_it_is_there_has_the_cursor_then() -> None:
+async def test_a_field_that_is_requested_before_it_is_there_has_the_cursor_then() -> None:
     app = FirstPicture()
     app.on_first = lambda: app.connection.form.ask_for_addresses()
     async with app.run_test() as pilot:

@@ -138,7 +138,7 @@ async def test_a_lost_line_is_shown_and_comes_back() -> None:
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
 
-async def test_a_drive_that_watches_the_line_is_asked_on() -> None:
+async def test_a_drive_that_watches_the_line_is_still_polled() -> None:
     """The Altivar 21 trips after 3 s without a request: found once, it is looked after."""
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
@@ -180,7 +180,7 @@ async def test_a_line_that_cannot_be_opened_says_what_to_try() -> None:
         assert app.opened is None
 
 
-async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
+async def test_percent_becomes_amperes_once_the_rating_is_reported() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 1)
@@ -286,7 +286,7 @@ async def test_another_word_of_bits_draws_that_alone(size: tuple[int, int], plac
         assert [line.plain for line in motor.lines] == ["as it was"]
 
 
-async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_still(
+async def test_nothing_is_drawn_below_the_help_and_it_is_reported_that_values_stand_still(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("tui.screens.monitor.screen.STILL_TOLD", 0.5)
@@ -324,7 +324,7 @@ async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
         assert len(titles) > 1
 
 
-async def test_how_often_the_drive_is_asked_is_told() -> None:
+async def test_how_often_the_drive_is_requested_is_reported() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)

@@ -63,7 +63,7 @@ def test_nothing_in_a_row_moves_whatever_it_says(width: int, one: WallRow, other
     assert len(column_heads(columns).plain) == columns.taken
 
 
-def test_where_there_is_little_room_the_load_goes_first_and_then_the_name() -> None:
+def test_small_width_drops_load_then_name() -> None:
     kept = [columns_for(width) for width in (180, 86, 70, 53)]
     assert [(bool(one.load), bool(one.name), bool(one.drive)) for one in kept] == [
         (True, True, True),

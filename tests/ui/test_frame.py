@@ -84,7 +84,7 @@ async def test_the_strip_tells_the_motor_on_every_screen(key: str) -> None:
 @pytest.mark.parametrize(
     "key", kept(["3", "4", "z", "question_mark", "ctrl+p"], "3", "question_mark")
 )
-async def test_a_trip_is_told_there_and_over_dialogs(key: str) -> None:
+async def test_a_trip_is_reported_there_and_over_dialogs(key: str) -> None:
     async with panel() as made:
         await made.pilot.press(key)
         made.simulation.drive(1).provoke("ObF")
@@ -119,7 +119,7 @@ async def test_enter_opens_the_parameter_that_a_fault_points_at() -> None:
         await made.until(lambda: made.shown("detail").lstrip().startswith("DEC"))
 
 
-async def test_a_stop_is_told_where_it_was_given() -> None:
+async def test_a_stop_is_reported_where_it_was_given() -> None:
     async with panel() as made:
         await made.on("3")
         await made.pilot.press("space")

@@ -63,7 +63,7 @@ def reported(frames: Sequence[Frame]) -> list[str]:
         ("nothing says so", []),
     ],
 )
-def test_what_was_typed_chooses_whole_exchanges(typed: str, shown: list[int]) -> None:
+def test_typed_filter_chooses_whole_exchanges(typed: str, shown: list[int]) -> None:
     assert chosen(LOG, choice_of(typed), reported, tcp=False) == shown
 
 
@@ -93,7 +93,7 @@ def test_the_time_of_day_has_its_thousandths(utc: None) -> None:
     assert frame_time(1_795_259_250.0625) == "11:07:30.062"
 
 
-def test_what_is_kept_has_a_line_a_frame_with_its_gap_on_the_line(utc: None) -> None:
+def test_saved_frames_have_a_line_each_with_gap(utc: None) -> None:
     places = chosen(LOG, choice_of("write 2"), reported, tcp=False)
     words = [reported(LOG)[at] for at in places]
     text = frames_text(LOG, places, words, 1_795_259_250.0, ["ttyUSB0", "2 frames"])

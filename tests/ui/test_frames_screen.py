@@ -61,7 +61,7 @@ async def test_a_filter_narrows_the_list_while_it_is_typed_and_esc_ends_it() -> 
 
 
 @pytest.mark.sweep
-async def test_errors_alone_are_shown_with_what_was_asked() -> None:
+async def test_errors_alone_are_shown_with_what_was_requested() -> None:
     async with on_frames() as made:
         assert made.app.opened is not None
         await made.pilot.press("O", *"error", "enter")

@@ -61,7 +61,7 @@ def test_the_pages_tell_every_key_and_no_other() -> None:
     assert reported - wanted == set()
 
 
-def test_every_action_is_told_in_its_words() -> None:
+def test_every_action_is_reported_in_its_words() -> None:
     for action in ACTIONS:
         of = EVERY_SCREEN if action.app or action.first else action.screens[0]
         assert action.help in tables()[of]
@@ -84,7 +84,7 @@ def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:
     assert "Old." not in written
 
 
-def test_what_has_no_key_is_told_behind_the_table() -> None:
+def test_actions_without_key_follow_the_table() -> None:
     table = key_table("line")
     assert "- Close the line; asks where a drive acts on that." in table
     assert "|  |" not in table

@@ -121,7 +121,7 @@ def test_letters_that_stop_at_once_are_stops() -> None:
 # A key without a meaning on a screen
 
 
-def test_where_a_key_has_a_meaning() -> None:
+def test_keys_have_a_meaning_on_their_screen() -> None:
     assert elsewhere(CONNECTION, "r").startswith("r has a meaning on Monitor (2): Run forward")
     assert elsewhere("frames", "V").startswith("V has a meaning on Scanner (4)")
     assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
@@ -208,7 +208,7 @@ def notices(made: Bench) -> str:
 
 
 @pytest.mark.parametrize("key", kept("123567", "1", "3"))
-async def test_what_is_typed_behind_the_slash_is_searched_for_and_nothing_else(key: str) -> None:
+async def test_text_after_slash_is_searched_for(key: str) -> None:
     """Typed at once on a slow machine, it was a key of the screen below: `a` armed."""
     async with bench("atv71") as made:
         await made.pilot.press(key)

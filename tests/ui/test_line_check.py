@@ -70,7 +70,9 @@ def settings(text: str) -> None:
     settings_file().write_text(text, "utf-8")
 
 
-async def test_another_drive_is_asked_about_and_read_only_till_then(simulation: Simulation) -> None:
+async def test_another_drive_needs_confirmation_and_read_only_till_then(
+    simulation: Simulation,
+) -> None:
     line = rtu_tcp(simulation)
     another_before(line)
     app = DrivePanelApp(start=line, device=2)
@@ -105,7 +107,7 @@ async def test_another_drive_is_asked_about_and_read_only_till_then(simulation: 
     assert load_memory().lines[line_key(line)].drives[2].profile == "atv71"
 
 
-async def test_a_line_that_is_as_it_was_is_not_asked_about(simulation: Simulation) -> None:
+async def test_a_line_that_is_as_it_was_is_not_questioned(simulation: Simulation) -> None:
     line = rtu_tcp(simulation)
     for _ in range(2):
         await opened_unasked(line)
@@ -124,7 +126,7 @@ async def opened_unasked(line: str) -> None:
         await until(pilot, lambda: "nothing to accept" in shown(app, "said"))
 
 
-async def test_it_is_asked_once_the_search_is_over(simulation: Simulation) -> None:
+async def test_it_is_still_polledce_the_search_is_over(simulation: Simulation) -> None:
     line = rtu_tcp(simulation)
     another_before(line)
     app = DrivePanelApp(start=line)
@@ -138,7 +140,7 @@ async def test_it_is_asked_once_the_search_is_over(simulation: Simulation) -> No
         await until(pilot, lambda: isinstance(app.screen, Confirm))
 
 
-async def test_an_adapter_that_changed_while_the_line_was_lost_is_asked_about(
+async def test_an_adapter_that_changed_while_the_line_was_lost_needs_confirmation(
     adapters: Adapters,
 ) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")

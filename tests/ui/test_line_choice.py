@@ -138,7 +138,7 @@ async def test_enter_in_a_field_looks_again_by_what_was_typed() -> None:
 
 
 @pytest.mark.sweep
-async def test_who_types_into_a_field_is_not_led_away() -> None:
+async def test_typing_into_a_field_changes_no_screen() -> None:
     async with line() as made:
         app, pilot = made.app, made.pilot
         await made.searched()

@@ -18,7 +18,7 @@ from tui.session.command.stop_report import Phase, StopReport
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
 from tui.session.monitor.alarms import LineAlarms
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 from tui.terminal.abilities import EVERYTHING, Abilities
 
 from . import fakes

@@ -22,7 +22,7 @@ from tui.screens.monitor.words import (
     word_line,
     word_pages,
 )
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 
 from . import fakes
 from .test_monitor_pictures import AT_TERMINALS, AT_ZERO, NO_SUPPLY, SPEEDING_UP
@@ -54,14 +54,14 @@ def test_the_state_in_words(raws: dict[str, int], armed: float | None, says: str
     assert state_lines(view, 22)[0].plain == says
 
 
-def test_a_fault_says_when_and_where_it_is_told_what_to_do() -> None:
+def test_a_fault_says_when_and_where_it_is_informed_what_to_do() -> None:
     view = replace(view_of(ATV71, fakes.FAULT), fault_at="seen since 16:28:05")
     text = "\n".join(line.plain for line in state_lines(view, 22))
     assert "seen since 16:28:05" in text
     assert "5 says what to do" in text
 
 
-def test_who_commands_and_who_gives_the_reference_are_not_mixed_up() -> None:
+def test_commander_and_reference_source_are_distinguished() -> None:
     view = view_of(ATV71, fakes.RUNNING)
     assert view.snapshot is not None
     state = replace(view.snapshot.state, channel="terminals", reference="keypad")
@@ -87,7 +87,9 @@ def test_the_block_has_five_lines_whatever_happens() -> None:
         ("atv31", {"LAC": 0}, "6 opens Control."),
     ],
 )
-def test_what_has_no_effect_names_the_way_out(family: str, raws: dict[str, int], way: str) -> None:
+def test_command_without_effect_names_next_step(
+    family: str, raws: dict[str, int], way: str
+) -> None:
     found = hindrance(library.load(family), raws)
     assert found is not None
     assert found.way == way

@@ -79,7 +79,7 @@ async def test_a_drive_that_would_act_is_left_alone_only_with_a_yes() -> None:
             assert app.line_text.endswith(",19200,8E1")
 
 
-async def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = [LineSetting(9600, "8E1"), LineSetting(600, "8E1"), LineSetting(300, "8E1")]
     monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
     with PtyPeer(silent) as peer:
@@ -92,7 +92,7 @@ async def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.Monke
             app.connection.action_stop_scan()
 
 
-async def test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked() -> None:
+async def test_unexpected_answer_tries_no_other_setting_unasked() -> None:
     def garbled(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(2, bytes.fromhex("03 02 0001"))[:-1] + b"\0"] if request[0] == 2 else []
 
@@ -109,7 +109,7 @@ async def test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked() -
             )
 
 
-async def test_who_may_be_there_is_named_before_the_first_request() -> None:
+async def test_possible_drives_are_named_before_first_request() -> None:
     with PtyPeer(silent) as peer:
         app = DrivePanelApp(start=f"{peer.path},19200,8E1")
         async with app.run_test(size=(80, 24)) as pilot:
@@ -120,7 +120,7 @@ async def test_who_may_be_there_is_named_before_the_first_request() -> None:
             assert " s left." in advice(app)
 
 
-async def test_drives_are_asked_on_while_the_person_decides_known_or_not() -> None:
+async def test_drives_are_still_polled_while_the_person_decides_known_or_not() -> None:
     def refusing(request: bytes, _count: int) -> Sequence[Step]:
         if request[0] == 2:
             return [frame(2, bytes([request[1] | 0x80, 1]))]
@@ -144,7 +144,7 @@ def _requested(peer: PtyPeer, device: int, since: int) -> int:
     return sum(request[0] == device for request in peer.requests[since:])
 
 
-async def test_another_master_is_told_and_nothing_is_sent() -> None:
+async def test_another_master_is_reported_and_nothing_is_sent() -> None:
     with PtyPeer(silent) as peer:
         async with panel_on(peer.path) as (app, pilot):
             sent = len(peer.requests)

@@ -55,7 +55,7 @@ def test_every_word_that_was_typed_is_in_what_is_found() -> None:
     assert find("eprm", "monitor") == []  # letters here and there are no word
 
 
-def test_what_fits_best_comes_first() -> None:
+def test_best_match_comes_first() -> None:
     assert find("frames", "monitor")[0].action.id == "goto('frames')"
     assert find("parameters", "monitor")[0].action.id == "goto('parameters')"
     assert find("undo", "parameters")[0].screen == "parameters"
@@ -81,7 +81,7 @@ def test_every_action_is_found_from_everywhere(screen: str) -> None:
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=3), st.sampled_from(EVERYWHERE))
-def test_what_acts_on_a_motor_is_reached_by_its_name_only(words: list[str], screen: str) -> None:
+def test_motor_commands_need_their_full_name(words: list[str], screen: str) -> None:
     for one in find(" ".join(words), screen):
         names = BY_NAME.get(one.action.id, ())
         called = {name for name in names if any(word.startswith(name) for word in words)}

@@ -147,7 +147,7 @@ async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() 
         assert writes(made.app) == []
 
 
-async def test_what_is_told_of_edits_is_true_while_the_motor_runs() -> None:
+async def test_reports_on_edits_are_true_while_motor_runs() -> None:
     """TFR waits for a standstill: nothing says that w writes it, and it is counted until it is."""
     async with bench("atv71") as made:
         editor = (await to_parameters(made)).editor
@@ -330,7 +330,7 @@ async def test_back_up_change_compare_stage_and_write(
         assert (made.drive().raw("ACC"), made.drive().raw("HSP")) == (30, 500)
 
 
-async def test_a_file_that_is_no_set_is_told_and_nothing_is_staged(
+async def test_a_file_that_is_no_set_is_reported_and_nothing_is_staged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -407,7 +407,7 @@ async def test_a_value_past_another_parameters_limit_is_refused_with_its_name() 
 
 
 @pytest.mark.parametrize("key", kept(["y", "escape", "f12"], "y", "f12"))
-async def test_behind_a_failure_the_rest_is_asked_about(key: str) -> None:
+async def test_behind_a_failure_the_rest_needs_confirmation(key: str) -> None:
     async with bench("atv71") as made:
         await made.running()
         screen = await to_parameters(made)
@@ -434,7 +434,7 @@ async def test_behind_a_failure_the_rest_is_asked_about(key: str) -> None:
 
 
 @pytest.mark.parametrize(("stops_since", "dialog"), [(0, RestQuestion), (1, Results)])
-async def test_a_stop_since_the_writing_leaves_nothing_to_be_asked(
+async def test_a_stop_since_the_writing_leaves_nothing_to_be_requested(
     stops_since: int, dialog: type
 ) -> None:
     """Whoever comes back to the screen after a stop reads what became of it, and no more."""

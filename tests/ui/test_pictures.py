@@ -14,7 +14,7 @@ from tui.screens.monitor.screen import MonitorScreen
 from tui.session.console import DriveConsole
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 
 from . import fakes
 

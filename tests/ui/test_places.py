@@ -15,7 +15,7 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.frames.frame_view import frame_line
-from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, of_screen
+from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, screen_actions
 from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
 from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_words
 from tui.screens.monitor.commands import order_keys
@@ -132,7 +132,7 @@ def test_numbers_end_and_units_begin_at_one_place(profile_id: str, data: st.Data
                 assert not part.strip() or (part[end - 1] != " " and part[end] == " "), part
 
 
-def test_what_monitor_shows_beside_its_values_is_read() -> None:
+def test_values_beside_monitor_are_read() -> None:
     """Who commands and who gives the reference would stand as dashes."""
     for profile in map(library.load, PROFILES):
         channels = [profile.quantity("command_channel"), profile.quantity("reference_channel")]
@@ -217,7 +217,7 @@ def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
     target = "ALL" if screen == CONNECTION else "99"
     line = keys_shown(screen, 80, f"STOP {target}").plain
     assert line.startswith(f" Space STOP {target}  ")
-    labels = [action for action in of_screen(screen) if action.label][1:]
+    labels = [action for action in screen_actions(screen) if action.label][1:]
     wanted = [f" {action.shown} {action.label}" for action in labels]
     assert [words for words in wanted if words not in line] == []
 

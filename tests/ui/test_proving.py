@@ -27,7 +27,7 @@ async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
         await until(made.pilot, lambda: "FAULT SLF" in shown(made.app, "strip"))
 
 
-async def test_where_nothing_would_show_it_says_so_and_asks_nothing() -> None:
+async def test_without_visible_effect_says_so_and_sends_nothing() -> None:
     async with bench("atv312", sets={"SLL": 0}) as made:
         await made.pilot.press("6")
         await arm(made.pilot)

@@ -152,7 +152,7 @@ async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
 
 
 @pytest.mark.usefixtures("slow_hands")
-async def test_what_is_typed_on_is_no_answer_to_a_question_that_comes_by_itself() -> None:
+async def test_typed_text_does_not_answer_a_new_question() -> None:
     requested = Asked(confirm(by_itself=True))
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -188,7 +188,7 @@ def test_questions_that_no_key_asks_for_come_by_themselves(place: str, calls: in
     assert RestQuestion.by_itself
 
 
-async def test_enter_is_no_yes_where_something_is_lost_and_that_is_said() -> None:
+async def test_enter_is_no_yes_where_something_is_lost_and_that_is_reported() -> None:
     requested = Asked(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -286,7 +286,7 @@ def now_text(snapshot: Snapshot | None, look: Look | None = None, passed: float 
     return motor_now(library.load("atv71"), snapshot, 0.5, look, now).plain
 
 
-def test_what_the_motor_does_now_in_a_line() -> None:
+def test_motor_state_is_shown_in_one_line() -> None:
     profile = library.load("atv71")
     running = fakes.snapshot_of(profile, fakes.RUNNING)
     assert now_text(running).split() == ["▶", "running", "forward", "50.0", "Hz", "8.4", "A"]
@@ -303,7 +303,7 @@ def test_what_the_motor_does_now_in_a_line() -> None:
     assert now_text(None) == "? not known now"
 
 
-def test_where_nobody_watches_the_looks_of_the_line_tell_the_state() -> None:
+def test_unwatched_line_shows_state_from_its_checks() -> None:
     profile = library.load("atv71")
     state = fakes.snapshot_of(profile, fakes.RUNNING).state
     look = Look(state, "", fakes.NOW, None)
@@ -498,7 +498,7 @@ async def test_the_panel_is_not_left_past_a_question() -> None:
 
 @pytest.mark.parametrize("motors", [1, 5])
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)])
-async def test_the_keys_of_leaving_stand_below_however_much_is_told(
+async def test_the_keys_of_leaving_stand_below_however_much_is_reported(
     size: tuple[int, int], motors: int
 ) -> None:
     def runs() -> Text:
@@ -516,7 +516,7 @@ async def test_the_keys_of_leaving_stand_below_however_much_is_told(
         assert requested.question.query_one("#says").max_scroll_y > 0
 
 
-async def test_enter_on_control_says_why_nothing_is_asked() -> None:
+async def test_enter_on_control_says_why_nothing_is_requested() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("6")
         await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))

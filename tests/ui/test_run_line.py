@@ -62,7 +62,7 @@ def test_the_first_digit_replaces_the_proposal_and_the_rest_edit(keys: str, text
 
 
 @pytest.mark.parametrize("character", ["x", " ", "-", "e", "[", "²", "٣"])
-def test_what_no_number_has_is_not_taken(character: str) -> None:
+def test_keys_no_number_has_are_ignored(character: str) -> None:
     assert LINE.typed(character) is None
 
 

@@ -46,7 +46,7 @@ def test_the_first_digit_replaces_the_proposal(text: str, stands: str) -> None:
 
 
 @pytest.mark.parametrize("character", ["a", " ", "-", "\r", "²", "٣", "h"])
-def test_what_a_number_has_not_closes_the_line(character: str) -> None:
+def test_keys_not_in_the_number_close_the_line(character: str) -> None:
     assert LINE.typed(character) is None
 
 
@@ -76,7 +76,7 @@ def test_whatever_is_typed_is_short_and_has_one_point(text: str) -> None:
     assert found.text.count(".") <= 1
 
 
-def test_a_reference_past_the_limit_is_told_and_not_given() -> None:
+def test_a_reference_past_the_limit_is_reported_and_not_given() -> None:
     profile = library.load("atv71")
     readings = fakes.readings_of(profile, {"HSP": 500, "LSP": 0, "TFR": 600}, fakes.NOW)
     wrong = RunLine("forward", "60", "Hz", 0.0, 0).checked(profile, readings)

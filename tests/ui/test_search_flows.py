@@ -101,7 +101,7 @@ async def test_other_addresses_are_typed_in_place_and_remembered_for_the_line() 
         await until(pilot, lambda: app.opened is not None and field.value == "13-14")
 
 
-async def test_what_is_no_line_is_not_remembered() -> None:
+async def test_invalid_line_is_not_stored() -> None:
     app = DrivePanelApp(start="sim:")
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: "names no profile" in shown(app, "message"))
@@ -110,7 +110,7 @@ async def test_what_is_no_line_is_not_remembered() -> None:
         assert recent_lines() == []
 
 
-async def test_who_trips_when_left_alone_is_told_once() -> None:
+async def test_pending_timeout_is_reported_once() -> None:
     async with panel(DriveSpec("atv21", 1), DriveSpec("atv71", 2)) as (app, pilot):
         await until(pilot, lambda: app.connection.drives.option_count == 2)
         await pilot.press("escape")

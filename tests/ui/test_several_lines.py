@@ -62,7 +62,7 @@ async def test_another_line_opens_beside_and_both_are_marked_and_can_be_shown() 
         )
 
 
-async def test_a_fault_of_a_line_that_is_not_shown_counts_and_is_told_with_its_line() -> None:
+async def test_a_fault_of_a_line_that_is_not_shown_counts_and_is_reported_with_its_line() -> None:
     async with two_lines() as made:
         simulation = made.app.panel_lines[0].opened.simulation
         assert simulation is not None

@@ -36,7 +36,7 @@ async def test_a_text_sets_the_inputs_of_the_drive_shown_and_writes_nothing() ->
         assert writes(made.app) == before
 
 
-async def test_a_wrong_text_is_told_and_sets_nothing() -> None:
+async def test_a_wrong_text_is_reported_and_sets_nothing() -> None:
     async with bench("atv312") as made:
         await requested(made)
         await made.pilot.press(*"LI1=1,LI9=1", "enter")

@@ -44,7 +44,7 @@ async def test_space_stops_where_a_space_is_no_text(field: str) -> None:
 
 
 @pytest.mark.parametrize("number", [True, False])
-async def test_space_stops_where_a_number_is_asked_for_and_is_text_in_a_name(number: bool) -> None:
+async def test_space_stops_where_a_number_is_requested_and_is_text_in_a_name(number: bool) -> None:
     app = app_of()
     async with app.run_test() as pilot:
         app.push_screen(Ask("Save to", str, number=number))
@@ -68,7 +68,7 @@ async def test_f12_and_f9_stop_in_every_field_and_nothing_else_does() -> None:
         assert app.stop_stamp() == stamps[-1]
 
 
-async def test_keys_that_were_not_taken_are_told_of_without_markup() -> None:
+async def test_keys_that_were_not_taken_are_reported_without_markup() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         app.keys_not_taken(3)
@@ -83,7 +83,7 @@ async def test_keys_that_were_not_taken_are_told_of_without_markup() -> None:
         assert not app._notifications, "a toast is for a motor that does not stop"
 
 
-async def test_what_is_known_of_a_key_is_known_while_it_has_its_effect() -> None:
+async def test_key_state_is_known_while_it_applies() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         seen: list[object] = []

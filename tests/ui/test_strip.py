@@ -114,7 +114,7 @@ def test_a_trouble_of_the_line_moves_nothing_else(
             assert marked.rindex(part) == plain.rindex(part)
 
 
-def test_a_drive_that_is_not_heard_is_told_by_its_age() -> None:
+def test_a_drive_that_is_not_heard_is_reported_by_its_age() -> None:
     line = strip_line(VIEW._replace(drive=RUNS._replace(age=12.0)), 80).plain
     assert "? 12s ago" in line
     assert "FORWARD" not in line
@@ -130,7 +130,7 @@ def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
     assert style_of(unseen=False) == FAULT
 
 
-def test_who_commands_where_it_is_not_this_panel() -> None:
+def test_commander_of_drive_not_commanded_by_this_panel() -> None:
     for by in ("Terminals", "panel pts/12"):
         drive = RUNS._replace(armed=None, by=by)
         assert f"by {by}" in strip_line(StripView(drive=drive), 80).plain
@@ -144,7 +144,7 @@ def test_without_a_drive_the_strip_tells_the_line() -> None:
     assert "load  74 %" in line
 
 
-def test_a_long_name_of_a_line_hides_nothing_that_is_told_of_it() -> None:
+def test_a_long_name_of_a_line_hides_nothing_that_is_reported_it() -> None:
     path = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0 19200 8E1"
     view = StripView(line=f"{path} · only listened to", load=0.74, clock="14:02:11")
     reported = strip_line(view, 80).plain

@@ -67,7 +67,7 @@ async def test_two_looks_on_monitor_and_a_third_that_disagrees() -> None:
         assert writes(app) == []
 
 
-async def test_what_is_no_number_of_a_display_is_told_in_the_question() -> None:
+async def test_invalid_display_number_is_reported_in_question() -> None:
     async with bench("powerdrive") as made:
         await pick(made, "5.01")
         await made.pilot.press(*"fast")

@@ -52,7 +52,7 @@ async def reported(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
     return shown(app, "reasons")
 
 
-async def test_on_line_it_is_asked_by_the_address_and_the_profile_of_the_form(
+async def test_on_line_it_is_requested_by_the_address_and_the_profile_of_the_form(
     nobody: PtyPeer,
 ) -> None:
     async with on_line(nobody.path) as (app, pilot):

@@ -35,14 +35,14 @@ def file_of(form: PacketForm, path: Path) -> Path:
 
     def add(device: int, pdu: str, *, request: bool) -> None:
         nonlocal wall
-        packet = form.of_frame(device, bytes.fromhex(pdu), request=request)
+        packet = form.frame_packet(device, bytes.fromhex(pdu), request=request)
         blocks.append(packet_block(packet.data, wall, packet.comment))
         wall += 0.125
 
     for device, request, reply in EXCHANGES:
         add(device, request, request=True)
         add(device, reply, request=False)
-    if noise := form.of_noise(b"\x00\xff"):
+    if noise := form.noise_packet(b"\x00\xff"):
         blocks.append(packet_block(noise.data, wall, noise.comment))
     add(0, BROADCAST, request=True)
     path.write_bytes(b"".join(blocks))
@@ -111,7 +111,7 @@ def test_times_line_and_noise_are_in_the_file(peer: Peer, tmp_path: Path) -> Non
     assert found[-1][2] == "before it, no frame: 00 FF"
 
 
-def test_tshark_reads_raw_frames_as_it_is_told(peer: Peer, tmp_path: Path) -> None:
+def test_tshark_reads_raw_frames_as_configured(peer: Peer, tmp_path: Path) -> None:
     """By the very option that the command names, on a file with a checksum fault."""
     program = peer("tshark", "tshark")
     path = file_of(RtuForm(), tmp_path / "raw.pcapng")
@@ -129,10 +129,10 @@ def test_tshark_reads_raw_frames_as_it_is_told(peer: Peer, tmp_path: Path) -> No
 
 def test_raw_packets_are_the_bytes_of_the_line() -> None:
     form = RtuForm()
-    assert form.of_frame(1, bytes.fromhex("0318750005"), request=True).data.hex() == (
+    assert form.frame_packet(1, bytes.fromhex("0318750005"), request=True).data.hex() == (
         "010318750005" + "92b3"
     )
-    noise = form.of_noise(b"\x01")
+    noise = form.noise_packet(b"\x01")
     assert noise is not None
     assert noise.data == b"\x01"
 
@@ -148,5 +148,5 @@ def test_every_block_is_whole_words_long_and_says_so_twice(length: int) -> None:
 def test_sequence_numbers_begin_anew_past_their_end() -> None:
     form = ModbusTcpForm()
     for _ in range(0x10001):
-        packet = form.of_frame(1, bytes.fromhex("0318750005"), request=True)
+        packet = form.frame_packet(1, bytes.fromhex("0318750005"), request=True)
     assert struct.unpack(">H", packet.data[40:42])[0] == 1

@@ -73,7 +73,7 @@ def test_every_whole_frame_is_found_wherever_it_begins(data: bytes) -> None:
     assert frame_ends(data) == found
 
 
-def test_what_is_no_frame_does_not_end() -> None:
+def test_unfinished_frame_does_not_end() -> None:
     assert frame_end(b"") is None
     assert frame_end(bytes(range(1, 100))) is None
     assert frame_end(frame(1, bytes(254))) is None  # one byte more than a frame may have

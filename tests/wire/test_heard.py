@@ -147,7 +147,7 @@ def test_noise_right_before_a_request_does_not_take_it_along(noise: bytes) -> No
     assert [one.data for one in found] == [noise, READ, WORDS]
 
 
-def test_what_never_becomes_a_frame_is_given_up() -> None:
+def test_broken_frame_is_dropped() -> None:
     splitter = FrameSplitter()
     noise = bytes([0x55, 0x55]) * 3000
     given = b"".join(one.data for one in splitter.take(noise, 0.0))
@@ -201,7 +201,7 @@ def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]
         ((READ, reply_words(2, 1)), [(2, 3, "unasked"), (2, 3, "none")]),
     ],
 )
-def test_what_becomes_of_requests(
+def test_results_of_requests(
     readings: tuple[bytes, ...], reported: list[tuple[int, int, str]]
 ) -> None:
     assert answers(*readings) == reported

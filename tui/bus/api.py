@@ -1,4 +1,4 @@
-"""What sessions, screens and commands ask of a line: the Protocol `ModbusLine`.
+"""Requests that sessions, screens and commands make to a line: the Protocol `ModbusLine`.
 
 `tui.bus.line.Line` is the one for live drives, `tui.bus.fake.FakeLine` the one without a wire.
 Whatever only uses a line types against the Protocol; only who opens a line names `Line`. The
@@ -80,7 +80,7 @@ class ModbusLine(Protocol):
 
     @property
     def link(self) -> Link:
-        """What the line is reached by."""
+        """Serial port or connection of the line."""
 
     @property
     def read_only(self) -> bool:
@@ -88,7 +88,7 @@ class ModbusLine(Protocol):
 
     @property
     def timing(self) -> Timing:
-        """How long is waited for a reply."""
+        """Timeouts for replies."""
 
     @property
     def pace(self) -> Pace:
@@ -96,7 +96,7 @@ class ModbusLine(Protocol):
 
     @property
     def facts(self) -> SharedFacts:
-        """What the programs on the line know of each other: who commands, who stopped."""
+        """State shared by the programs on the line: commanders, stops."""
 
     @property
     def state(self) -> LineState:
@@ -104,7 +104,7 @@ class ModbusLine(Protocol):
 
     @property
     def counters(self) -> LineCounters:
-        """What has happened on the line so far."""
+        """Counts since the line was opened."""
 
     @property
     def trace(self) -> tuple[Frame, ...]:
@@ -120,7 +120,7 @@ class ModbusLine(Protocol):
         """Set what a device may be sent; nobody's device gets one word and no write."""
 
     def device_state(self, device: int) -> DeviceState:
-        """What the line has seen of a device."""
+        """Return what the line knows about a device."""
 
     async def read(
         self,

@@ -14,7 +14,7 @@ UNKNOWN_FATE = " Whether it was taken is not known; read the register back befor
 
 
 def without_fate(error: LineError) -> str:
-    """What an error says, once it was read what became of the write."""
+    """Return the text of an error once the result of the write was read."""
     return str(error).removesuffix(UNKNOWN_FATE)
 
 
@@ -77,7 +77,7 @@ class LineFailed(LineLost):
 ONE_BEHIND = "Replies are one behind"
 """Opens the text of a LineBehind."""
 OWNER_SILENT = "owns the line and does not answer"
-"""What a LineLost says of a frozen program of Drive Panel that has the line."""
+"""Text of a LineLost if a frozen program of Drive Panel holds the line."""
 
 
 class LineBusy(LineError):
@@ -141,7 +141,7 @@ class NoAnswer(ExchangeError):
 
 
 class ChecksumFault(ExchangeError):
-    """What came back was damaged or cut short; `received` are the bytes."""
+    """The reply was damaged or cut short; `received` are its bytes."""
 
     def __init__(
         self, device: int, function: int, address: int, detail: str = "", received: bytes = b""

@@ -1,4 +1,4 @@
-"""What the reply to a request must look like, down to every byte the request determines."""
+"""Form of the reply to a request, down to every byte that the request determines."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Expectation:
         return identification_extent(data, start)
 
     def fits(self, pdu: bytes) -> bool:
-        """Whether a whole reply is what was asked for."""
+        """Return True if a whole reply is what was asked for."""
         return bool(pdu) and self.extent(pdu) == len(pdu)
 
     def mismatch(self, pdu: bytes) -> str:

@@ -1,4 +1,4 @@
-"""Who hears what other programs on the line do."""
+"""Listeners for events of other programs on the line."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ class FakeLine:
         self.requests: list[Request] = []
         """All that was sent, in order; not what was refused before."""
         self.limits: dict[int, Limits] = {}
-        """What describe() was told."""
+        """Arguments of describe()."""
         self.state = LineState(LineStatus.CONNECTED, "", clock())
         self.counters = LineCounters()
         """Nothing is counted here, `requests` tells; may be set."""
@@ -157,7 +157,7 @@ class FakeLine:
         self.limits[device] = limits
 
     def device_state(self, device: int) -> DeviceState:
-        """What was set for the device, or what the requests so far have shown."""
+        """Return the state set for the device, or derived from the requests so far."""
         return self._device(device).state
 
     async def read(

@@ -24,7 +24,8 @@ UNKNOWN_FUNCTION, UNKNOWN_ADDRESS = 1, 2
 
 @dataclass(slots=True)
 class PlannedFailure:
-    """What is to go wrong; `times` is how often still, `taken` whether the words arrive."""
+    """A planned failure; `times` is how often it still happens, `taken` whether the words
+    arrive."""
 
     error: LineError | int
     address: int | None
@@ -32,7 +33,7 @@ class PlannedFailure:
     taken: bool = False
 
     def hits(self, request: Request) -> bool:
-        """Whether a request meets it."""
+        """Return True if a request meets it."""
         return self.times > 0 and (self.address is None or self.address in _span(request))
 
     def raised(self, request: Request) -> LineError:
@@ -52,12 +53,12 @@ class FakeDevice:
         self.identity: Mapping[int, bytes] | None = None
         """Objects of function 43/14; None where it does not know the function."""
         self.called: bytes | None = None
-        """What it answers to function 17; None where it does not know the function."""
+        """Reply to function 17; None if the device does not know the function."""
         self.silent = False
         self.seconds = 0.0
-        """How long each answer takes."""
+        """Delay of each answer in seconds."""
         self.state = DeviceState(None, 0, None, None, None, None, None)
-        """What the line has seen of it; may be set."""
+        """State of the device on the line; may be set."""
         self._failures: dict[str, list[PlannedFailure]] = {}
 
     def held(self, address: int, count: int) -> tuple[int, ...]:
@@ -75,13 +76,13 @@ class FakeDevice:
         self.words.update(zip(span, values, strict=True))
 
     def objects(self) -> IdentificationObjects:
-        """Who it is. Raises DeviceException where it does not know the function."""
+        """Return its identity. Raises DeviceException where it does not know the function."""
         if self.identity is None:
             raise refusal(self.number, Identify.function, 0, UNKNOWN_FUNCTION)
         return IdentificationObjects(1, self.identity)
 
     def own_words(self) -> IdentificationObjects:
-        """What it calls itself. Raises DeviceException where it does not know the function."""
+        """Return its own name. Raises DeviceException where it does not know the function."""
         if self.called is None:
             raise refusal(self.number, ReportId.function, 0, UNKNOWN_FUNCTION)
         return IdentificationObjects(0, {REFERENCE: self.called})
@@ -121,7 +122,7 @@ class FakeDevice:
 
 
 def refusal(device: int, function: int, address: int, code: int) -> DeviceException:
-    """What a device answers that does not do it."""
+    """Return the exception of a device that does not support it."""
     return DeviceException(device, function, address, code, STANDARD_EXCEPTIONS.get(code, ""))
 
 

@@ -1,4 +1,4 @@
-"""What a device says of itself by functions 43/14 and 17: objects out of checked replies."""
+"""Identity of a device by functions 43/14 and 17: objects from checked replies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one device may be sent: functions, lengths, windows, sub-functions, broadcasts."""
+"""Requests that one device accepts: functions, lengths, windows, sub-functions, broadcasts."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Window:
     fixed_start: bool
 
     def holds(self, address: int, count: int) -> bool:
-        """Whether a block of `count` words at `address` keeps to the window."""
+        """Return True if a block of `count` words at `address` keeps to the window."""
         if not self.min_words <= count <= self.max_words:
             return False
         if self.fixed_start:
@@ -63,7 +63,7 @@ Windows = Annotated[tuple[Window, ...], Meta(max_length=256)]
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one device takes; lengths in words, `exceptions` the meaning of its codes."""
+    """Limits of one device; lengths in words, `exceptions` the meaning of its codes."""
 
     functions: ByteValues
     max_read: RegisterCount
@@ -118,7 +118,7 @@ def send_refusal(
 
 
 def out_of_range(request: Request) -> str:
-    """What no Modbus device can be sent."""
+    """Return why no Modbus device can be sent this."""
     match request:
         case Read(address=address, count=count):
             return _bad_span(address, count, MAX_READ)
@@ -156,7 +156,7 @@ def _bad_words(values: tuple[int, ...]) -> str:
 
 
 def _too_long(request: Request, limits: Limits) -> str:
-    """What this device cannot be sent although Modbus allows it."""
+    """Return why this device cannot be sent it although Modbus allows it."""
     match request:
         case ReadInput(address=address, count=count):
             return _bad_block("read", address, count, limits.max_read_4, (), limits)

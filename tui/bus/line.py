@@ -95,7 +95,7 @@ class Line:
         self.timing = timing or timing_of(link)
         self.facts = SharedFacts(program)
         self.facts.gated = gated  # nothing is written to a device that is not armed
-        """What the programs on the line know of each other."""
+        """State shared by the programs on the line."""
         shared = partial(share, place) if place is not None else None
         self._engine = Engine(link, self.timing, clock, self.facts, shared)
         self.pace = self._engine.pace
@@ -120,7 +120,7 @@ class Line:
 
     @property
     def counters(self) -> LineCounters:
-        """What has happened on the line so far."""
+        """Counts since the line was opened."""
         return self._engine.tally.frozen()
 
     @property
@@ -137,7 +137,7 @@ class Line:
         self._devices.describe(device, limits)
 
     def device_state(self, device: int) -> DeviceState:
-        """What the line has seen of a device."""
+        """Return what the line knows about a device."""
         return self._devices.state(device)
 
     async def read(

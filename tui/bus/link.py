@@ -1,4 +1,4 @@
-"""What a line is reached by: a serial port, Modbus TCP, or RTU over TCP; parsing and labels."""
+"""Links of a line: a serial port, Modbus TCP, or RTU over TCP; parsing and labels."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def _host_and_port(text: str, rest: str) -> tuple[str, int | None]:
 
 
 def label(link: Link) -> str:
-    """How the link is written: `serial:/dev/ttyUSB0,19200,8E1`, `tcp:10.0.0.5:502`."""
+    """Return the link as it is written: `serial:/dev/ttyUSB0,19200,8E1`, `tcp:10.0.0.5:502`."""
     timeout = "" if link.timeout is None else f",timeout={link.timeout:g}"
     match link:
         case SerialLink(path, baud, format_):

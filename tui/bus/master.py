@@ -1,4 +1,4 @@
-"""What sends a request and waits for its reply, whatever the line is made of."""
+"""Interface that sends a request and waits for its reply, over any kind of line."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Sending:
 
 @dataclass(slots=True)
 class LineContext:
-    """What a master notes its doings in."""
+    """Place for the log of a master."""
 
     timing: Timing
     trace: Trace
@@ -50,7 +50,7 @@ class Master(Protocol):
     """One opened line, one request at a time."""
 
     echo: bool | None
-    """Whether the adapter repeats what is sent, None while not known."""
+    """True if the adapter repeats what is sent, None while not known."""
     failure: LineLost | None
     """Why the line cannot be used any more."""
 

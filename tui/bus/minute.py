@@ -18,7 +18,7 @@ class MinuteWindow:
     def __init__(self, copied: LastMinute | None = None) -> None:
         self._buckets: tuple[tuple[int, tuple[int, ...]], ...] = ()
         self._copied = copied
-        """What the program that owns the line has counted; None where this one counts."""
+        """Counts of the program that owns the line; None if this one counts."""
         self._summed: tuple[object, int, LastMinute] = (None, 0, LastMinute())
         """The last sum, of which buckets and in which bucket: it is looked at more often."""
 

@@ -23,7 +23,7 @@ from .errors import BytesSwapped, ChecksumFault, DeviceException, NoAnswer, Wron
 
 
 class Priority(IntEnum):
-    """What goes out first; within one priority, first come first served."""
+    """Order of sending; within one priority, first come first served."""
 
     STOP = 0
     FEED = 1
@@ -37,7 +37,7 @@ class Priority(IntEnum):
 
 
 class LineStatus(Enum):
-    """Whether the line can be used now."""
+    """True if the line can be used now."""
 
     CLOSED = "closed"
     CONNECTING = "connecting"
@@ -79,10 +79,10 @@ def contact_of(error: BaseException) -> Contact:
 
 @dataclass(frozen=True, slots=True)
 class DeviceState:
-    """What the line has seen of one device."""
+    """Knowledge of the line about one device."""
 
     answers: bool | None
-    """Whether its last request was answered; None before the first."""
+    """True if its last request was answered; None before the first."""
     failures: Number
     """Requests not answered in a row."""
     silent_since: MonotonicTime | None
@@ -116,7 +116,7 @@ class Reply:
     """A checked reply; `time` when its last byte was on the wire."""
 
     words: tuple[int, ...]
-    """What it brings, where that is registers."""
+    """Registers that the reply contains, if it contains any."""
     time: float
     pdu: bytes = b""
     """Function and data as they came; empty where nobody answers a broadcast."""
@@ -176,7 +176,7 @@ class LastMinute:
 
 @dataclass(frozen=True, slots=True)
 class DeviceCounters:
-    """What was exchanged with one device since the line was opened; device 0 is all of them."""
+    """Counts of one device since the line was opened; device 0 is all of them."""
 
     requests: Number = 0
     """Frames that were sent to it, repeated ones too."""
@@ -201,7 +201,7 @@ class DeviceCounters:
 
 @dataclass(frozen=True, slots=True)
 class LineCounters:
-    """What happened on a line since it was opened."""
+    """Counts of a line since it was opened."""
 
     requests: Number = 0
     replies: Number = 0
@@ -247,7 +247,7 @@ class Timing:
     patient_timeout: float = 0.8
     """The same where it is asked once more."""
     late_reply: float = 2.0
-    """How long after a request its reply may still come; a request whose reply could be
+    """Seconds after a request in which its reply may still come; a request whose reply could be
     mistaken for it is held back until then."""
     turnaround_delay: float = 0.1
     """Quiet time after a broadcast."""
@@ -263,7 +263,7 @@ class Timing:
     frame_gap_tcp: float = 0.08
     """The same for RTU over TCP."""
     wire_time: bool | None = None
-    """Whether bytes take the time of their baud, so that a reply which began before its request
+    """True if bytes take the time of their baud, so that a reply which began before its request
     was over is another's. None: on every serial port that is no pseudo-terminal."""
     probes: bool = True
     """True if a drive must prove that its replies belong to their requests before they count."""

@@ -46,7 +46,7 @@ class PollPlan(msgspec.Struct, frozen=True):
 
     @property
     def rates(self) -> dict[PlannedRead, float]:
-        """How often each read is sent in a second."""
+        """Rate of each read per second."""
         each = 1.0 / (self.period * len(self.turns))
         found: dict[PlannedRead, float] = {}
         for turn in self.turns:

@@ -57,6 +57,6 @@ class Program(msgspec.Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """How people are told of it: `panel on pts/3 (pid 812)`."""
+        """Name of the program for people: `panel on pts/3 (pid 812)`."""
         where = f" on {readable(self.where, LONGEST_NAME)}" if self.where else ""
         return f"{readable(self.name, LONGEST_NAME)}{where} (pid {self.pid})"

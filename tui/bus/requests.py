@@ -48,7 +48,7 @@ class Request(ABC):
 
     @abstractmethod
     def expectation(self) -> Expectation:
-        """What the reply must look like."""
+        """Return the form of the reply."""
 
     @property
     def register(self) -> int:

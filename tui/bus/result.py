@@ -1,4 +1,4 @@
-"""How an exchange on the line ended, whatever the line is made of."""
+"""Result of an exchange, over any kind of line."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Piece:
 
 
 class ResultKind(Enum):
-    """How an exchange ended."""
+    """Result of an exchange, by kind."""
 
     REPLY = "reply"
     EXCEPTION = "exception"

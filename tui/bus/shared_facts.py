@@ -1,4 +1,4 @@
-"""What all programs on one line must know of each other: who is there, who commands, who stopped.
+"""State shared by all programs on one line: programs, commanders, stops.
 
 A line that nobody shares has such facts too: then this program is the only one.
 """
@@ -21,7 +21,7 @@ from .share.voices import LineVoice
 from .stop_counts import GivenStops, StopCounts
 
 DEPARTED_KEPT = 16
-"""How many programs that left are remembered."""
+"""Number of departed programs that are remembered."""
 
 
 class SharedFacts(FactsHeard):
@@ -40,7 +40,7 @@ class SharedFacts(FactsHeard):
         self.paused: Mapping[int, tuple[str, str]] = MappingProxyType({})
         """Devices that nobody asks now: by whose id, and why."""
         self.stops = StopCounts()
-        """How many stops each device was given, by all programs."""
+        """Stops given to each device, by all programs."""
         self.leases = WriteLeases(self.me.id, self.stops, self._tell)
         """Which program may write to which device."""
         self.keep_alives = KeepAlives(self.me.id, self._tell)

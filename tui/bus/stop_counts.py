@@ -1,4 +1,4 @@
-"""How many stops each device was given, by which program; two tellings of one stop count once.
+"""Stops given to each device, by program; a stop reported twice counts once.
 
 A write carries the count that its program knew of: one that is older than a stop does not go out.
 Counts wrap: no number that another program sends keeps a later stop from changing the total.
@@ -40,10 +40,10 @@ class StopCounts:
 
     def __init__(self) -> None:
         self.totals: Mapping[int, int] = MappingProxyType({})
-        """How many stops each device was given, by all programs."""
+        """Stops given to each device, by all programs."""
         self.given: GivenStops = MappingProxyType({})
         self.by: Mapping[int, str] = MappingProxyType({})
-        """Who gave the last one of each device, as people are told."""
+        """Name of the program of each device's last stop."""
         self.times: Mapping[int, float] = MappingProxyType({})
         """When the last one of each device was given (monotonic), by whichever program."""
         self._lock = threading.RLock()
@@ -55,7 +55,7 @@ class StopCounts:
         return sum(self.totals.values()) % STOPS_WRAP
 
     def of(self, program: str, devices: Iterable[int]) -> tuple[int, ...]:
-        """How often a program has stopped each device."""
+        """Return how often a program has stopped each device."""
         return tuple(self.given.get(device, {}).get(program, 0) for device in devices)
 
     def give(self, program: str, devices: tuple[int, ...], by: str) -> None:

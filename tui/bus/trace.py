@@ -19,7 +19,7 @@ class Frame:
     direction: FrameDirection
     data: bytes
     note: str = ""
-    """What the frame is: empty for a request or its reply, else why it is out of the ordinary."""
+    """Remark on the frame: empty for a request or its reply, else what is unusual."""
 
 
 LOOKED_LATELY = 5.0
@@ -51,5 +51,5 @@ class Trace:
 
     @property
     def looked_at(self) -> bool:
-        """Whether somebody looked at the frames in the last seconds."""
+        """True if somebody looked at the frames in the last seconds."""
         return monotonic() - self._looked < LOOKED_LATELY

@@ -76,7 +76,7 @@ Exit status:
   130  ended by Ctrl-C
 """
 AS_JSON = "drivepanel.json"
-"""Where the context keeps whether JSON was asked for."""
+"""Key of the context for the option --json."""
 COMPLETE = "_DRIVEPANEL_COMPLETE"
 """The environment variable by which a shell asks what may be typed."""
 VERBOSE = frozenset({"-v", "-vv", "-vvv", "--verbose"})
@@ -180,7 +180,7 @@ class Commands(click.Group):
 
 
 def no_such_command(name: str) -> str:
-    """What is wrong with a word that is neither a command nor a LINE."""
+    """Return the error for a word that is neither a command nor a LINE."""
     from difflib import get_close_matches
 
     near = get_close_matches(name.lower(), COMMANDS, n=1)

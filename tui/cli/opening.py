@@ -75,7 +75,7 @@ def open_panel(
 
 
 def _drive_documents() -> DriveDocuments:
-    """How commands write their JSON about a drive; they are imported for it."""
+    """Import and return the JSON documents of drives."""
     from .shared.drive_documents import drive_documents
 
     return drive_documents()

@@ -1,1 +1,1 @@
-"""What a drive is: its profile, parameters, values, words and state chart; no line, no screen."""
+"""Model of a drive: profile, parameters, values, words and state chart; no line, no screen."""

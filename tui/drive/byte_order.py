@@ -1,4 +1,4 @@
-"""Whether the bytes of words arrive swapped, by what a profile documents. Pure functions."""
+"""True if the bytes of words arrive swapped, by what a profile documents. Pure functions."""
 
 from __future__ import annotations
 

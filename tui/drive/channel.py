@@ -1,4 +1,4 @@
-"""Who commands a drive and who gives its reference now, by the channels that its words tell."""
+"""Commander of a drive and source of its reference, from its channel words."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class Channel:
     """The channel in force."""
 
     text: str
-    """Who it is, as a person reads it; empty where it is not known."""
+    """Name of the channel for a person; empty if it is not known."""
     by_line: bool | None
-    """Whether it is this line; None where it is not known."""
+    """True if it is this line; None where it is not known."""
     parameter: Parameter | None = None
     """The word that tells it, or that was not read and decides."""
-    of_several: bool = False
-    """Whether another word counts under other conditions."""
+    is_several: bool = False
+    """True if another word counts under other conditions."""
 
 
 NOT_TOLD = Channel("", None)
@@ -29,13 +29,13 @@ NOT_TOLD = Channel("", None)
 
 
 def command_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | None:
-    """Who commands; None where the profile has no words for it."""
+    """Return the commanding channel; None if the profile has no words for it."""
     rows = profile.data.channels.command
     return _in_force(profile, rows, raws) if rows else None
 
 
 def reference_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | None:
-    """Who gives the reference; None where the profile has no words for it."""
+    """Return the reference channel; None if the profile has no words for it."""
     rows = profile.data.channels.reference
     return _in_force(profile, rows, raws) if rows else None
 
@@ -51,7 +51,7 @@ def channel_codes(profile: Profile) -> list[str]:
 
 
 def switch_texts(profile: Profile, raws: Mapping[str, int]) -> list[str]:
-    """What can bring another channel into force, or changes what follows then; sentences."""
+    """Return sentences on what can change the channel, or follows from a change."""
     found = []
     for switch in profile.data.channels.switches:
         raw = raws.get(switch.parameter)

@@ -12,7 +12,7 @@ from .profile.schema import ChannelBits, Chart, DirectionBit, State, StateKind, 
 
 UNKNOWN = State(id="unknown", name="Unknown", kind="unknown", mask=0, value=0)
 TOLD_FAULT = State(id="fault", name="Fault", kind="fault", mask=0, value=0)
-"""What a fault word tells where the chart has no state for it."""
+"""State for a fault word if the chart has none."""
 ENABLED_KINDS: frozenset[StateKind] = frozenset({"running", "stopping"})
 """Kinds of state in which the drive may turn its motor."""
 Direction = Literal["forward", "reverse"]
@@ -20,7 +20,7 @@ Direction = Literal["forward", "reverse"]
 
 @dataclass(frozen=True, slots=True)
 class ChartState:
-    """What the status words say; a part is None where its word was not read."""
+    """State from the status words; a part is None if its word was not read."""
 
     state: State
     """The state in force: a fault where the fault word tells one, whatever the status word."""
@@ -31,9 +31,9 @@ class ChartState:
     alarm: bool | None = None
     local: bool | None = None
     channel: str = ""
-    """Who commands the drive, where its words tell it."""
+    """Commander of the drive, if its words show it."""
     reference: str = ""
-    """Who gives its reference, where its words tell it."""
+    """Source of its reference, if its words show it."""
 
     @property
     def kind(self) -> StateKind:
@@ -124,7 +124,7 @@ def _direction(mark: DirectionBit | None, raws: Mapping[str, int]) -> Direction 
 
 
 def _commanded_by(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> str:
-    """Who commands: by the channels of the profile, else by bits of the chart."""
+    """Return the commander: by the channels of the profile, else by bits of the chart."""
     found = command_channel(profile, raws)
     return found.text if found is not None else _channel(chart.channel, raws)
 

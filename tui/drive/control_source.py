@@ -19,7 +19,7 @@ class SourceChange:
 
     @property
     def verified(self) -> bool:
-        """Whether a document in hand confirms the parameter's address."""
+        """True if a document in hand confirms the parameter's address."""
         return is_verified(self.parameter)
 
 

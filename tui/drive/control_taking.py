@@ -1,4 +1,4 @@
-"""Whether a drive's control can be taken from its terminals, and given back; pure."""
+"""True if a drive's control can be taken from its terminals, and given back; pure."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class ControlTaking:
     can_take: bool
     can_give_back: bool
     taken: bool | None
-    """Whether the line has it; None where no word tells."""
+    """True if the line has it; None where no word tells."""
 
 
 def control_taking(profile: Profile, raws: Mapping[str, int]) -> ControlTaking | None:
-    """What can be done about a drive's control; None where it has neither command."""
+    """Return what can be done about a drive's control; None if it has neither command."""
     chart = chart_in_force(profile, raws)
     if chart is None:
         return None

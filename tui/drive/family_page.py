@@ -1,4 +1,4 @@
-"""What a person has to know of a family around its line: one page, in sections.
+"""Family page: facts about the line of a family, in sections.
 
 Warnings first, then waiting, pins, rules, addresses, servers, lamps, commands, and where its
 manuals are wrong. Made from the profile alone.
@@ -24,7 +24,7 @@ SURENESS: dict[Confidence, str] = {
     "analogy": "sister family ?",
     "unverified": "not verified ?",
 }
-"""How surely a thing is known, where no manual of the family says it."""
+"""Certainty of a fact that no manual of the family states."""
 HEAD_WIDTH = 18
 """Columns of what stands before a text, an indent of two and a space behind it among them."""
 MARKS, MARK_WIDTH = ("!", "*"), 4

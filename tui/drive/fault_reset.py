@@ -53,7 +53,7 @@ def not_in_command(profile: Profile, raws: Mapping[str, int]) -> str:
         return ""
     chart = chart_in_force(profile, raws)
     held = held_back(profile, chart, "forward", raws) if chart is not None else None
-    why = (held.text, held.remedy) if held is not None and held.of_channel else ()
+    why = (held.text, held.remedy) if held is not None and held.by_channel else ()
     return " ".join(
         part for part in (f"{NOT_IN_COMMAND}, and the drive is still in fault.", *why) if part
     )
@@ -66,7 +66,7 @@ def command_holder(profile: Profile, raws: Mapping[str, int]) -> Literal["line",
         return None if found.by_line is None else "line" if found.by_line else "others"
     chart = chart_in_force(profile, raws)
     held = held_back(profile, chart, "forward", raws) if chart is not None else None
-    return "others" if held is not None and held.of_channel else None
+    return "others" if held is not None and held.by_channel else None
 
 
 def closed_inputs(profile: Profile, raws: Mapping[str, int]) -> str:

@@ -1,4 +1,4 @@
-"""What profiles tell about finding drives on a line: settings, turnaround, reads, timeouts."""
+"""Facts of profiles for scanning: settings, turnaround, reads, timeouts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .profile.schema import LinkSettings
 T = TypeVar("T")
 
 FACTORY_SHARE = Decimal("0.5")
-"""How many of the drives of a family are taken to be as they left the factory, in each setting."""
+"""Share of a family's drives assumed to have factory settings, for each setting."""
 SLOW_BELOW = 1200
 """Baud rates below it are tried last, unless a family leaves the factory so: an address costs
 0.2 s and more there."""
@@ -41,11 +41,12 @@ class LineSetting:
 
     @property
     def slow(self) -> bool:
-        """Whether it is tried last, and only after that was said."""
+        """True if it is tried last, and only after that was said."""
         return self.baud < SLOW_BELOW
 
     def hears(self, other: LineSetting) -> bool:
-        """Whether a drive of the one setting may understand the other: but for stop bits alike."""
+        """Return True if a drive of the one setting may understand the other: but for stop bits
+        alike."""
         return (self.baud, self.format[:2]) == (other.baud, other.format[:2])
 
 
@@ -58,7 +59,7 @@ class WatchingFamily:
     code: str
     """The parameter that sets its timeout."""
     sure: bool
-    """Whether a document says so; it is taken so where none does."""
+    """True if a document says so; it is taken so where none does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +100,10 @@ def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[Li
     """
     shares: dict[LineSetting, Decimal] = {}
     for link in links:
-        for baud, of_baud in _shares(link.baud, link.bauds).items():
-            for form, of_form in _shares(link.format, link.formats).items():
+        for baud, baud_share in _shares(link.baud, link.bauds).items():
+            for form, form_share in _shares(link.format, link.formats).items():
                 one = LineSetting(baud, form)
-                shares[one] = shares.get(one, Decimal(0)) + of_baud * of_form
+                shares[one] = shares.get(one, Decimal(0)) + baud_share * form_share
     factory = {LineSetting(link.baud, link.format) for link in links}
 
     def worth(one: LineSetting) -> tuple[bool, bool, float, int, str]:
@@ -131,7 +132,7 @@ def names_text(names: Sequence[str]) -> str:
 
 
 def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
-    """How likely each value is: the factory's half of the time, the others alike."""
+    """Return how likely each value is: half for the factory's, the rest shared evenly."""
     others = [one for one in dict.fromkeys(all_of_them) if one != factory]
     if not others:
         return {factory: Decimal(1)}
@@ -172,7 +173,7 @@ def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
 
 
 def watching_text(families: Sequence[WatchingFamily]) -> str:
-    """Who acts when it was asked once and is asked no more, in a sentence; empty where nobody."""
+    """Name the families that react to lost polling, in a sentence; empty for none."""
     sure = ", ".join(f"{one.name} ({one.code})" for one in families if one.sure)
     likely = ", ".join(f"{one.name} ({one.code})" for one in families if not one.sure)
     if not families:

@@ -23,7 +23,7 @@ class FirstWord:
     address: int
     word: int
     code: str
-    """What the register is called by those families."""
+    """Name of the register in those families."""
     order: OrderId
     families: tuple[StopFacts, ...]
 
@@ -66,7 +66,7 @@ class StopPlace:
 
 
 def stop_places(families: Sequence[StopFacts], named: Sequence[str] = ()) -> list[StopPlace]:
-    """Where families are stopped: those named first, then those that a wrong word meets silence in.
+    """Return the stop registers of families: named ones first, then those that ignore a wrong word.
 
     The others refuse at once a word that they do not have.
     """
@@ -161,7 +161,7 @@ def blind_stops(families: Sequence[StopFacts]) -> list[FirstWord]:
 
 
 def _stopped_by(family: StopFacts, address: int, word: int, raws: Mapping[int, int]) -> bool:
-    """Whether a word stops a family in every chart that may be in force."""
+    """Return True if a word stops a family in every chart that may be in force."""
     known = _known(family, raws)
     charts = _charts(family, known)
     return bool(charts) and all(
@@ -189,7 +189,7 @@ def _charts(family: StopFacts, known: Mapping[str, int]) -> list[Chart]:
 
 
 def _holds(order: Order, chart: Chart, known: Mapping[str, int]) -> bool:
-    """Whether an order surely may be given now."""
+    """Return True if an order surely may be given now."""
     if any(not when.holds(known) for when in order.when):
         return False
     if not order.states:

@@ -1,4 +1,4 @@
-"""What a write from a program that is not ours would do to a drive; pure functions of a profile.
+"""Effect of a write by a foreign program on a drive; pure functions of a profile.
 
 A SCADA knows registers, not what they mean: each word is told apart here into settings, commands,
 and words that can do nothing but stop the motor.
@@ -28,7 +28,7 @@ StartDirection = Literal["forward", "reverse"]
 
 
 class WordKind(Enum):
-    """What a word does."""
+    """Kind of a word's effect."""
 
     SETTING = "setting"
     COMMAND = "command"
@@ -61,7 +61,7 @@ def _places(profile: Profile) -> Mapping[int, tuple[Parameter, ...]]:
 def foreign_words(
     profile: Profile, words: Mapping[int, int], raws: Mapping[str, int]
 ) -> list[ForeignWord]:
-    """What each word of a write does, given what was surely read of the drive just now."""
+    """Return the effect of each word of a write, given what was surely read just now."""
     return [_word(profile, address, word, raws) for address, word in words.items()]
 
 
@@ -81,7 +81,7 @@ def parameters_at(words: Collection[ForeignWord]) -> list[Parameter]:
 
 
 def starts_by(profile: Profile, words: Collection[ForeignWord]) -> StartDirection | None:
-    """Whether words may start the motor, and which way by what is known; None where none may.
+    """Return the direction in which words may start the motor; None if none may.
 
     Every command counts but a reference, which starts nothing that no command has enabled.
     """
@@ -114,7 +114,7 @@ def _ordered(profile: Profile) -> frozenset[str]:
 
 
 def only_stops(profile: Profile, parameter: Parameter, word: int, raws: Mapping[str, int]) -> bool:
-    """Whether a word stops the motor in every chart that may be in force, and in its state.
+    """Return True if a word stops the motor in every chart that may be in force, and in its state.
 
     A stop of one chart runs the motor in another: what is not known lets no word pass.
     """
@@ -149,7 +149,7 @@ def _is_stop(
 
 
 def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, int]) -> bool:
-    """Whether the words carry out an order that stops, should what it depends on be so."""
+    """Return True if the words carry out an order that stops, should what it depends on be so."""
     if order.id not in WAYS_TO_STOP or len(order.words) != 1:
         return False
     place = order_target(profile, chart, order)

@@ -15,25 +15,25 @@ from .profile.schema import Chart, OrderId
 IN_FAULT = "The drive is in fault: reset it first."
 
 WayOut = Literal["", "set-up", "take-control"]
-"""What opens the way: nothing from here, another control source, taking the control."""
+"""Remedies: none by Drive Panel, another control source, taking control."""
 
 
 @dataclass(frozen=True, slots=True)
 class HeldBack:
-    """What speaks against a command now."""
+    """Reason against a command now."""
 
     text: str
     remedy: str = ""
-    """What is to be done, as a sentence."""
+    """Remedy as a sentence."""
     way: WayOut = ""
-    of_channel: bool = False
-    """Whether somebody else commands the drive."""
+    by_channel: bool = False
+    """True if somebody else commands the drive."""
 
 
 def held_back(
     profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]
 ) -> HeldBack | None:
-    """What speaks against a command, as far as is known; a word that decides and is not does."""
+    """Return the reason against a command, as far as known; an unknown deciding word is one."""
     if (lock := locked_by(chart, id, raws)) is not None:
         if lock.parameter not in raws:
             return HeldBack(f"{lock.parameter} is not known, and it decides: {lock.text}")
@@ -49,7 +49,7 @@ def held_back(
         shown = raws[when.parameter] if value is None else value
         text = f"The drive is not commanded by Modbus: {when.parameter} is {shown}."
         way: WayOut = "take-control" if _takes_control(profile, chart, when.parameter) else ""
-        return HeldBack(text, "", way, of_channel=True)
+        return HeldBack(text, "", way, by_channel=True)
     return None
 
 
@@ -72,18 +72,18 @@ def _by_others(profile: Profile, found: Channel) -> HeldBack:
     """Somebody else commands, or who does is not known."""
     word = found.parameter
     if word is None:
-        return HeldBack("Who commands the drive is not known.", of_channel=True)
+        return HeldBack("Who commands the drive is not known.", by_channel=True)
     if found.by_line is None:
         return HeldBack(f"{word.code} is not known, and it decides who commands the drive.")
-    counts = ", which counts," if found.of_several else ""
+    counts = ", which counts," if found.is_several else ""
     name = f"{word.name[0].lower()}{word.name[1:]} ({word.code}){counts}"
     text = f"The drive is not commanded by Modbus: {name} is {found.text}."
     way: WayOut = "set-up" if profile.data.control_sources else ""
-    return HeldBack(text, profile.data.channels.remedy, way, of_channel=True)
+    return HeldBack(text, profile.data.channels.remedy, way, by_channel=True)
 
 
 def _is_set_up(profile: Profile, code: str) -> bool:
-    """Whether a way of commanding the drive, as it is set up from here, sets this word."""
+    """Return True if a way of commanding the drive, as it is set up from here, sets this word."""
     sources = profile.data.control_sources
     written = {setting.parameter for source in sources for setting in source.settings}
     return code in written or profile[code].quantity == "command_channel"

@@ -1,4 +1,4 @@
-"""What a fault or an alarm points at, in words that screens, commands and reports share."""
+"""Causes of a fault or an alarm, in words shared by screens, commands and reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TRUST: Mapping[HelpConfidence, str] = {
     "public": "public guide",
     "practice": "general practice",
 }
-"""How surely the first cause is known, in words."""
+"""Certainty of the first cause, in words."""
 RESETS: Mapping[ResetWay | None, str] = {
     "by-reset": "{by} once the cause is gone.",
     "automatic": "{by} once the cause is gone, or the automatic restart, if it is on.",
@@ -51,7 +51,7 @@ class FaultAdvice:
 
 @dataclass(frozen=True, slots=True)
 class ResetText:
-    """How a fault ends, in a sentence or two, and whether the drive itself says so."""
+    """Reset of a fault, in a sentence or two, and whether the drive itself states it."""
 
     text: str
     by_drive: bool
@@ -61,7 +61,7 @@ class ResetText:
 def reset_text(
     help_: FaultHelp | None, ready: bool | None, by: str, follows: str = MAY_START
 ) -> ResetText:
-    """How a fault ends; `by` names what resets it: a key, or the command.
+    """Return how a fault is reset; `by` names the key or the command.
 
     `ready` is what the drive says of it now, None where it says nothing. The drive is believed
     before what is only recalled. `follows` is the motor's reaction, of `reset_follows`.
@@ -75,7 +75,7 @@ def reset_text(
 
 
 def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
-    """Whether the drive says that a reset can work now; None where it does not tell."""
+    """Return True if the drive says that a reset can work now; None where it does not tell."""
     reported = profile.data.faults.reset_ready
     raw = raws.get(reported.parameter) if reported else None
     if reported is None or raw is None:
@@ -138,7 +138,7 @@ def alarms_on(profile: Profile, raws: Mapping[str, int]) -> list[tuple[str, int,
 def hint_markdown(
     profile: Profile, hint: Hint, left: FaultAdvice, value: Callable[[str], str], reset: str = ""
 ) -> list[str]:
-    """What is known of a fault as lines of Markdown; `value` tells what a parameter holds."""
+    """Return facts about a fault as lines of Markdown; `value` returns what a parameter holds."""
     lines = []
     if left.probable:
         lines.append(f"- Probably ({TRUST[left.confidence]}): {_joined(left.probable)}")

@@ -70,7 +70,7 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
 
 
 def follows_from(chart: Chart, id: OrderId) -> str:
-    """What follows from an order besides, for whoever is asked before it is given."""
+    """Return the consequences of a command, for the person who confirms it."""
     return " ".join(dict.fromkeys(o.follows for o in chart.orders if o.id == id and o.follows))
 
 
@@ -116,14 +116,14 @@ def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order
 
 
 def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:
-    """Whether a chart may be the one in force."""
+    """Return True if a chart may be the one in force."""
     if chart.when is None:
         return True
     return chart.when.holds(raws) is not False
 
 
 def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int]) -> bool:
-    """Whether words at a place stop a motor in a chart, in whichever state it is."""
+    """Return True if words at a place stop a motor in a chart, in whichever state it is."""
     return any(
         order.id in GENTLE_FIRST
         and not order.when
@@ -135,13 +135,14 @@ def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int
 
 
 def last_word(chart: Chart, order: Order) -> Order | None:
-    """What ends operation once an order that leaves it enabled has brought the motor to 0 Hz."""
+    """Return the command that ends operation after an enabled ramp stop to 0 Hz."""
     same = (one for one in chart.orders if one.id == order.id and not one.states and not one.when)
     return next((one for one in same if one is not order), None) if order.states else None
 
 
 def stop_alike(profiles: Sequence[Profile]) -> bool:
-    """Whether the same words stop the drives of all these families, told by the same states."""
+    """Return True if the same words stop the drives of all these families, told by the same
+    states."""
     ways = [_ways_to_stop(profile) for profile in profiles]
     return bool(ways) and all(one == ways[0] for one in ways)
 
@@ -229,7 +230,7 @@ def optional_bits(chart: Chart, code: str) -> int:
 
 
 def order_target(profile: Profile, chart: Chart, order: Order) -> Parameter:
-    """Where the words of an order go."""
+    """Return the register of a command's words."""
     return profile[order.parameter or chart.command]
 
 

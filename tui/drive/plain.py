@@ -12,7 +12,7 @@ import unicodedata
 from collections.abc import Iterable
 
 PICTURES = 0x2400
-"""Where Unicode has the pictures of the first 32 control characters: ␀ to ␟."""
+"""Offset of the Unicode pictures of the first 32 control characters: ␀ to ␟."""
 DELETE = "␡"
 UNSHOWN = "\ufffd"
 """For what has no picture: C1 controls, marks of direction, halves of characters."""
@@ -46,7 +46,7 @@ def escaped_toml(text: str) -> str:
 
 
 def commands(character: str) -> bool:
-    """Whether a character could command a terminal, or show nothing at all."""
+    """Return True if a character could command a terminal, or show nothing at all."""
     return unicodedata.category(character) in COMMANDING
 
 

@@ -31,7 +31,7 @@ READ_WRITE_CHARACTERS = 13
 
 @dataclass(frozen=True, slots=True)
 class WireTiming:
-    """What the line takes for an exchange; all in seconds."""
+    """Time of an exchange on the line, in seconds."""
 
     character: float = 11 / 19200
     silence: float = 3.5 * 11 / 19200
@@ -61,7 +61,7 @@ class WireTiming:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a parameter's words stand in a reply: the offset of the first one."""
+    """Place of a parameter's words in a reply: the offset of the first one."""
 
     code: str
     offset: int
@@ -160,7 +160,7 @@ class _Stretch:
     checked: bool
 
     def brings(self, wanted: Mapping[str, Parameter]) -> bool:
-        """Whether any of its words is wanted."""
+        """Return True if any of its words is wanted."""
         return any(place.code in wanted for place in self.request.places)
 
 

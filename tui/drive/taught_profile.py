@@ -29,7 +29,7 @@ def why_not_taught(family: Profile, code: str) -> str:
 
 
 def is_raw(family: Profile, parameter: Parameter) -> bool:
-    """Whether a parameter is shown raw since no document tells its scale.
+    """Return True if a parameter is shown raw since no document tells its scale.
 
     A document may tell what it is and leave its scale open, as a cover diagram does.
     """
@@ -46,7 +46,7 @@ def teachable_codes(family: Profile) -> list[str]:
 
 
 def reference_of(family: Profile, code: str) -> TeachableReference | None:
-    """What is known of a parameter that may take the reference once it was taught, or None."""
+    """Return the facts on a parameter that can become the reference once taught, or None."""
     found = family.data.teachable_references
     return next((one for one in found if one.parameter == code), None)
 

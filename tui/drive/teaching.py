@@ -27,7 +27,7 @@ USUAL_SCALES = tuple(
 )
 """Steps of 2, 5 and 2.5, and rpm of 1 or 0.1 Hz with 1 to 5 pole pairs."""
 SCALES = (*POWERS_OF_TEN, *USUAL_SCALES)
-"""What one count may be worth, the likeliest first."""
+"""Possible values of one count, the likeliest first."""
 UNITS = ("Hz", "rpm", "A", "V", "kW", "W", "%", "s", "ms", "°C", "Nm", "h", "kWh")
 """Units that are usual on drives, as they are written here."""
 _ALIASES = {
@@ -56,12 +56,12 @@ class DisplayLook:
 
 @dataclass(frozen=True, slots=True)
 class TaughtScale:
-    """What one count of a word is worth, as looks at the drive's display have told."""
+    """Value of one count of a word, learned from readings of the drive's display."""
 
     scale: Decimal
     unit: str
     signed: bool | None
-    """Whether words from 32768 on are negative; None while no look has told."""
+    """True if words from 32768 on are negative; None while no look has told."""
 
     def number(self, raw: int) -> Decimal | None:
         """The value of a raw word; None where its sign is not known."""
@@ -74,12 +74,12 @@ class TaughtScale:
 
     @property
     def text(self) -> str:
-        """What one count is worth, for a person."""
+        """Value of one count, for a person."""
         return f"1 count is {self.scale:f} {self.unit}".rstrip()
 
 
 class LessonKind(StrEnum):
-    """What a look has come to."""
+    """Result of a reading, by kind."""
 
     FIRST = "first"
     SAME = "same"
@@ -92,7 +92,7 @@ class LessonKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """What a look has come to, which looks are kept, and what is known by them."""
+    """Result of a reading, with the readings kept and the knowledge gained."""
 
     kind: LessonKind
     looks: tuple[DisplayLook, ...]
@@ -102,7 +102,7 @@ class Lesson:
 
     @property
     def went_wrong(self) -> bool:
-        """Whether looks contradict each other."""
+        """True if looks contradict each other."""
         return self.kind in (LessonKind.DISAGREES, LessonKind.ENDED)
 
 
@@ -157,7 +157,7 @@ def taught_by(looks: Sequence[DisplayLook]) -> TaughtScale | None:
 
 
 def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson:
-    """What one more look at a parameter comes to."""
+    """Evaluate one more reading of a parameter."""
     known, looks = taught_by(before), _with(before, look)
     if not scales_that_fit(looks):
         return _contradiction(code, tuple(before), look, known)
@@ -212,7 +212,8 @@ def _with(before: Sequence[DisplayLook], look: DisplayLook) -> tuple[DisplayLook
 
 
 def _agrees(look: DisplayLook, scale: TaughtScale) -> bool:
-    """Whether a display shows this, to one step of its last digit: it cuts, rounds, and lags."""
+    """Return True if a display shows this, to one step of its last digit: it cuts, rounds, and
+    lags."""
     number = scale.number(look.word)
     step = Decimal(1).scaleb(min(0, int(look.shown.as_tuple().exponent)))
     return number is not None and abs(number - look.shown) <= step

@@ -32,11 +32,11 @@ class Value:
     number: Decimal | None
     unit: str
     text: str
-    """What a person reads, without the unit."""
+    """Text for a person, without the unit."""
     taught: bool = False
-    """Whether a person has taught its scale; no document has it."""
+    """True if a person has taught its scale; no document has it."""
     unsure: bool = False
-    """Whether no document says what so high a raw value means; its text ends with `?`."""
+    """True if no document says what so high a raw value means; its text ends with `?`."""
 
     @property
     def display(self) -> str:
@@ -51,11 +51,11 @@ class Conversion:
     raw: int
     rounded: bool
     lossy: bool = False
-    """Whether rounding made another value of it: 0, or either of two that are as near."""
+    """True if rounding made another value of it: 0, or either of two that are as near."""
 
 
 def word_count(parameter: Parameter) -> int:
-    """How many registers the parameter takes: 1 or 2."""
+    """Return the number of registers of the parameter: 1 or 2."""
     return 2 if parameter.type.endswith("32") else 1
 
 
@@ -72,7 +72,7 @@ def from_words(parameter: Parameter, words: Sequence[int]) -> int:
 
 
 def is_field(parameter: Parameter) -> bool:
-    """Whether the parameter is some bits of its register, and others are not its own."""
+    """Return True if the parameter is some bits of its register, and others are not its own."""
     return parameter.shift != 0 or parameter.mask != 0xFFFF
 
 
@@ -157,7 +157,7 @@ def decode(
 
 
 def is_enumeration(parameter: Parameter) -> bool:
-    """Whether the raw values are names rather than a number."""
+    """Return True if the raw values are names rather than a number."""
     named = bool(parameter.enumeration or parameter.values)
     return named and not parameter.unit and parameter.scale == "1" and not _is_number(parameter)
 
@@ -259,7 +259,7 @@ def _hexadecimal(parameter: Parameter, typed: str) -> int:
 
 
 def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decimal:
-    """What was typed in the parameter's unit: `3.5`, `3.5 s`, `3500ms`; raises ValueRefused."""
+    """Parse typed text in the parameter's unit: `3.5`, `3.5 s`, `3500ms`; raises ValueRefused."""
     bare, factor = typed, Decimal(1)
     if match := _WITH_UNIT.fullmatch(typed):
         bare, unit = match[1], match[2].strip()

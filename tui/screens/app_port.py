@@ -1,4 +1,4 @@
-"""What screens may ask of the app they stand in."""
+"""Interface of the app for its screens."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Panel(LeanApp):
     clock: Clock
     read_only: bool
     low_bandwidth: bool
-    """Whether the terminal is to be sent as little as possible."""
+    """True if the terminal is to be sent as little as possible."""
     leave_running: bool
-    """Whether motors started from here are meant to go on when the panel is lost."""
+    """True if motors started from here are meant to go on when the panel is lost."""
     period: float
     """Wished time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None
@@ -51,7 +51,7 @@ class Panel(LeanApp):
     hearing: str = ""
     """The line that is listened to, as it was typed: nothing is sent there, no stop either."""
     drive_documents: Callable[[], DriveDocuments]
-    """How commands write their JSON about a drive; imported when it is needed."""
+    """JSON documents of drives; imported when needed."""
     unreached: tuple[str, float]
     """The last text about drives that a stop of all does not reach, and its monotonic time."""
     chosen: DriveConsole | None
@@ -60,7 +60,7 @@ class Panel(LeanApp):
     @property
     @abstractmethod
     def stroke(self) -> Stroke | None:
-        """What is known of the key that has its effect now; None while there is none."""
+        """Facts about the key that has its effect now; None if there is none."""
 
     @abstractmethod
     def stop_stamp(self) -> object:
@@ -136,7 +136,8 @@ class Panel(LeanApp):
 
     @abstractmethod
     async def may_let_go(self, question: str, *, yes: str, no: str, always: str = "") -> bool:
-        """Whether the drives of the line may be left alone; asks where that trips one that runs.
+        """Return True if the drives of the line may be left alone; asks where that trips one that
+        runs.
 
         With `always` it asks in any case, and says that. Belongs into a worker: it waits for
         the answer.
@@ -166,7 +167,7 @@ class Panel(LeanApp):
 
     @abstractmethod
     def frame_now(self) -> FrameView:
-        """What stands around every screen at this moment."""
+        """Return the frame around every screen at this moment."""
 
     @abstractmethod
     def say_first(self, happened: str, next_step: str, kind: str = "") -> None:

@@ -1,4 +1,4 @@
-"""What the screens of the panel share: a look now and then, lines in their places, the keys."""
+"""Common parts of the screens: regular refresh, lines in their places, the keys."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class PanelScreen(Framed):
         yield Lines(id="keys", fit=self._keys)
 
     def body(self) -> Iterable[Widget]:
-        """What stands between the tabs and the message."""
+        """Compose the part between the tabs and the message."""
         raise NotImplementedError
 
     def on_mount(self) -> None:
@@ -99,7 +99,7 @@ class PanelScreen(Framed):
         return [key_line(keys)]
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
-        """What Enter, Esc and their like do in the field that is typed into."""
+        """Return the effects of Enter, Esc and similar keys in the focused field."""
         return ()
 
     @property

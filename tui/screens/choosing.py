@@ -1,4 +1,4 @@
-"""What becomes of an action that was chosen in the palette."""
+"""Execution of an action that was chosen in the palette."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands around every screen and over every dialog: strip, tabs, the newest message.
+"""Frame around every screen and over every dialog: status bar, tabs, the newest message.
 
 It is live everywhere: whoever answers a question sees what the motor does meanwhile.
 """
@@ -79,7 +79,7 @@ class Framed(Screen[Any]):
     app: Panel
     _frame_parts: Mapping[str, Lines] = MappingProxyType({})
     _small: Lines | None = None
-    """What covers the screen while the terminal is too small for it."""
+    """Cover of the screen while the terminal is too small."""
     DEFAULT_CSS = """
     Framed { layers: default frame; }
     Framed #strip { dock: top; height: 1; background: $surface; layer: frame; }
@@ -129,11 +129,11 @@ class Framed(Screen[Any]):
 
     @property
     def takes_letters(self) -> bool:
-        """Whether digits and letters are not those of the panel now: a dialog, or a text."""
+        """True if digits and letters are not those of the panel now: a dialog, or a text."""
         return self.is_modal or takes_text(self.focused)
 
     def watch_focused(self) -> None:
-        """Whether Space is text now, or a stop, is told before the next key can come."""
+        """Show whether Space is text or a stop before the next key can come."""
         if self.is_running:
             self.call_later(self.draw_stop_keys)
 
@@ -143,7 +143,7 @@ class Framed(Screen[Any]):
             self.draw_frame(self.app.frame_now())
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """What stood still below another screen is not shown for a moment."""
+        """Hide values that were frozen below another screen for a moment."""
         self.draw_frame(self.app.frame_now())
 
     def on_key(self, event: Key) -> None:

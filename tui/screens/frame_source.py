@@ -1,4 +1,4 @@
-"""What the frame around every screen tells, gathered from the line and its drives."""
+"""Data for the frame around every screen, gathered from the line and its drives."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class FrameSource:
         return self._load
 
     def _message(self, console: DriveConsole | None, now: float) -> Said | None:
-        """What holds now before what was said: a lost line, a drive that is not heard."""
+        """Return the state with priority over messages: a lost line, a silent drive."""
         holds = self._line_trouble(now) or self._not_heard() or self._trouble_below(now)
         if holds:
             return Said(self._app.clock.time_of_day(), holds, "alarm", 0.0)
@@ -242,7 +242,7 @@ def _is_at_zero(console: DriveConsole, readings: Mapping[str, Reading]) -> bool:
 
 
 def stands_by(console: DriveConsole, state: DriveState) -> bool:
-    """Whether the motor stands and the next command from here runs it."""
+    """Return True if the motor stands and the next command from here runs it."""
     if state.kind not in ("blocked", "ready", "stopped"):
         return False
     from tui.drive.orders import chart_in_force
@@ -272,14 +272,14 @@ def _commanding(fleet: Fleet, device: int) -> str:
 
 
 def _commanded_by(state: DriveState | None) -> str:
-    """Who commands the drive, where its chart tells that it is not the line."""
+    """Return the commander of the drive, if its chart shows that it is not the line."""
     if state is None or not state.channel or "modbus" in state.channel.casefold():
         return ""
     return state.channel
 
 
 def _marks(console: DriveConsole | None, fleet: Fleet | None) -> dict[str, tuple[str, Style]]:
-    """What the tabs say of their screens."""
+    """Return the marks of the tabs."""
     if fleet is None:
         return {}
     marks: dict[str, tuple[str, Style]] = {}

@@ -45,7 +45,7 @@ TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it ag
 
 
 class Hands(Panel):
-    """What keys do to the whole panel; the first part of it is asked in the thread of the keys."""
+    """Keys for the whole panel; their first part runs in the thread of the keys."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -121,7 +121,7 @@ class Hands(Panel):
 
     @property
     def stroke(self) -> Stroke | None:
-        """What is known of the key that has its effect now; None while there is none."""
+        """Facts about the key that has its effect now; None if there is none."""
         return self._typed.stroke
 
     def keys_not_taken(self, count: int, *, late: bool = False) -> None:
@@ -257,12 +257,13 @@ class Hands(Panel):
             self.say_first(canceled, "Choose a line and press Enter.")
 
     def _is_void(self, key: Key) -> bool:
-        """Whether a stop came while a key went through the screen, before it has its effect."""
+        """Return True if a stop came while a key went through the screen, before it has its
+        effect."""
         stroke = stroke_of(key)
         return stroke is not None and stroke.stamp != self.stop_stamp()
 
     def _open_drive(self) -> DriveConsole | None:
-        """Whom the stop key stops: the drive that was opened; None for every drive."""
+        """Return the target of the stop key: the open drive; None for every drive."""
         chosen = self.chosen
         known = chosen is not None and any(chosen in fleet.consoles for fleet in self.fleets)
         return chosen if known else None

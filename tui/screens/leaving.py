@@ -15,7 +15,7 @@ from .last_stops import LastStops, LineStops
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
-    from tui.session.timeout_told import TimeoutWatch
+    from tui.session.timeout_report import TimeoutWatch
 
     from .dialogs.confirm import Confirm
     from .dialogs.leave import LeaveChoice
@@ -24,10 +24,10 @@ STOP_OR_TAKE_OVER = "Space stops it. To take it over: Esc, then T on Monitor."
 
 
 class Leaving(Panel):
-    """What the app does before it lets drives go."""
+    """Steps of the app before it lets drives go."""
 
     settled: bool
-    """Whether it was decided what becomes of motors that run by an order from here."""
+    """True if it was decided what becomes of motors that run by an order from here."""
     _requested: Confirm | None = None
     """The question before leaving, while nothing runs by a command from here."""
 
@@ -56,7 +56,7 @@ class Leaving(Panel):
         return [one for fleet in self.fleets for one in fleet.line_watch.under_command()]
 
     def _leaving_report(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
-        """What becomes of the drives of lines that are left; of several lines each by its name.
+        """Return what happens to the drives of lines that are left; several lines by their names.
 
         `on_purpose`: motors that run are put on record as left running.
         """
@@ -170,7 +170,8 @@ class Leaving(Panel):
             self.exit()
 
     async def may_let_go(self, question: str, *, yes: str, no: str, always: str = "") -> bool:
-        """Whether the drives of the line may be left alone; asks where that trips one that runs.
+        """Return True if the drives of the line may be left alone; asks where that trips one that
+        runs.
 
         With `always` it asks in any case, and says that. Belongs into a worker: it waits for
         the answer.
@@ -191,7 +192,7 @@ class Leaving(Panel):
     def _question(
         self, fleets: Sequence[Fleet], question: str, *, yes: str, no: str, always: str = ""
     ) -> Confirm | None:
-        """What to ask before drives are left alone; None where nothing is to be said."""
+        """Return the question before polling stops; None if nothing needs to be reported."""
         from .dialogs.confirm import Confirm
         from .dialogs.now import MotorsNow
 
@@ -205,7 +206,7 @@ class Leaving(Panel):
         return Confirm(question, "\n".join(reported), yes=yes, no=no, loses=True, now=now)
 
     def _unfinished(self, fleet: Fleet) -> list[str]:
-        """What would be lost of the work on parameters."""
+        """Return the unfinished work on parameters that would be lost."""
         reported = []
         for console in fleet.consoles:
             device, editor = console.device, console.begun_editor

@@ -26,7 +26,7 @@ class LineCheck(Panel):
     def __init__(self) -> None:
         super().__init__()
         self._waiting_for: tuple[str, ...] = ()
-        """What differs, as it was asked about last."""
+        """Differences in the last question."""
         self._line_question: Confirm | None = None
         """The last question of that."""
         self._connected_since: float | None = None

@@ -37,7 +37,7 @@ class LineOwner(Panel):
 
     _open: Opener
     _gone = False
-    """Whether the panel was left: what is opened from then on is closed again."""
+    """True if the panel was left: what is opened from then on is closed again."""
     _journal: Journal | None = None
     panel_lines: tuple[PanelLine, ...] = ()
     opened: OpenLine | None = None

@@ -1,4 +1,4 @@
-"""What is looked at on every screen, now and then: the frame, new faults, stops that failed."""
+"""Regular checks on every screen: the frame, new faults, failed stops."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Lookout(Panel):
     """Draws the frame of the screen on top, and says what must be heard wherever one is."""
 
     bell_rings = True
-    """Whether a new fault rings."""
+    """True if a new fault rings."""
 
     def __init__(self) -> None:
         super().__init__()
         self._frame = FrameSource(self)
         self._drawn: object = None
-        """What of the frame is shown at once, as it was drawn last."""
+        """Urgent parts of the frame as last drawn."""
         self._drawn_at = 0.0
         self._keys_shown = ("", False)
-        """Whom the stop key meant at the last look, and whether other keys meant nothing."""
+        """Target of the stop key at the last check, and whether other keys had none."""
         self._journal_trouble = ""
         self._left_behind_seen: set[DriveConsole] = set()
         """Drives of which it was said that no program commands their motor."""
@@ -41,7 +41,7 @@ class Lookout(Panel):
         """When the health of the lines was last judged, on the panel's clock."""
 
     def look_around(self) -> None:
-        """What must be seen on every screen: the frame with stops that failed, and a new fault."""
+        """Check what every screen shows: the frame with failed stops, and a new fault."""
         if not self.is_running:
             return  # the panel ends: its screens are gone before its timers
         watches = [(fleet.alarms, fleet.line_watch) for fleet in self.fleets]
@@ -59,7 +59,7 @@ class Lookout(Panel):
         self.draw_frame()
 
     def frame_now(self) -> FrameView:
-        """What stands around every screen at this moment."""
+        """Return the frame around every screen at this moment."""
         return self._frame.view()
 
     def draw_frame(self) -> None:

@@ -63,7 +63,7 @@ class LineOpening:
 
 
 class LineEvents(EventLog):
-    """What is said about the drives of one line: with its name, unless it is the one shown."""
+    """Events of the drives of one line: with its name, unless it is the one shown."""
 
     def __init__(self, events: EventLog, label: str, is_shown: Callable[[], bool]) -> None:
         super().__init__()

@@ -47,7 +47,7 @@ class OpeningScreen(PanelScreen):
         yield doing
 
     def draw(self, width: int) -> None:
-        """How far it is."""
+        """Draw the progress."""
         super().draw(width)
         self.put("doing", self._lines(width))
 

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class Places(Panel):
-    """Where the keys 1 to 7 lead, and those that look for the drive or the screen they need."""
+    """Keys 1 to 7, and those that open the drive or the screen they need."""
 
     chosen: DriveConsole | None = None
 

@@ -66,7 +66,7 @@ async def _kept(app: Panel, target: WhyTarget) -> Diagnosis:
 
 
 async def _looked(target: WhyTarget) -> Diagnosis:
-    """What is seen, and which rung of the ladder fails."""
+    """Return the evidence, and the check that fails."""
     from tui.session.diagnosis.asking import profile_remembered, sight_of_port
     from tui.session.diagnosis.diagnosis import diagnosed
     from tui.session.diagnosis.examining import examine_line

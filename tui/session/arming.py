@@ -1,4 +1,4 @@
-"""Whether a drive may be written to from here: until when, and why no longer."""
+"""True if a drive may be written to from here: until when, and why no longer."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Arming:
         self._span = ARMED_FOR
         self._why = ""
         self.times = 0
-        """How often it was armed."""
+        """Number of times it was armed."""
         self.trouble: Callable[[], str] = str
         """Returns what is wrong with the drive's replies so that nothing may be written now."""
         self.barred = ""
@@ -111,7 +111,7 @@ class Arming:
 
     @property
     def armed(self) -> bool:
-        """Whether writes are let through now."""
+        """True if writes are let through now."""
         return self.armed_for is not None
 
     @property

@@ -20,7 +20,7 @@ VOTES_LAST = 90.0
 
 
 class ByteOrder:
-    """Whether the bytes of each word of one drive arrive swapped; for any thread."""
+    """True if the bytes of each word of one drive arrive swapped; for any thread."""
 
     def __init__(self, device: int) -> None:
         self._device = device
@@ -34,7 +34,7 @@ class ByteOrder:
 
     @property
     def error(self) -> BytesSwapped | None:
-        """What is wrong; None while words arrive as they should."""
+        """Error; None while words arrive correctly."""
         return BytesSwapped(self._device, self._against) if self._against else None
 
     @property

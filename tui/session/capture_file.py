@@ -45,11 +45,11 @@ class CaptureFile:
 
     def add_frame(self, device: int, pdu: bytes, wall: float, *, request: bool) -> None:
         """Add a whole frame; `wall` is its time in seconds since 1970."""
-        self._add(self._form.of_frame(device, pdu, request=request), wall)
+        self._add(self._form.frame_packet(device, pdu, request=request), wall)
 
     def add_noise(self, data: bytes, wall: float) -> None:
         """Add bytes that form no frame."""
-        if (packet := self._form.of_noise(data)) is not None:
+        if (packet := self._form.noise_packet(data)) is not None:
             self._add(packet, wall)
 
     def close(self) -> None:

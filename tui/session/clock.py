@@ -17,7 +17,7 @@ class Clock:
     """
 
     _apart = 0.0
-    """What the time of day is ahead of monotonic seconds."""
+    """Seconds that the time of day is ahead of the monotonic clock."""
 
     def monotonic(self) -> float:
         """Seconds that only go forward."""
@@ -45,7 +45,7 @@ class Clock:
         """Let others go on for so many seconds; of a loop, and never less than one turn of it."""
         await asyncio.sleep(seconds)
 
-    def of_line(self, reported: float) -> float:
+    def line_time(self, reported: float) -> float:
         """A moment that the line has told, time.monotonic(), on this clock."""
         return reported
 

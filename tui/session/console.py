@@ -33,7 +33,7 @@ class DriveConsole:
     session: DriveSession
     journal: Journal
     proved: str = ""
-    """What the last proof of its communication loss came to, in a few words."""
+    """Result of the last communication loss test, in a few words."""
     diagnosis: Diagnosis | None = None
     """The last verdict on why it does not answer, or not well; None before the first."""
     diagnosed_at: float = 0.0
@@ -57,26 +57,26 @@ class DriveConsole:
 
     @property
     def identity(self) -> DriveIdentity | None:
-        """What the drive says of itself."""
+        """Identity that the drive reports."""
         return self.session.identity
 
     @cached_property
     def editor(self) -> Editor:
-        """What is staged and written of its parameters."""
+        """Staged and written values of its parameters."""
         from .settings.editor import Editor  # what Monitor does not need is imported later
 
         return Editor(self.session, self.journal, self._state)
 
     @cached_property
     def blocks(self) -> BlockEditor:
-        """What is proposed and written of its blocks."""
+        """Proposed and written assignments of its blocks."""
         from .blocks.editor import BlockEditor
 
         return BlockEditor(self.session, self.monitor, self.journal)
 
     @cached_property
     def counters(self) -> CounterWatch:
-        """What was exchanged with the drive, as counted here and by the drive."""
+        """Exchanges with the drive, counted by this program and by the drive."""
         from .counters.watch import CounterWatch
 
         return CounterWatch(self.session)

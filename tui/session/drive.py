@@ -23,7 +23,7 @@ from .connect.prepared_stop import prepared_stop
 from .image import RegisterImage
 from .reading import Rating, Reading
 from .starts.keeper import StartKeeper
-from .timeout_told import Timeout
+from .timeout_report import Timeout
 from .unsaved import UnsavedSettings
 from .work import WorkQueue
 
@@ -47,44 +47,45 @@ class DriveSession:
         self.line = line
         self.device = device
         self.family = profile
-        """What is known of every drive of its family."""
+        """Facts about every drive of its family."""
         self.profile = profile
         """The same, with what a person has taught of this drive."""
         self.identity = identity
         self.clock = clock
-        """What everything that is done with the drive counts by."""
+        """Clock of all work with the drive."""
         self.image = RegisterImage(profile, clock)
-        """What is known of its registers."""
+        """Known values of its registers."""
         self.arming = Arming(line, clock, device, self.care)
-        """Whether it may be written to from here."""
+        """True if it may be written to from here."""
         self.guessed = False
         """True if its family was neither named nor told by the drive: never told as stopped."""
         self.contradiction = contradiction(identity, profile)
-        """How the drive contradicts its profile by what it says of itself; empty if it does not."""
+        """Contradiction between the drive's reported identity and its profile; empty if none."""
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.byte_order = ByteOrder(device)
-        """Whether the bytes of its words arrive as they should."""
+        """True if the bytes of its words arrive as they should."""
         self.arming.trouble = lambda: self.byte_order.text
         self.work = WorkQueue(line, device, self.arming, clock)
-        """What is being done to it; a stop ends it."""
+        """Work in progress on it; a stop ends it."""
         self.work.on_change = self.request_full_read
         self.ratings: dict[str, Rating] = {}
-        """What 100 % is, by code, where a person has told it from the nameplate."""
+        """Value of 100 %, by code, that a person entered from the nameplate."""
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
         self.timeout: Timeout | None = None
-        """What it has told of its communication timeout; None while it was not asked."""
+        """Its communication timeout; None before it was read."""
         self.reported_by_line = False
-        """Whether a command or reference word was written to it from here, a stop among them."""
+        """True if a command or reference word was written to it from here, a stop among them."""
         self.unsaved_settings = UnsavedSettings()
-        """What was written by this program and is lost at power-off until the drive saves it."""
+        """Settings written by this program that are lost at power-off until the drive saves
+        them."""
         self.followed: tuple[str, ...] = ()
         """Codes of words that were written from here and are polled on."""
         self.prepared = prepared_stop(line, device, [profile])
         """The frames that stop it in any chart, for when its usual stop fails by an error here."""
         self.starts: StartKeeper | None = None
-        """Where the starts of its motor are put on record; None where they are not."""
+        """Records of its motor's starts; None if they are not kept."""
         self.rest_seen = -math.inf
         """When the motor was last seen at rest, or in an unknown state (monotonic)."""
         self.stirs = 0
@@ -122,7 +123,7 @@ class DriveSession:
 
     @property
     def known_identity(self) -> DriveIdentity:
-        """What the drive says of itself; empty where it says nothing."""
+        """Identity that the drive reports; empty if it reports none."""
         return self.identity or DriveIdentity(self.device, "", "", "", "", None, ())
 
     @property
@@ -132,7 +133,7 @@ class DriveSession:
 
     @property
     def commanded(self) -> bool:
-        """Whether a command or reference was sent to the drive from here."""
+        """True if a command or reference was sent to the drive from here."""
         return self.commanded_at is not None
 
     def learn(self, profile: Profile) -> None:

@@ -1,4 +1,4 @@
-"""What a drive does, in words, from the readings of one cycle."""
+"""State of a drive in words, from the readings of one cycle."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class DriveState:
     alarm: bool | None
     local: bool | None
     channel: str
-    """Who commands the drive, where its words tell it."""
+    """Commander of the drive, if its words show it."""
     reference: str
-    """Who gives its reference, where its words tell it."""
+    """Source of its reference, if its words show it."""
     fault: FaultCode | None
     """The fault that the drive is in now."""
     fault_raw: int | None
@@ -76,7 +76,7 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
 
 
 def _requested(profile: Profile, readings: Mapping[str, Reading]) -> bool:
-    """Whether the words that tell the state are among those read at all."""
+    """Return True if the words that tell the state are among those read at all."""
     return any(chart.status in readings for chart in profile.data.charts)
 
 
@@ -125,7 +125,8 @@ def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> S
 
 
 def channel_text(parameter: Parameter, reading: Reading | None) -> str:
-    """Who commands or gives the reference, from an enumeration or a word of one bit a channel."""
+    """Return the commander or reference source, from an enumeration or a word of one bit a
+    channel."""
     if reading is None or reading.raw is None:
         return ""
     if parameter.bits:

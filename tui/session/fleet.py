@@ -33,7 +33,7 @@ from .monitor.alarms import LineAlarms, PresentFault
 from .monitor.line_health import LineHealth
 from .monitor.line_watch import LineWatch
 from .monitor.snapshot import Snapshot
-from .monitor.strangers_asked import StrangersAsked
+from .monitor.unknown_drive_poller import UnknownDrivePoller
 from .sharing.handover import Handover
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
@@ -56,7 +56,7 @@ class FoundDrive:
 
     @property
     def guessed(self) -> bool:
-        """Whether its profile is one of several that may fit, and nobody has said which."""
+        """True if its profile is one of several that may fit, and nobody has said which."""
         return self.session is not None and self.session.guessed
 
     @property
@@ -81,21 +81,21 @@ class Fleet:
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
         self.line = line
         self.clock = clock
-        """What the sessions with its drives count by."""
+        """Clock of the sessions with its drives."""
         self.journal = journal
         self.starts = starts
-        """Where starts of motors are put on record; None where none are."""
+        """Records of motor starts; None if they are not kept."""
         self.line_watch = LineWatch(line)
-        self._strangers = StrangersAsked(line)
+        self._strangers = UnknownDrivePoller(line)
         self.health = LineHealth()
         self.events = events or EventLog(clock.wall)
-        """What was said about the drives."""
+        """Messages about the drives."""
         self.event_notes = EventNotes(line.facts, self.events)
         self.stopper = Stopper(line, journal, self.events)
         self.alarms = LineAlarms(self.events, self._record_fault)
         """The faults of all of them."""
         self.handover = Handover(line, self.events, self._session_of, clock)
-        """Who commands a drive when two programs want to."""
+        """Decides who commands a drive if two programs want to."""
         self._departed = line.facts.departed
         line.facts.on_change(self._look_for_left)
         self.search: Search | None = None
@@ -164,7 +164,8 @@ class Fleet:
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
-        """Whether the same drive is taken for another family while its motor may run; tells it."""
+        """Return True if the same drive is taken for another family while its motor may run; tells
+        it."""
         runs = any(one is before for one in self.line_watch.under_command())
         if not runs or before.known_identity != session.known_identity:
             return False
@@ -176,7 +177,7 @@ class Fleet:
         return True
 
     def _recall(self, console: DriveConsole) -> None:
-        """What earlier programs have left of a drive: a motor that runs, and what was taught.
+        """Load the state that earlier programs left of a drive: a running motor, taught scales.
 
         One that may be of another family is prepared to be stopped as that, too.
         """
@@ -298,5 +299,5 @@ class Fleet:
 
 
 def _same(one: DriveSession, other: DriveSession) -> bool:
-    """Whether two sessions are with one drive, by all that it says of itself."""
+    """Return True if two sessions are with one drive, by all that it says of itself."""
     return one.profile.id == other.profile.id and one.known_identity == other.known_identity

@@ -1,4 +1,4 @@
-"""What is known of a drive's registers: raw values that the drive itself has told, and when.
+"""Known values of a drive's registers: raw values that the drive itself reported, with their time.
 
 Only replies of the drive come in here, as readings without a value: what scales them may change.
 A write makes its word unknown until it is read back.
@@ -26,7 +26,7 @@ class _State:
     held: Mapping[str, Reading]
     refused: Mapping[str, Reading]
     since: float
-    """What was read before may have changed."""
+    """Time before which values may be outdated."""
 
     # worked out where somebody asks: replies come far more often
     @cached_property
@@ -56,7 +56,7 @@ class RegisterImage:
         """When a word was last written, or may have been."""
         self._trusted_from = -math.inf
         self._waiting_for: dict[str, Callable[[int], None]] = {}
-        """Who wants to know what a word holds that was written without a sure answer."""
+        """Callers that wait for the value of a word written without a sure answer."""
 
     @property
     def raws(self) -> Mapping[str, int]:
@@ -79,7 +79,7 @@ class RegisterImage:
         return frozenset(code for code, one in self._now.refused.items() if one.absent)
 
     def get(self, code: str) -> Reading | None:
-        """What is held of a register; None where it was never read, or is unknown by now."""
+        """Return the value of a register; None if it was never read, or is unknown by now."""
         return self._now.held.get(code)
 
     def changed(self, code: str) -> float:

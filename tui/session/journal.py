@@ -104,9 +104,9 @@ class Journal:
         self._lost = 0
         self._closed = False
         self._requested = False
-        """Whether somebody waits for another try that was not begun yet."""
+        """True if somebody waits for another try that was not begun yet."""
         self._ending: Callable[[], None] | None = None
-        """What waits for the last entries where the program ends without close()."""
+        """Wait for the last entries if the program ends without close()."""
 
     @property
     def path(self) -> Path:
@@ -120,7 +120,7 @@ class Journal:
 
     @property
     def recent(self) -> tuple[Entry, ...]:
-        """What was written since the start, oldest first; on the disk or not."""
+        """Writes since the start, oldest first; on the disk or not."""
         with self._changed:
             return tuple(entry for entry in self._recent if entry.kind == "write")
 
@@ -132,13 +132,13 @@ class Journal:
 
     @property
     def lost(self) -> int:
-        """How many entries were given up, since too many waited for the disk."""
+        """Number of entries that were dropped because too many waited for the disk."""
         with self._changed:
             return self._lost
 
     @property
     def unkept(self) -> int:
-        """How many entries are not on the disk: waiting for it, or lost."""
+        """Number of entries that are not on the disk: waiting for it, or lost."""
         with self._changed:
             return len(self._waiting) + (self._begun is not None) + self._lost
 
@@ -259,7 +259,8 @@ class Journal:
             return self._waiting.popleft()
 
     def _may_go_on(self) -> bool:
-        """Whether the disk is to be tried again, after a moment or as soon as somebody waits."""
+        """Return True if the disk is to be tried again, after a moment or as soon as somebody
+        waits."""
         with self._changed:
             if self._closed and not self._requested:
                 self._thread = None

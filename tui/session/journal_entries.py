@@ -1,4 +1,4 @@
-"""What the journal keeps of a parameter that was written, by whichever way."""
+"""Journal entries of written parameters, whatever wrote them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .drive import DriveSession
 from .journal import Entry, now_text
 
 CUT_SHORT = "a stop came: not known whether it was taken"
-"""What is kept of a write that was ended before its answer."""
+"""Entry of a write that was ended before its answer."""
 
 
 def raw_text(session: DriveSession, parameter: Parameter, raw: int | None) -> str:

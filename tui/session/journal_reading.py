@@ -1,4 +1,4 @@
-"""What the journal's files tell, line by line; any content of them is survived."""
+"""Reader of the journal's files, line by line; any content is survived."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class DamagedLine:
 
 
 def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
-    """What the journal's files tell of a drive on a line, oldest first.
+    """Return the entries of the journal's files on a drive of a line, oldest first.
 
     Waits a few seconds for entries that are not on the disk yet. Damaged lines are left out.
     """
@@ -140,7 +140,7 @@ def _entry(line: bytes) -> Entry | None:
 
 
 def _is_mark(line: bytes) -> bool:
-    """Whether a line only says of the one before it that it was cut off."""
+    """Return True if a line only says of the one before it that it was cut off."""
     try:
         reported = json.loads(line)
     except (ValueError, RecursionError):

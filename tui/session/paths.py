@@ -1,4 +1,4 @@
-"""What the panel keeps between runs: its folder, the lines used lately, whom they were asked."""
+"""State kept between runs: its folder, the lines used lately, their addresses."""
 
 from __future__ import annotations
 

@@ -12,14 +12,14 @@ from tui.drive.values import NOT_AVAILABLE, Value
 
 @dataclass(frozen=True, slots=True)
 class Rating:
-    """What 100 % is: a number and its unit."""
+    """Value of 100 %: a number and its unit."""
 
     number: Decimal
     unit: str
 
 
 class Quality(StrEnum):
-    """Whether a value may be taken for the present one."""
+    """True if a value may be taken for the present one."""
 
     GOOD = "good"
     STALE = "stale"
@@ -58,7 +58,7 @@ class Reading:
 
     @property
     def text(self) -> str:
-        """What a person reads, without the unit; dashes where there is no value."""
+        """Text for a person, without the unit; dashes if there is no value."""
         return self.value.text if self.value is not None else NOT_AVAILABLE
 
     @property

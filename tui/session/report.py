@@ -24,7 +24,7 @@ from .journal import Entry
 from .trips import trips_of
 
 ENTRIES_SHOWN = 200
-"""How many entries of the journal a report shows at most, the last ones."""
+"""Most entries of the journal in a report, the last ones."""
 CHANNEL_QUANTITIES: tuple[Quantity, ...] = ("command_channel", "reference_channel")
 
 
@@ -66,7 +66,7 @@ class _Report:
         return f"UTC{offset[:3]}:{offset[3:5]}"
 
     def head(self) -> list[str]:
-        """What the drive is, and when and where it was read."""
+        """Return the identity of the drive, and when and where it was read."""
         head = self.values.head
         known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
         model = model_read(self.profile, self.values.raws)
@@ -109,7 +109,7 @@ class _Report:
         ]
 
     def control(self) -> list[str]:
-        """Who commands the drive and who gives its reference."""
+        """Return the commander of the drive and the source of its reference."""
         raws = self.values.raws
         source = source_in_force(self.profile, raws)
         lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
@@ -129,7 +129,7 @@ class _Report:
         return ["## Control source", "", *lines]
 
     def blocks(self) -> list[str]:
-        """What indirect blocks and the communication scanner bring."""
+        """Return the contents of indirect blocks and the communication scanner."""
         lines: list[str] = ["## Indirect blocks and scanner", ""]
         if not self.profile.data.blocks:
             return [*lines, "This family has none."]
@@ -147,7 +147,7 @@ class _Report:
         return "nothing" if not raw else f"raw {raw}"
 
     def watch(self) -> list[str]:
-        """What the drive does on loss of communication."""
+        """Return the drive's reaction to loss of communication."""
         watch = self.profile.data.communication_fault
         lines = ["## Loss of communication", ""]
         if watch is None:
@@ -185,7 +185,7 @@ class _Report:
         return [*lines, *self._pointed_at(codes)]
 
     def _pointed_at(self, codes: Sequence[str]) -> list[str]:
-        """What the faults that these words tell point at, each once."""
+        """Return the causes of the faults in these words, each once."""
         lines: list[str] = []
         raws = (self.values.raws.get(code) for code in codes)
         for raw in dict.fromkeys(raw for raw in raws if raw is not None):
@@ -225,7 +225,7 @@ class _Report:
         return ["## Trips seen from here", "", *_table(head, rows)] if rows else []
 
     def journal(self) -> list[str]:
-        """What was written to this drive from this machine."""
+        """Return the writes to this drive from this computer."""
         last = self.entries[-ENTRIES_SHOWN:]
         left = len(self.entries) - len(last)
         rows = [(_when(e.time, self.zone), e.code, e.old, e.new, e.answer, e.why) for e in last]

@@ -28,7 +28,8 @@ def make_folder(folder: Path) -> None:
 
 
 def stored_json(file: Path) -> object:
-    """What a file holds; None where it is missing, damaged, too long, too deep or no file."""
+    """Return the contents of a file; None if it is missing, damaged, too long, too deep or not a
+    file."""
     try:
         return json.loads(read_small_text(file, LONGEST_STORED))
     except (OSError, ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""What is being done to one drive: one task after another, and a stop that ends them all.
+"""Work on one drive: one task after another, and a stop that ends them all.
 
 Every task carries the count of stops under which it was typed. Once the count has risen the task
 is refused: when it is handed in, when its turn comes, and before each frame that it sends.
@@ -38,7 +38,7 @@ class Stopped(OrderRefused):
 
 
 class OutcomeKind(StrEnum):
-    """What an outcome is."""
+    """Kind of an outcome."""
 
     WORKING = "working"
     DONE = "done"
@@ -47,13 +47,13 @@ class OutcomeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What the last work on a drive has come to; `time` is monotonic."""
+    """Result of the last work on a drive; `time` is monotonic."""
 
     kind: OutcomeKind
     text: str
     time: float
     error: Exception | None = None
-    """What was refused, and by whom."""
+    """Refusal, and its source."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +87,11 @@ class Task:
     owner: object = None
     """Whose work it is."""
     working: str = ""
-    """What is told while it is being done."""
+    """Text while the work is in progress."""
     given_up: Callable[[], str | None] | None = None
     """Called, in any thread, where it ends without having been done; says what was done of it."""
     armed: bool = True
-    """Whether the drive must be armed for it."""
+    """True if the drive must be armed for it."""
 
 
 class WorkQueue:
@@ -102,11 +102,11 @@ class WorkQueue:
     ) -> None:
         self.arming = arming
         self.outcome: Outcome | None = None
-        """What the last work has come to: the one truth about this drive."""
+        """Result of the last work: the one truth about this drive."""
         self.stops = 0
-        """How many stops this drive was given from here."""
+        """Number of stops given to this drive by this program."""
         self.stopped_by = ""
-        """Who gave the last one."""
+        """Program of the last stop."""
         self.on_tell: Callable[[Outcome], None] = lambda _: None
         """Called, in any thread, with each outcome that is told."""
         self.on_change: Callable[[], None] = lambda: None
@@ -132,11 +132,11 @@ class WorkQueue:
 
     @property
     def busy(self) -> bool:
-        """Whether a task is being carried out."""
+        """True if a task is being carried out."""
         return self._worker is not None and not self._worker.done()
 
     def busy_for(self, owner: object) -> bool:
-        """Whether a task of an owner waits or is being carried out."""
+        """Return True if a task of an owner waits or is being carried out."""
         doing = self._doing if self.busy else None
         tasks = [doing, *(task for task, _ in tuple(self._waiting))]
         return any(task is not None and task.owner is owner for task in tasks)

@@ -1,4 +1,4 @@
-"""What the parts of a simulated drive share: registers, motor, terminal order, fault, watch."""
+"""Common parts of a simulated drive: registers, motor, terminal command, fault, watch."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CHART_WORDS: Mapping[Quantity, str] = {"status_word": "status", "command_word": 
 
 
 class Fallback(Enum):
-    """What a silent line makes the drive do without a fault."""
+    """Reaction to a silent line without a fault."""
 
     STOP = "stop"
     SPEED = "fallback speed"
@@ -63,7 +63,7 @@ class LineOrders:
 
     @property
     def any_given(self) -> bool:
-        """Whether a command or a reference was written since power-up."""
+        """True if a command or a reference was written since power-up."""
         return bool(self._at)
 
 
@@ -77,7 +77,7 @@ class Body:
     rating: RatingPlate
     motor: MotorState = field(default_factory=MotorState)
     powered: bool = True
-    """Whether the drive's supply is on; without it the drive is silent."""
+    """True if the drive's supply is on; without it the drive is silent."""
     terminals: Terminals = field(default_factory=lambda: Terminals(PLAIN_TERMINALS))
     """Its inputs; no trip, reset or power-down changes them."""
     earlier_hz: float | None = None
@@ -85,7 +85,7 @@ class Body:
     fault: ActiveFault | None = None
     fallback: Fallback | None = None
     forced_local: bool = False
-    """Whether an input forces local control: the line is not watched meanwhile."""
+    """True if an input forces local control: the line is not watched meanwhile."""
     alarms: int = 0
     """Alarm word as provoked, beside what the motor itself raises."""
     saving: float = 0.0
@@ -120,7 +120,7 @@ class Body:
         return self.registers.in_force(parameter) * self.scale(parameter)
 
     def scale(self, parameter: Parameter) -> float:
-        """What one count is worth, after the parameter that its scale follows.
+        """Return the value of one count, from the parameter that its scale follows.
 
         The panel has a conversion of its own, and this one is there to show its mistakes.
         """
@@ -173,5 +173,5 @@ class Body:
 
     @property
     def turning(self) -> bool:
-        """Whether the drive supplies the motor."""
+        """True if the drive supplies the motor."""
         return self.motor.energised or self.motor.braking

@@ -160,7 +160,7 @@ class SimulatedDrive:
 
     @property
     def motor(self) -> MotorState:
-        """What the motor does now, in physical units."""
+        """State of the motor, in physical units."""
         return self._body.motor
 
     @property

@@ -156,7 +156,7 @@ class Registers:
 
 
 def is_volatile(parameter: Parameter) -> bool:
-    """Whether a parameter lives in memory only: so declared, or an order of the line."""
+    """Return True if a parameter lives in memory only: so declared, or an order of the line."""
     return (
         parameter.storage == "ram"
         or parameter.access == "w"
@@ -165,7 +165,7 @@ def is_volatile(parameter: Parameter) -> bool:
 
 
 INPUT_REGISTERS = 0x10000
-"""What is added to the address of an input register (function 4), a space of its own."""
+"""Offset of the address of an input register (function 4), a space of its own."""
 
 
 def typed_raw(parameter: Parameter, raw: int) -> int:

@@ -1,4 +1,4 @@
-"""What the families do alike and differently, as tables: refusals, traits, first values.
+"""Common and different behavior of the families, as tables: refusals, traits, first values.
 
 Sources: ATV21 Modbus manual 7.10; ATV31, ATV312 and ATV71 Modbus manuals, exception
 responses; PX-MODBUS manual 5.9 (no exception is documented: silence).
@@ -38,7 +38,7 @@ SILENT = Refusals(None, None, None, None, None, None)
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """How a family differs from its sisters where the profile has no field for it."""
+    """Differences of a family from its sisters for which the profile has no field."""
 
     kind: ChartKind
     refusals: Refusals
@@ -123,7 +123,7 @@ PLAYED_BY: Mapping[ChartKind, tuple[str, ...]] = {
 }
 """Words that a drive must have to be played as one of a family; others go by their own chart."""
 LINE_WORDS = ("modbus", "line", "serial", "rs485", "rs-485")
-"""What the sources of a profile call the line."""
+"""Names of the line among the sources of a profile."""
 
 
 def traits_of(profile: Profile) -> Traits:

@@ -1,4 +1,4 @@
-"""What a simulated line is made of: its drives and its timing."""
+"""Parts of a simulated line: its drives and its timing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a simulated drive comes to its faults: provoked, by a silent line, by a word or an input."""
+"""Causes of a simulated drive's faults: provoked, a silent line, a word or an input."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Tripping:
         self._watch = watch
         self._history = FaultHistory(body)
         self._raised = False
-        """Whether the fault is one that a word or an input reports still."""
+        """True if the fault is one that a word or an input reports still."""
 
     def trip(self, raw: int, stop: Stop, *, persists: bool = False) -> None:
         """Trip with a fault, if none is there; the inputs stay as they are."""

@@ -1,4 +1,4 @@
-"""What the terminal can show: signs beyond ASCII, colors, erasing in color.
+"""Abilities of the terminal: characters beyond ASCII, colors, erasing in color.
 
 The locale tells the signs, terminfo (or COLORTERM) the colors; nothing is asked of the terminal
 itself, which a slow link would have to answer first.
@@ -31,7 +31,7 @@ NAMED_COLORS: tuple[tuple[str, ColorSystem], ...] = (
     ("putty", ColorSystem.STANDARD),
     ("xterm", ColorSystem.STANDARD),
 )
-"""What a part of TERM tells where the system does not know that terminal."""
+"""Colors by a part of TERM if the system does not know that terminal."""
 
 LOCALE = ("LC_ALL", "LC_CTYPE", "LANG")
 """Variables that tell the encoding, the first that is set first."""
@@ -41,14 +41,14 @@ BEGINNING = Path("/proc/self/environ")
 
 
 class Abilities(NamedTuple):
-    """What a terminal can show."""
+    """Abilities of a terminal."""
 
     encoding: str = UTF_8
-    """How characters are written, as Python names it; what it lacks becomes a plain sign."""
+    """Encoding of characters, by its Python name; missing ones become plain signs."""
     colors: ColorSystem | None = ColorSystem.TRUECOLOR
     """None where there are none, or none are wanted."""
     erases: bool = False
-    """Whether it erases cells in the color that is set."""
+    """True if it erases cells in the color that is set."""
 
 
 EVERYTHING: Final = Abilities()
@@ -57,7 +57,7 @@ EVERYTHING: Final = Abilities()
 def abilities_of(
     environment: Mapping[str, str], *, written_as: str = UTF_8, ascii: bool | None = None
 ) -> Abilities:
-    """What the terminal of this environment can show; Python writes to it in `written_as`.
+    """Return the abilities of this environment's terminal; Python writes to it in `written_as`.
 
     With `ascii` plain signs are used whatever the locale says, without them where it is False.
     """
@@ -115,7 +115,7 @@ def _colors(environment: Mapping[str, str], term: str, known: int | None) -> Col
 
 
 def _terminfo(term: str) -> tuple[int | None, bool]:
-    """How many colors a terminal has, and whether it erases in them; None where not known."""
+    """Return the number of colors of a terminal, and whether it erases in them; None if unknown."""
     try:
         import curses
     except ImportError:  # as on Windows

@@ -29,7 +29,7 @@ PASTE_IGNORED = "Pasted text ignored: it goes into a text field only."
 
 
 class Stamps(Protocol):
-    """What admission needs of the app, besides what every app has."""
+    """Needs of admission that not every app meets."""
 
     def stop_stamp(self) -> object:
         """Another object after every stop."""
@@ -49,7 +49,7 @@ class Admission:
         self._looking = False
 
     def admits(self, event: Key | Paste) -> bool:
-        """Whether the app may take a key or a paste now, when its turn has come."""
+        """Return True if the app may take a key or a paste now, when its turn has come."""
         if isinstance(event, Paste):
             is_text = takes_text(self._app.focused)
             if event.text and not is_text:
@@ -70,7 +70,7 @@ class Admission:
         return False
 
     def _harmless(self, event: Key) -> bool:
-        """Whether a key of a piece can only write text or move a cursor."""
+        """Return True if a key of a piece can only write text or move a cursor."""
         if event.key in CURSOR_KEYS:
             return True
         typed = event.is_printable or event.key in EDITS

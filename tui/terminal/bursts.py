@@ -36,9 +36,9 @@ class Given(NamedTuple):
     alone: bool = False
     held: bool = False
     steps: bool = False
-    """Whether it may step a value: alone, held, or the first of a piece of one arrow only."""
+    """True if it may step a value: alone, held, or the first of a piece of one arrow only."""
     piece: int = 1
-    """How many keys came at once, as far as that is known."""
+    """Number of keys that came together, as far as known."""
 
 
 class Bursts:
@@ -77,7 +77,7 @@ class Bursts:
         self._given.append(Given(paste))
 
     def given(self, now: float, pending: float | None = None) -> list[Given]:
-        """What is known by now; `pending` is when a sequence began that may become a key."""
+        """Return the known keys; `pending` is when a sequence began that may become a key."""
         self._give_repeats()
         if not self._hangs_on(pending):
             if now - self._last > APART:
@@ -145,7 +145,7 @@ class Bursts:
 
 
 def _even(reads: Sequence[Sequence[KeyToken]]) -> bool:
-    """Whether each of these reads is the same key, at an even pace."""
+    """Return True if each of these reads is the same key, at an even pace."""
     names = {key.name for read in reads for key in read}
     if len(reads) < REPEATS or len(names) != 1 or not names <= STEPPING:
         return False

@@ -11,7 +11,15 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from . import sequences
-from .names import SPACE, SPACE_ALONE, STOP_KEYS, Named, of_character, of_sequence, with_alt
+from .names import (
+    SPACE,
+    SPACE_ALONE,
+    STOP_KEYS,
+    Named,
+    name_of_character,
+    name_of_sequence,
+    with_alt,
+)
 from .sequences import ESC, PASTE_ENDS
 from .tokens import KeyToken, Paste, Report, Token
 
@@ -59,7 +67,7 @@ class Tokenizer:
         return self._given()
 
     def tick(self, now: float) -> list[Token]:
-        """What has come to its end by this time because nothing more was read."""
+        """Return the tokens that end by this time because nothing more was read."""
         self._end_waiting(now)
         return self._given()
 
@@ -118,7 +126,7 @@ class Tokenizer:
             self._introduce(second)
         else:
             self._begin()
-            self._key(of_character(character))
+            self._key(name_of_character(character))
 
     def _escape(self, character: str) -> None:
         """After ESC."""
@@ -140,7 +148,7 @@ class Tokenizer:
         self._state = states.get(character, self._opening)
 
     def _broken(self, character: str) -> bool:
-        """Whether a character ends a sequence of keys that it cannot belong to."""
+        """Return True if a character ends a sequence of keys that it cannot belong to."""
         if character == ESC or character in sequences.EIGHT_BIT:
             cut = self._state, self._text, self._began, self._mark, self._alt, self._mute
             self._ground(character)
@@ -199,13 +207,13 @@ class Tokenizer:
             self._found.append(Report(text))
             self._go_on()
         else:
-            named = of_sequence(text[: sequences.LONGEST_KEY + 1], kitty=self._mouse)
+            named = name_of_sequence(text[: sequences.LONGEST_KEY + 1], kitty=self._mouse)
             self._key(named)
             if named is None:
                 self._go_on()
 
     def _go_on(self) -> None:
-        """What came was no key: the sequence that it came into, whole or late, goes on."""
+        """Continue the interrupted sequence, whole or late: the input was no key."""
         self._late_until = self._late_before
         if self._cut is not None:
             # from its own last character on: reports come twice a second
@@ -248,7 +256,7 @@ class Tokenizer:
         self._escape(character)
 
     def _no_reply(self) -> None:
-        """What began like a reply has no end: a Space in it was typed."""
+        """Give up a reply without an end: a Space in it was typed."""
         spaced = " " in self._long
         self._begin()
         self._key(SPACE if spaced else None)
@@ -265,14 +273,14 @@ class Tokenizer:
         self._state = self._ground
 
     def _stops_inside(self, text: str) -> bool:
-        """Whether a read is a stop key alone that was pressed while something has no end.
+        """Return True if a read is a stop key alone that was pressed while something has no end.
 
         A Space that is read by itself, a while after the rest, was pressed: where the end of a
         paste or of a reply was lost, no stop may be lost with it.
         """
         if self._state not in (self._paste, self._reply) or self._now - self._last <= APART:
             return False
-        named = SPACE_ALONE if text == " " else of_sequence(text[: sequences.LONGEST_KEY])
+        named = SPACE_ALONE if text == " " else name_of_sequence(text[: sequences.LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:
             return False
         self._found.append(KeyToken(*named, self._now, self._now, self._here))

@@ -50,7 +50,7 @@ NO_REPORTS = "\x1b[?1000l\x1b[?1002l\x1b[?1003l\x1b[?1006l\x1b[?1004l"
 """A program that died may have left the mouse reported: a click would be typed, a Space with it."""
 
 UNASKED = ("\x1b[>", "\x1b[<u", "\x1b]22;")
-"""How the kitty keyboard protocol is begun and ended, and how the mouse gets another shape."""
+"""Sequences that begin and end the kitty keyboard protocol and change the mouse pointer."""
 
 
 FULL_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[?7l"
@@ -58,10 +58,10 @@ FULL_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[?7l"
 
 
 class WithMouse(Protocol):
-    """What the driver asks of the app at its start."""
+    """Needs of the driver at the app's start."""
 
     mouse: bool
-    """Whether the terminal is to report its mouse and to speak the kitty protocol."""
+    """True if the terminal is to report its mouse and to speak the kitty protocol."""
 
 
 class Fails(Protocol):
@@ -72,7 +72,7 @@ class Fails(Protocol):
 
 
 class Drawing(Protocol):
-    """What the driver tells the app, in the app's loop."""
+    """Messages of the driver to the app, in the app's loop."""
 
     def picture_taken(self, at: float) -> None:
         """The terminal has drawn a frame, and said so at this time."""
@@ -139,7 +139,7 @@ def _quiet(driver: type[Driver]) -> type[Driver]:
             super().write(NO_REPORTS if data == ASK_FOR_FOCUS and not self.wanted else data)
 
         def process_message(self, message: Message) -> None:
-            """Where the cursor stands is asked only to know what the terminal has drawn."""
+            """Handle a cursor report, which only shows what the terminal has drawn."""
             if isinstance(message, events.CursorPosition):
                 drawing = cast("Drawing", self._app)
                 soon_in_loop(self._app, drawing.picture_taken, time.monotonic())
@@ -239,7 +239,7 @@ def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[Terminal
 
 
 def _typed(driver: Any) -> bytes:
-    """What was typed. Raises TerminalGone."""
+    """Return the typed bytes. Raises TerminalGone."""
     try:
         data = os.read(driver.fileno, READ_SIZE)
     except OSError as error:
@@ -262,7 +262,7 @@ def _in_background(terminal: int) -> bool:
 
 
 def _messages(read: TerminalInput, reports: XTermParser) -> Iterator[Message]:
-    """What Textual would make of it."""
+    """Yield the messages of Textual for them."""
     if isinstance(read, Pressed):
         event = events.Key(read.name, read.character)
         attach(event, read.stroke)
@@ -277,7 +277,8 @@ def _messages(read: TerminalInput, reports: XTermParser) -> Iterator[Message]:
 
 def _stopping(driver: type[Driver]) -> type[Driver]:
     class StoppingDriver(driver):  # type: ignore[valid-type, misc]
-        """Where Textual reads the keys itself, as on Windows: only stop keys are taken early."""
+        """Driver for systems where Textual reads the keys itself, as on Windows: only stop keys
+        are taken early."""
 
         def process_message(self, message: Message) -> None:
             if isinstance(message, events.Key):

@@ -1,4 +1,4 @@
-"""What a focused widget does with text: none, numbers, or any text, spaces too.
+"""Use of text by a focused widget: none, numbers, or any text, spaces too.
 
 A widget says it by `takes_text` and `takes_space`; of Textual's own it is known.
 """
@@ -12,7 +12,7 @@ TEXT_FIELDS = frozenset({"Input", "TextArea"})
 
 
 def takes_text(widget: Widget | None) -> bool:
-    """Whether what is typed becomes text in this widget."""
+    """Return True if what is typed becomes text in this widget."""
     reported = getattr(widget, "takes_text", None)
     if reported is not None:
         return bool(reported)
@@ -20,7 +20,7 @@ def takes_text(widget: Widget | None) -> bool:
 
 
 def takes_space(widget: Widget | None) -> bool:
-    """Whether a space is text in this widget; in a field for numbers it is none."""
+    """Return True if a space is text in this widget; in a field for numbers it is none."""
     reported = getattr(widget, "takes_space", None)
     if reported is not None:
         return bool(reported)

@@ -35,7 +35,7 @@ SAID_WITHIN = 1.0
 FAILED = 70
 """The exit status after an internal error, as of any command."""
 TRIES, TRIED_AGAIN = 5, 0.2
-"""How often the last work is ordered where an error keeps it from that, and after how long."""
+"""Number of attempts at the last work after errors, and the delay between them."""
 NOT_ORDERED = "NOT STOPPED: motors that were started here may run on. Stop them at the machine."
 END_NOT_SEEN = "It is not known whether the motors stopped. Check them at the machine."
 

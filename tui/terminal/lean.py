@@ -1,4 +1,4 @@
-"""What the terminal is to show and what it shows; only the cells that differ are sent.
+"""Wanted and present contents of the terminal; only the cells that differ are sent.
 
 Textual 8.2 sends a changed part of a widget from its left edge on, a new screen as a whole and
 several times over, and sets every color anew for each piece of text; over a slow link that is
@@ -20,7 +20,7 @@ from textual.strip import Strip
 
 from tui.drive.plain import commands
 
-from .sgr import change, erasable, of_blank, same_blank
+from .sgr import blank_style, change, erasable, same_blank
 
 Cell = tuple[str, str]
 """A character and its colors; none where the one to the left takes two cells."""
@@ -40,7 +40,7 @@ lead, message and keys."""
 
 
 class Picture:
-    """What the terminal is to show, and what it shows as far as the frames so far tell.
+    """Wanted contents of the terminal, and its present ones as far as the frames show.
 
     With `erases` the terminal erases cells in the color that is set.
     """
@@ -53,7 +53,7 @@ class Picture:
 
     @property
     def is_shown(self) -> bool:
-        """Whether the terminal shows all that it is to show."""
+        """True if the terminal shows all that it is to show."""
         return not self._changed
 
     def forget(self) -> None:
@@ -78,7 +78,7 @@ class Picture:
             self._changed[y] = min(first, x), max(last, end)
 
     def frame(self, room: int) -> str:
-        """What goes to the terminal, which shows it from then on.
+        """Return the output for the terminal, which shows it from then on.
 
         It ends with the row in which it gets longer than `room` bytes. Rows come in the order in
         which a person needs them: the first ones, the last ones, then from the top.
@@ -132,13 +132,13 @@ def screen_text(screen: Screen[Any]) -> str:
 def strips_of(update: RenderableType | None) -> list[Placed] | None:
     """The strips of an update of Textual's; None for anything else."""
     if isinstance(update, ChopsUpdate):
-        return list(_of_spans(update))
+        return list(_span_places(update))
     if isinstance(update, LayoutUpdate):
-        return list(_of_lines(update))
+        return list(_line_places(update))
     return None
 
 
-def _of_spans(update: ChopsUpdate) -> Iterator[Placed]:
+def _span_places(update: ChopsUpdate) -> Iterator[Placed]:
     """The changed spans of some lines, column and row first."""
     for y, first, last in update.spans:
         line = update.chops[y]
@@ -149,7 +149,7 @@ def _of_spans(update: ChopsUpdate) -> Iterator[Placed]:
             yield left, y, strip.crop(left - x, min(end, last) - x)
 
 
-def _of_lines(update: LayoutUpdate) -> Iterator[Placed]:
+def _line_places(update: LayoutUpdate) -> Iterator[Placed]:
     """Whole lines of a part of the screen, column and row first."""
     for y, line in enumerate(update.strips, update.region.y):
         x = update.region.x
@@ -165,7 +165,7 @@ def cells_of(strip: Strip, colors: ColorSystem) -> list[Cell]:
         if control:
             continue
         ansi = Strip.render_ansi(style, colors) if style is not None else ""
-        blank = (" ", of_blank(ansi))
+        blank = (" ", blank_style(ansi))
         if text.isascii() and text.isprintable():
             found += [blank if character == " " else (character, ansi) for character in text]
             continue
@@ -212,7 +212,7 @@ class Pen:
         self._at = (x + len(cells), y) if moved else None
 
     def _blank(self, cells: Sequence[Cell | None], place: int) -> int:
-        """How many cells from here on are erased rather than written."""
+        """Return the number of cells from here on that are erased rather than written."""
         cell = cells[place]
         if not self._erases or cell is None or cell[0] != " " or not erasable(cell[1]):
             return 0

@@ -47,7 +47,7 @@ class LeanApp(App[None]):
         self._later: asyncio.TimerHandle | None = None
         self._first_request = False
         self._begun = False
-        """Whether a frame was sent in part."""
+        """True if a frame was sent in part."""
 
     def fit_terminal(self, abilities: Abilities, *, slow: bool = False) -> None:
         """Use signs and colors that the terminal has.
@@ -56,7 +56,7 @@ class LeanApp(App[None]):
         """
         self._colors = abilities.colors or ColorSystem.STANDARD
         self.plain_signs = abilities.encoding != UTF_8
-        """Whether the terminal has signs of ASCII only, or few more."""
+        """True if the terminal has signs of ASCII only, or few more."""
         self._instead = filters_for(abilities)
         self._picture = Picture(erases=abilities.erases)
         self._pacing = Pacing(slow=slow)
@@ -86,7 +86,7 @@ class LeanApp(App[None]):
         return super().switch_screen(screen)
 
     def hurry(self) -> None:
-        """What changes now is for a person who waits for it, or must see it at once."""
+        """Draw the next change at once: a person waits for it, or must see it."""
         self._hurries_until = time.monotonic() + HURRY_FOR
 
     def picture_taken(self, at: float) -> None:
@@ -105,7 +105,7 @@ class LeanApp(App[None]):
 
     @property
     def _draws(self) -> bool:
-        """Whether there is a terminal, and a picture of it that is complete."""
+        """True if there is a terminal, and a picture of it that is complete."""
         there = self._running and not self._closed and not self.is_headless
         return there and self._driver is not None and not self._batch_count
 
@@ -144,7 +144,7 @@ class LeanApp(App[None]):
         self._pacing.sent(len(frame), now)
 
     def _look_later(self, now: float) -> None:
-        """Where an answer does not come, nothing else would send the rest."""
+        """Check later: without an answer nothing else would send the rest."""
         wait = self._pacing.wait(now)
         if wait is not None and not self._picture.is_shown:
             self._later_by(wait)
@@ -159,7 +159,7 @@ class LeanApp(App[None]):
         self.app_resume_signal.subscribe(self, lambda _: self._anew())
 
     def on_resize(self) -> None:
-        """What a terminal of another size shows is not known."""
+        """Forget the terminal's contents, which are unknown after a change of size."""
         self._picture.clear()
 
     def action_redraw(self) -> None:
@@ -174,7 +174,7 @@ class LeanApp(App[None]):
 
 
 def filters_for(abilities: Abilities) -> list[LineFilter]:
-    """What makes a picture one that the terminal can show; nothing where it can show everything."""
+    """Return the filters that adapt a picture to the terminal; none if it can show everything."""
     found: list[LineFilter] = []
     if abilities.encoding != UTF_8:
         from .plain_signs import PlainSigns

@@ -36,7 +36,7 @@ PIECE_TIME: Final = 0.3
 """Seconds that the link may take for one piece of a frame, above its shortest round trip."""
 
 GROWTH: Final = 4
-"""How much more a piece may have after one that went through fast."""
+"""Growth of a piece after one that was sent fast."""
 
 OWED_MOST: Final = 32
 """Questions that a terminal without answers is kept account of."""
@@ -101,7 +101,7 @@ class Pacing:
         return LOST_AFTER if self._answers else MUTE_AFTER
 
     def _is_mute(self, now: float) -> bool:
-        """Whether the terminal has had the time to answer, and never did."""
+        """Return True if the terminal has had the time to answer, and never did."""
         return (
             not self._answers
             and bool(self._requested)

@@ -40,7 +40,7 @@ PLAIN_SIGNS: Final = {
     "Ω": "O",
     "°": "o",
 }
-"""What is drawn, and what stands for it."""
+"""Drawn characters and their plain substitutes."""
 
 
 class PlainSigns(LineFilter):

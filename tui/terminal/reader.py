@@ -25,7 +25,7 @@ EDITING = frozenset({"backspace", "delete", "left", "right", "home", "end"})
 
 
 class Stops(Protocol):
-    """What the app is asked in the thread that reads the keys."""
+    """Calls to the app in the thread that reads the keys."""
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
         """Stop, if the key means that now; True if it was taken.
@@ -86,7 +86,7 @@ class KeyReader:
         return self._sorted(tokens, now)
 
     def tick(self, now: float) -> list[TerminalInput]:
-        """What is known by this time because nothing more was read."""
+        """Return the input known by this time because nothing more was read."""
         try:
             return self._sorted(self._tokens.tick(now), now)
         except Exception as error:
@@ -127,7 +127,7 @@ class KeyReader:
         return [*reports, *(_to_input(one) for one in given)]
 
     def _stopped(self, key: KeyToken) -> bool:
-        """Whether a key was a stop."""
+        """Return True if a key was a stop."""
         return key.name in STOP_KEYS and self._stops.take_stop_key(key.name, self._left(key))
 
     def _left(self, key: KeyToken) -> float | None:

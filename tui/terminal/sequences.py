@@ -1,4 +1,4 @@
-"""What the sequences of terminals look like: reports, the mouse, replies, eight-bit forms."""
+"""Forms of terminal sequences: reports, the mouse, replies, eight-bit forms."""
 
 from __future__ import annotations
 
@@ -31,4 +31,4 @@ REPLY_BEGINS = {"]": "0123456789", "P": "0123456789;>!$+=?|", "_": "G"}
 """Replies of any length, and how they go on: Alt+] and Alt+P begin the same."""
 REPLY_ENDS = "\x07\x9c\udc9c\x18\x1a"
 ESCAPED = frozenset({"[", "O", *REPLY_BEGINS})
-"""What begins a sequence behind ESC; anything else is a key with Alt."""
+"""Characters after ESC that begin a sequence; any other is a key with Alt."""

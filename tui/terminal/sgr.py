@@ -1,4 +1,4 @@
-"""How colors and attributes are set on a terminal, and what has to be sent to change them."""
+"""Sequences for colors and attributes, and those that change from one to another."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class CellLook(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def look_of(ansi: str) -> CellLook:
-    """What the numbers of a style mean, as `1;38;5;7;48;5;0`."""
+    """Return the look of a style such as `1;38;5;7;48;5;0`."""
     attributes, colors = set(), {"foreground": "", "background": ""}
     left = ansi.split(";") if ansi else []
     while left:
@@ -65,16 +65,16 @@ def change(before: str, after: str) -> str:
 
 
 def erasable(ansi: str) -> bool:
-    """Whether a blank of this style looks like an erased cell."""
+    """Return True if a blank of this style looks like an erased cell."""
     return look_of(ansi).attributes <= SEEN_ON_SIGNS
 
 
 @lru_cache(maxsize=1024)
-def of_blank(ansi: str) -> str:
+def blank_style(ansi: str) -> str:
     """The style of a blank without what is seen on signs only."""
     return look_of(ansi).background if erasable(ansi) else ansi
 
 
 def same_blank(before: str, after: str) -> bool:
-    """Whether a blank looks the same in two styles."""
-    return erasable(before) and erasable(after) and of_blank(before) == of_blank(after)
+    """Return True if a blank looks the same in two styles."""
+    return erasable(before) and erasable(after) and blank_style(before) == blank_style(after)

@@ -1,4 +1,4 @@
-"""What is known of a key besides its name: when it was read, in what company, before which stop."""
+"""Facts about a key besides its name: its time, its burst, the stop before it."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ class Stroke(NamedTuple):
     read_at: float
     """Seconds of `time.monotonic` at which its first character was read."""
     stamp: object
-    """What the app's `stop_stamp` was then: the key is void where it is another one now."""
+    """The app's `stop_stamp` at that time: the key is discarded if it has changed."""
     alone: bool = True
-    """Whether no other key was read within 50 ms of it."""
+    """True if no other key was read within 50 ms of it."""
     held: bool = False
-    """Whether it is the repeat of an arrow that is held down."""
+    """True if it is the repeat of an arrow that is held down."""
     steps: bool = True
-    """Whether it may step a value: alone, held, or the first of a piece of one arrow only."""
+    """True if it may step a value: alone, held, or the first of a piece of one arrow only."""
     piece: int = 1
-    """How many keys came at once, as far as that was known."""
+    """Number of keys that came together, as far as known."""
 
     @property
     def acts(self) -> bool:
-        """Whether it may do more than write text and move a cursor."""
+        """True if it may do more than write text and move a cursor."""
         return self.alone or self.held
 
 
@@ -35,6 +35,6 @@ def attach(event: Event, stroke: Stroke) -> None:
 
 
 def stroke_of(event: Event) -> Stroke | None:
-    """What is known of the key of an event; None for one that no terminal has sent."""
+    """Return the facts about the key of an event; None for one that no terminal has sent."""
     known: Any = vars(event).get("stroke")
     return known if isinstance(known, Stroke) else None

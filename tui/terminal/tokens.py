@@ -1,4 +1,4 @@
-"""What comes out of the characters that a terminal sends."""
+"""Tokens from the characters of a terminal."""
 
 from __future__ import annotations
 

@@ -48,7 +48,8 @@ class TypeAhead:
         return stroke_of(self._taken) if self._taken is not None else None
 
     def admit(self, typed: Typed) -> bool:
-        """Whether the app may take this key now; one that must wait comes again in its turn."""
+        """Return True if the app may take this key now; one that must wait comes again in its
+        turn."""
         if self._taken is not None and typed is not self._taken:
             if not self._repeats_the_last(typed):
                 self._waiting.append(typed)
@@ -61,7 +62,7 @@ class TypeAhead:
         return True
 
     def _repeats_the_last(self, typed: Typed) -> bool:
-        """Whether it is a held key that waits already: it is to end with the key."""
+        """Return True if it is a held key that waits already: it is to end with the key."""
         last = self._waiting[-1] if self._waiting else None
         if not isinstance(typed, Key) or not isinstance(last, Key) or typed.key != last.key:
             return False

@@ -79,7 +79,7 @@ def fitting(keys: Sequence[KeyLabel], width: int, kept: Collection[str]) -> list
 
 
 def key_styles(action: str) -> tuple[Style, Style]:
-    """How a key and its words are drawn; a key that stops a motor is red."""
+    """Return the styles of a key and its words; a key that stops a motor is red."""
     return (STOP_KEY, STOP_KEY) if action.startswith("stop") else (KEY, FAINT)
 
 
@@ -97,7 +97,7 @@ def key_line(
 
 
 def armed_text(armed: float | None, *, lost: bool = False) -> Text:
-    """Whether a drive is armed, and for how many seconds more."""
+    """Return whether a drive is armed, and for how many seconds more."""
     if armed is None:
         return Text(" NOT ARMED  ", ALARM if lost else STRONG)
     return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)

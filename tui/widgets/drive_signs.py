@@ -1,4 +1,4 @@
-"""How the state of a drive and the age of a value look, wherever they are shown."""
+"""Look of a drive's state and of a value's age, on every screen."""
 
 from __future__ import annotations
 

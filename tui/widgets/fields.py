@@ -18,7 +18,7 @@ class Field(Input):
             super().update_node_styles(animate)
 
     takes_space: ClassVar[bool] = True
-    """Whether Space is typed into it; where it is not, Space stops the motor there too."""
+    """True if Space is typed into it; where it is not, Space stops the motor there too."""
 
     def __init__(self, value: str = "", **how: Any) -> None:
         super().__init__(value, highlighter=Signs(), compact=True, **how)

@@ -37,11 +37,11 @@ class Lines(Widget):
         self._under: Style | None = None
         """The colors of the place itself; to ask for them costs more than to draw a line."""
         self.redrawn = 0
-        """How many lines were sent so far, for tests and benchmarks."""
+        """Number of lines sent so far, for tests and benchmarks."""
 
     @property
     def lines(self) -> list[Text]:
-        """What is shown."""
+        """Lines that are shown."""
         return list(self._lines)
 
     def show(self, lines: Sequence[Text]) -> None:
@@ -196,7 +196,7 @@ def looks(strip: Strip) -> tuple[str, list[Style | None]]:
 
 
 def same(one: Text, other: Text) -> bool:
-    """Whether two lines look the same, their colors too."""
+    """Return True if two lines look the same, their colors too."""
     if one is other:
         return True
     return one.plain == other.plain and one.spans == other.spans and one.style == other.style

@@ -1,4 +1,4 @@
-"""What a motor does now, in one line: for questions that are asked while it turns."""
+"""State of a motor in one line: for questions that are asked while it turns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text
 from .palette import ALARM, FAINT, PLAIN, STALE, STRONG
 
 QUANTITIES_NOW: tuple[Quantity, ...] = ("output_frequency", "motor_current")
-"""What is told beside the state."""
+"""Quantities shown beside the state."""
 NUMBER_WIDTH = 7
 HEADLINE_WIDTH = 18
 """Columns of the state's words, so that the numbers behind them stand still."""
@@ -53,7 +53,7 @@ def motor_now(
 
 
 def _by_look(look: Look | None, now: float) -> Text:
-    """What the line watch saw, which reads the state and no values."""
+    """Return the state from the line watch, which reads no values."""
     if look is None or look.state is None:
         return _not_known("", None)
     age = max(0.0, now - look.time)

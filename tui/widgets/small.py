@@ -1,4 +1,4 @@
-"""What stands on a terminal too small for a screen: the motor, and the keys that stop it."""
+"""Contents of a terminal too small for a screen: the motor, and the keys that stop it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STOPS = (("Space", ""), ("F12", ""), ("F9", "STOP ALL"))
 
 
 def is_too_small(width: int, height: int) -> bool:
-    """Whether a terminal is too small for a screen."""
+    """Return True if a terminal is too small for a screen."""
     return width < LEAST_WIDTH or height < LEAST_HEIGHT
 
 
@@ -31,7 +31,9 @@ def small_lines(view: StripView, target: str, width: int, height: int) -> list[T
     `whom` says whom the stop key stops.
     """
     drive = view.drive
-    lines = _of_drive(drive, width) if drive is not None else [Text(" No drive is open.", STRONG)]
+    lines = (
+        _drive_lines(drive, width) if drive is not None else [Text(" No drive is open.", STRONG)]
+    )
     if view.faults:
         lines.append(Text(f" {view.faults} in fault on this line", FAULT))
     apart = [Text()] if height >= ROWS_FOR_GAPS else []
@@ -47,7 +49,7 @@ def small_lines(view: StripView, target: str, width: int, height: int) -> list[T
     return lines[:height]
 
 
-def _of_drive(drive: DriveNow, width: int) -> list[Text]:
+def _drive_lines(drive: DriveNow, width: int) -> list[Text]:
     """State, figures with their units, and who it is."""
     style = STRIP_STYLES.get(drive.kind, STRONG)
     state = f"{STATE_SIGNS.get(drive.kind, '□')} {drive.words}"
@@ -57,12 +59,12 @@ def _of_drive(drive: DriveNow, width: int) -> list[Text]:
     if drive.armed is not None:
         line.append(" ").append(f" ARM {drive.armed:2.0f} ", ATTENTION_BLOCK)
     values = Text()
-    of_now = STRONG if drive.age is None else STALE
+    style = STRONG if drive.age is None else STALE
     for text, unit in (
         (drive.frequency, drive.frequency_unit),
         (drive.current, drive.current_unit),
     ):
-        values.append(f"{text or '-----':>6}", of_now).append(f" {unit}  ", FAINT)
+        values.append(f"{text or '-----':>6}", style).append(f" {unit}  ", FAINT)
     name = Text(f" {plain(drive.name or drive.model)}", FAINT)
     return [line, values, name]
 

@@ -59,7 +59,7 @@ class DriveNow(NamedTuple):
 
     device: int
     name: str
-    """What it says it is called; empty where it says nothing."""
+    """Name that it reports; empty if none."""
     model: str
     kind: str
     """Kind of its state, or `stop` while one is on its way, `stop failed` where it is none."""
@@ -74,7 +74,7 @@ class DriveNow(NamedTuple):
     armed: float | None = None
     """Seconds for which it is armed yet."""
     by: str = ""
-    """Who commands it, where it is not this panel."""
+    """Its commander, if it is not this panel."""
 
 
 class StripView(NamedTuple):
@@ -86,12 +86,12 @@ class StripView(NamedTuple):
     faults: int = 0
     """Drives of the line that are in fault."""
     unseen: bool = False
-    """Whether one of the faults was not looked at yet."""
+    """True if one of the faults was not looked at yet."""
     load: float | None = None
     clock: str = ""
     read_only: bool = False
     off_record: bool = False
-    """Whether the journal cannot be written."""
+    """True if the journal cannot be written."""
     trouble: tuple[str, ...] = ()
     """A few words for a trouble of the line, the longest first; empty while it is healthy."""
 
@@ -127,7 +127,7 @@ def _line_text(line: str, room: int) -> str:
 
 
 def _drive(drive: DriveNow, width: int) -> Text:
-    """Who it is, its state and values; the name has what the other parts may leave."""
+    """Return its identity, state and values; the name gets the room that the others leave."""
     right = RIGHT_WIDTH if width >= NARROW else NARROW_RIGHT
     room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - VALUES_WIDTH - right))
     who = Text(no_wrap=True)
@@ -167,7 +167,7 @@ def _values(drive: DriveNow) -> Text:
 
 
 def _right(view: StripView, width: int) -> Text:
-    """What concerns the whole line, and whether keys move this drive's motor."""
+    """Return the part on the whole line, and whether keys move this drive's motor."""
     text, drive, narrow = Text(no_wrap=True), view.drive, width < NARROW
     room = NARROW_RIGHT if narrow else RIGHT_WIDTH
     off_record = "J!" if narrow and drive is not None else "NO JOURNAL "
@@ -271,7 +271,7 @@ class Said(NamedTuple):
     kind: str
     age: float
     there: bool = False
-    """Whether it is about another drive than the one that is open."""
+    """True if it is about another drive than the one that is open."""
 
 
 class FrameView(NamedTuple):
@@ -286,7 +286,7 @@ class FrameView(NamedTuple):
 
     @property
     def at_once(self) -> object:
-        """What is shown at once on a slow link too: state, stop, fault, arming, what was said."""
+        """Parts shown at once on a slow link too: state, stop, fault, arming, message."""
         strip, drive, message = self.strip, self.strip.drive, self.message
         who = drive and (drive.device, drive.kind, drive.words, drive.age is None, drive.by)
         armed = drive is not None and drive.armed is not None

@@ -17,7 +17,7 @@ WANTED = Style(color=KEY.color)
 WANTED_OVER = "#123a5c"
 """Color of the line where the area lies over it."""
 AREA, HANGING, LINE_ABOVE, LINE_OVER = range(4)
-"""What a cell shows: the area, the end of one that hangs from zero, the line beside or over it."""
+"""Contents of a cell: the area, the end of one that hangs from zero, the line beside or over it."""
 
 TrendCell = tuple[str, int]
 
@@ -84,12 +84,13 @@ def _below(
 
 
 def _eighths(value: float, high: float, rows: int, row: int) -> int:
-    """How much of a row is filled, 0 to 8."""
+    """Return the filled part of a row, 0 to 8."""
     return max(0, min(8, round(value / high * rows * 8) - row * 8))
 
 
 def _line_at(value: float, high: float, rows: int, row: int) -> float | None:
-    """Where in a row a line stands, in eighths from zero's side; None where it is in another."""
+    """Return the place of a line in a row, in eighths from zero's side; None if it is in
+    another."""
     place = min(value / high, 1.0) * rows
     own = min(rows - 1, int(place))
     return (place - own) * 8 if own == row else None

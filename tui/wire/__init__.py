@@ -1,1 +1,1 @@
-"""What goes over the wire, as the protocol has it: frames, checksum, times. Pure functions."""
+"""Frames, checksums and times of the protocol. Pure functions."""

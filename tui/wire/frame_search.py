@@ -21,7 +21,7 @@ def _rows() -> tuple[tuple[int, ...], ...]:
 
 
 def _step(low: int) -> int:
-    """What the low byte of a register becomes behind eight shifts."""
+    """Return the effect of a register's low byte after eight shifts."""
     for _ in range(8):
         low = (low >> 1) ^ (0xA001 if low & 1 else 0)
     return low

@@ -41,7 +41,7 @@ def frame(device: int, pdu: bytes) -> bytes:
 
 
 def is_whole(data: bytes | bytearray) -> bool:
-    """Whether the bytes end with the checksum of the others."""
+    """Return True if the bytes end with the checksum of the others."""
     return len(data) >= MIN_FRAME and crc16(data) == 0
 
 

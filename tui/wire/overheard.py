@@ -1,4 +1,4 @@
-"""What a frame that was overheard on a line asks of whom; replies and noise ask nothing."""
+"""Requests in a frame overheard on a line; replies and noise have none."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class OverheardRequest(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What it asks, in few words."""
+        """Request in few words."""
         several = f" on, {self.words} words" if self.words > 1 else ""
         if self.function in READS:
             return f"read of {READS[self.function]} {self.register}{several}"

@@ -1,4 +1,4 @@
-"""What characters and silences take on a serial line (Modbus over serial line 2.5.1.1)."""
+"""Times of characters and silences on a serial line (Modbus over serial line 2.5.1.1)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ _FORMAT = re.compile(r"8([NEO])([12])")
 
 
 def is_format(text: str) -> bool:
-    """Whether a text is a character format that Modbus RTU can have: 8E1, 8N1, 8O1, 8N2 ..."""
+    """Return True if a text is a character format that Modbus RTU can have: 8E1, 8N1, 8O1, 8N2
+    ..."""
     return _FORMAT.fullmatch(text) is not None
 
 

@@ -1,4 +1,4 @@
-"""Whether a loop has just come back from standing still: by SIGSTOP, or on a machine that swaps."""
+"""True if a loop has just come back from standing still: by SIGSTOP, or on a machine that swaps."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Awake:
 
     @property
     def just_woke(self) -> bool:
-        """Whether what comes in now may have come while the loop stood still."""
+        """True if what comes in now may have come while the loop stood still."""
         now = self._clock()
         # the bytes of a connection are taken in before the look that is due
         return now - self._looked > STANDS_STILL or now < self._stale_until

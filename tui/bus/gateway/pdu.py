@@ -1,4 +1,4 @@
-"""What a Modbus client asks of a gateway, from the bytes of its request; and answers as bytes.
+"""Requests of Modbus clients to a gateway, parsed from bytes, and answers as bytes.
 
 Pure functions. Lengths and counts are held strictly: a request that is not exactly what its
 function says is refused with exception 3, never half understood.
@@ -52,7 +52,7 @@ class WriteAsked:
 
     @property
     def words(self) -> Mapping[int, int]:
-        """What is to be written, by register."""
+        """Words to be written, by register."""
         return {self.address + offset: word for offset, word in enumerate(self.values)}
 
 
@@ -76,7 +76,7 @@ GatewayAsked = ReadAsked | WriteAsked | DiagnoseAsked | IdentifyAsked
 
 
 def parse_request(pdu: bytes) -> GatewayAsked:
-    """What the bytes of a request ask for. Raises Unanswerable."""
+    """Parse the bytes of a request. Raises Unanswerable."""
     function, data = pdu[0], pdu[1:]
     match function:
         case 3 | 4:

@@ -57,7 +57,7 @@ class _Incoming(asyncio.StreamReader):
 
     @property
     def stale(self) -> bool:
-        """Whether what was taken last waited while this program stood still."""
+        """True if what was taken last waited while this program stood still."""
         return self._taken <= self._stale
 
 
@@ -73,7 +73,7 @@ class TcpRequest:
     unit: int
     pdu: bytes
     stale: bool = False
-    """Whether it waited while this program stood still: nobody may expect its effect now."""
+    """True if it waited while this program stood still: nobody may expect its effect now."""
     turn: Callable[[], Awaitable[None]] = at_once
     """Returns once the writes that came before it on its connection are answered."""
 

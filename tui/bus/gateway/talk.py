@@ -22,11 +22,11 @@ class TcpClient:
     """Host and port that it comes from."""
     host: str = ""
     left: bool = False
-    """Whether it sends nothing any more: it may be gone."""
+    """True if it sends nothing any more: it may be gone."""
 
 
 class ClientTalk:
-    """What is under way on one connection."""
+    """Pending work of one connection."""
 
     def __init__(self, client: TcpClient, writer: asyncio.StreamWriter) -> None:
         self.client = client
@@ -35,13 +35,13 @@ class ClientTalk:
         self.requested = asyncio.get_running_loop().time()
         """When a request came last, on the loop's clock."""
         self.goes = False
-        """Whether it is about to end for another one."""
+        """True if it is about to end for another one."""
         self._under_way: set[asyncio.Task[None]] = set()
         self._writes: set[asyncio.Task[None]] = set()
 
     @property
     def full(self) -> bool:
-        """Whether no further read is taken."""
+        """True if no further read is taken."""
         return len(self._under_way) >= MOST_AT_ONCE
 
     @property
@@ -90,7 +90,7 @@ class ClientTalk:
 
 
 def peer_text(peer: object) -> str:
-    """Where a connection comes from, as a person writes it."""
+    """Return the source of a connection as a person writes it."""
     if not isinstance(peer, tuple) or len(peer) < 2:
         return "somewhere"
     host, port = str(peer[0]), peer[1]

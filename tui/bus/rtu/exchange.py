@@ -51,7 +51,7 @@ class RtuExchange:
 
     @property
     def expected(self) -> bool:
-        """Whether a reply is due at all."""
+        """True if a reply is due at all."""
         return self._expectation is not None
 
     @property
@@ -114,7 +114,7 @@ class RtuExchange:
         )
 
     def _is_too_short(self, expectation: Expectation) -> bool:
-        """Whether neither the reply nor a refusal can be there yet, as after most pieces."""
+        """Return True if neither the reply nor a refusal can be there yet, as after most pieces."""
         if expectation.length is None:
             return False
         if len(self.buffer) - self._skipped_to >= expectation.length + 3:
@@ -123,7 +123,7 @@ class RtuExchange:
         return not self._exceptions or refusal not in self.buffer
 
     def _after_echo(self) -> int:
-        """Where a reply may begin: behind the echo of the request, if there is one."""
+        """Return where a reply may begin: after the echo of the request, if there is one."""
         if self._mirrored and self.echo is False:
             return 0
         copy = self.buffer.find(self.frame)
@@ -148,7 +148,7 @@ class RtuExchange:
         )
 
     def _loose(self, match: Match | None = None) -> list[Piece]:
-        """What was received beside the reply and the echo."""
+        """Return the bytes received beside the reply and the echo."""
         rest = bytearray(self.buffer)
         parts = []
         if match is not None:
@@ -183,7 +183,8 @@ class RtuExchange:
         return None
 
     def _is_remnant(self, data: bytes, expectation: Expectation) -> bool:
-        """Whether damaged bytes are what came of the reply: by its head, or by its length."""
+        """Return True if damaged bytes are what came of the reply: by its head, or by its
+        length."""
         if expectation.length is not None and len(data) == expectation.length + 3:
             return True
         return begins_reply(data, self._device, expectation.function) or expectation.prefix in data

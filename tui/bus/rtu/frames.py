@@ -76,6 +76,7 @@ def pieces(data: bytes | bytearray) -> list[Piece]:
 
 
 def begins_reply(data: bytes, device: int, function: int) -> bool:
-    """Whether a reply of the device to the function seems to begin somewhere in the bytes."""
+    """Return True if a reply of the device to the function seems to begin somewhere in the
+    bytes."""
     heads = (bytes([device, function]), bytes([device, function | EXCEPTION]))
     return any(head in data for head in heads)

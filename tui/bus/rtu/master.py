@@ -126,7 +126,7 @@ class RtuMaster:
         self._ends = max(time, self._sent, self._over) + self._gap
 
     def _came_too_early(self, result: ExchangeResult, time: float) -> bool:
-        """Whether a reply began before its request was over: then it is that of another one.
+        """Return True if a reply began before its request was over: then it is that of another one.
 
         Only where the line is known to keep the time of its baud.
         """

@@ -1,4 +1,4 @@
-"""What a person reads beside the bytes that came in one exchange: a pure function."""
+"""Remarks for a person beside the bytes of one exchange: a pure function."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .frames import pieces
 
 
 def noted(result: ExchangeResult, request: bytes, device: int) -> Iterator[tuple[bytes, str]]:
-    """What came, in pieces, each with what it is; empty for the reply itself."""
+    """Yield the received pieces, each with its remark; empty for the reply itself."""
     if not result.received:
         return
     if result.pdu and len(result.received) == len(result.pdu) + 3:

@@ -1,1 +1,1 @@
-"""Who may ask when: the queue, the dispatcher, patience with slow devices, the line's own loop."""
+"""Order of requests: the queue, the dispatcher, patience with slow devices, the line's own loop."""

@@ -104,7 +104,7 @@ async def open_master(
 
 
 def _no_counts() -> None:
-    """What a device server tells of its port."""
+    """Report that a device server does not count port errors."""
 
 
 class Connection:
@@ -216,7 +216,7 @@ class Connection:
         self._say(LineStatus.CONNECTED, f"{self._dispatcher.facts.unkept} {self._note}".strip())
 
     def _say_of_owner(self, status: LineStatus, text: str, error: LineError | None) -> None:
-        """What the program tells that owns the line; its requests are its own business."""
+        """Report about the program that owns the line; its requests are its own business."""
         if status is LineStatus.CONNECTED:
             self.refusal = None
             self._failures = 0

@@ -1,4 +1,4 @@
-"""What a line has seen of one device, field by field; `Devices` says what follows from it."""
+"""Record of one device, field by field; `Devices` draws conclusions from it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Outstanding:
     due: float
     expires: float
     copy: bool = False
-    """Whether it came once already, at `sent`, and may come again."""
+    """True if it came once already, at `sent`, and may come again."""
     pdu: bytes = b""
     """The request, if it may be repeated while its reply is outstanding."""
 

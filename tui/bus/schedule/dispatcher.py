@@ -46,7 +46,7 @@ class Dispatcher:
         facts: SharedFacts | None = None,
     ) -> None:
         self.facts = facts or SharedFacts()
-        """What the programs that share the line must know of each other."""
+        """State shared by the programs on the line."""
         self._devices = devices
         self._clock = clock
         self._queue = JobQueue(timing.queue_length, tally.use)
@@ -63,7 +63,7 @@ class Dispatcher:
         self.held_back: Callable[[], bool] = bool
         """True if nothing but stops may go out now: others may have sent stops meanwhile."""
         self.last_way: LastWay | None = None
-        """Where stops wait that go around the queue."""
+        """Place of stops that bypass the queue."""
 
     def wake(self) -> None:
         """Something changed: a request came, a late reply came, or the line was lost."""

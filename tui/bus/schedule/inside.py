@@ -1,4 +1,4 @@
-"""What sharing needs of the line that is shared, and what the line needs of sharing."""
+"""Interface between sharing and the line that is shared."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ class LineInside:
 
     @property
     def timing(self) -> Timing:
-        """What governs the line."""
+        """Timing of the line."""
         return self.around.timing
 
     @property
     def clock(self) -> MonotonicClock:
-        """What the line counts by."""
+        """Clock of the line."""
         return self.around.clock
 
     @property
     def facts(self) -> SharedFacts:
-        """What the programs on the line must know of each other."""
+        """State shared by the programs on the line."""
         return self.dispatcher.facts
 
 

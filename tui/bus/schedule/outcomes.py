@@ -1,4 +1,4 @@
-"""What becomes of a request once its exchange is over: an answer, an error, or another try."""
+"""Result of a request once its exchange is over: an answer, an error, or a retry."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Outcomes:
         gateway: bool,
     ) -> None:
         self.values = SharedValues()
-        """What was read a moment ago."""
+        """Values read a moment ago."""
         self._devices = devices
         self._tally = tally
         self._timing = timing

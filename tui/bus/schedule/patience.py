@@ -1,4 +1,4 @@
-"""What the line knows of each device: limits, turnaround, silence, replies that may still come."""
+"""Knowledge of the line about each device: limits, turnaround, silence, late replies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LONGEST_WAIT = 10.0
 QUIET_SHARE = 0.3
 """Longest that the whole line keeps quiet for one late device, as a share of the timeout."""
 FORGET = 0.99
-"""What is left of the worst lateness after each reply in time."""
+"""Share of the worst lateness that remains after each timely reply."""
 SHORT_WAIT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
@@ -56,7 +56,7 @@ class Devices:
         self[device].limits = limits
 
     def state(self, device: int) -> DeviceState:
-        """What has been seen of a device."""
+        """Return what is known about a device."""
         record = self[device]
         return DeviceState(
             record.answers,
@@ -156,8 +156,8 @@ class Devices:
         now: float,
         repeated: tuple[bytes, float | None] = (b"", None),
     ) -> tuple[bool, int]:
-        """Whether a refusal would be surely that of the next request, and how many replies
-        that fit it may come first. One to an earlier try of a repeat is as good as its own."""
+        """Return whether a refusal would surely be that of the next request, and how many
+        fitting replies may come first. One to an earlier try of a repeat is as good as its own."""
         late = [
             each for each in self._still_outstanding(device, now) if not each.is_reply_to(*repeated)
         ]
@@ -175,7 +175,7 @@ class Devices:
         return record.outstanding
 
     def is_repeat(self, device: int, pdu: bytes, reply: bytes, turnaround: float) -> bool:
-        """Whether a reply is more likely a copy of one before than that of this request.
+        """Return True if a reply is more likely a copy of one before than that of this request.
 
         It is the same to the last bit, though other registers were asked for, and it came
         earlier or later than this device ever answers.
@@ -216,7 +216,7 @@ class Devices:
             record.outstanding.append(Outstanding(expectation, now, now, now + settle, copy=True))
 
     def _settle_of(self, record: Device, now: float) -> float:
-        """How long nothing like it is asked after a reply, where replies came twice."""
+        """Return the seconds without a similar request after a reply, if replies came twice."""
         single = now - record.repeated
         if single > SHORT_MEMORY:
             record.settle = min(record.settle, SHORT_WAIT)

@@ -26,7 +26,7 @@ class Job:
     limits: Limits
     answer: Future[Reply] = field(default_factory=Future)
     repeats: int = 0
-    """How often it has been sent again."""
+    """Number of retries."""
     first_sent: float | None = None
     """When it was first sent, if it is sent again: a reply to it may be of that time."""
     pdu: bytes = b""

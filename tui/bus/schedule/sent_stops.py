@@ -21,7 +21,7 @@ class SentStop(NamedTuple):
 
     when: float
     tries: int
-    """How often, without an acknowledgment; 0 once it was acknowledged."""
+    """Number of unacknowledged attempts; 0 once acknowledged."""
 
 
 class SentStops:

@@ -25,7 +25,7 @@ LEAST_COUNTED = 0.001
 
 
 class LineShares:
-    """Who comes next: a stop, then kinds that were kept below their share, then by priority.
+    """Order of requests: stops, then kinds below their share, then by priority.
 
     Within a kind, programs take turns by the time that each has had. Lives in the line's loop.
     """

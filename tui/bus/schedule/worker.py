@@ -19,7 +19,7 @@ class Worker:
     def __init__(self, work: ThreadWork, name: str, loop: asyncio.AbstractEventLoop) -> None:
         self.name = name
         self.error: BaseException | None = None
-        """What ended the work against its will."""
+        """Error that ended the worker."""
         self._work = work
         self._loop = loop
         self._task: asyncio.Task[object] | None = None
@@ -69,7 +69,7 @@ class Worker:
             self._task.cancel()
 
     def done(self) -> bool:
-        """Whether the work has ended: by itself, by cancel() or by an error."""
+        """Return True if the work has ended: by itself, by cancel() or by an error."""
         return self._ended.done()
 
     def wait(self, timeout: float | None = None) -> bool:

@@ -56,7 +56,7 @@ class Client:
     shares: dict[int, float] = field(default_factory=dict)
     trace: bool = False
     frames: int = 0
-    """How many frames of the line it was told of."""
+    """Number of frames of the line sent to it."""
     limits: dict[int, Limits] = field(default_factory=dict)
     stops_left: list[Job] = field(default_factory=list)
     """Stops that it had asked when it went."""
@@ -68,7 +68,7 @@ class Client:
     heard: float = 0.0
     """When it last said anything."""
     looks: int = 0
-    """How often the owner has looked in vain for a sign of life since."""
+    """Number of checks without a heartbeat since the last one."""
 
     def say(self, message: AnyMessage) -> None:
         """Tell it something; never waits."""
@@ -163,7 +163,7 @@ class Client:
             job.answer.cancel()
 
     def news(self, inside: LineInside, shares: dict[int, float]) -> News:
-        """What is new to it on the line."""
+        """Return the news of the line for it."""
         changed = {}
         for device in inside.devices.known:
             state = inside.devices.state(device)

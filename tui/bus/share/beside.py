@@ -1,4 +1,4 @@
-"""What a program asks of the holder of a line without being attached to it.
+"""Requests of a program to the holder of a line without being attached.
 
 In place of a Hello it sends four bytes, which read as the length of a message are longer than any.
 The answer follows, then the connection closes.

@@ -1,4 +1,4 @@
-"""Who commands which device, granted by the owner of the line; questions and their answers."""
+"""Commander of each device, granted by the owner of the line; requests and answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What programs that share a line tell each other: tagged messages, length before each.
+"""Messages between programs that share a line: tagged, with the length before each.
 
 Times are those of the machine's monotonic clock, which all its programs share.
 """
@@ -76,9 +76,9 @@ class Welcome(Message, frozen=True):
     label: Text
     """The line as it is open."""
     requested: bool = True
-    """Whether it is open with the settings that were meant."""
+    """True if it is open with the settings that were meant."""
     gone: bool = False
-    """Whether it was taken for gone meanwhile: it commands nothing any more."""
+    """True if it was taken for gone meanwhile: it commands nothing any more."""
 
 
 class TurnedAway(Message, frozen=True):
@@ -88,7 +88,7 @@ class TurnedAway(Message, frozen=True):
 
 
 class Describe(Message, frozen=True):
-    """What a device may be sent."""
+    """Requests that a device accepts."""
 
     device: DeviceId
     limits: Limits
@@ -107,7 +107,7 @@ class Asking(Message, frozen=True):
     """The count of stops of the device that the asker knew of."""
     requested: MonotonicTime
     limits: Limits | None = None
-    """Where they are not those of the device: of a broadcast."""
+    """Limits if they differ from the device's: of a broadcast."""
     within: Seconds | None = None
     """Seconds in which the answer is to begin, where the asker says it."""
 
@@ -119,7 +119,7 @@ class Withdraw(Message, frozen=True):
 
 
 class Answer(Message, frozen=True):
-    """What the line answered; `time` when its last byte was on the wire."""
+    """Reply of the line; `time` when its last byte was on the wire."""
 
     number: Number
     pdu: ByteString
@@ -127,7 +127,7 @@ class Answer(Message, frozen=True):
 
 
 class Failed(Message, frozen=True):
-    """What became of a request that was not answered well."""
+    """Result of a request that failed."""
 
     number: Number
     error: Word
@@ -139,7 +139,7 @@ class StopGiven(Message, frozen=True):
 
     devices: DeviceIds
     counts: Annotated[tuple[StopCount, ...], Meta(max_length=MOST_DEVICES)]
-    """How often the program has stopped each of them by now."""
+    """Stops of each device given by the program so far."""
     by: Text
     program: Program
     when: MonotonicTime | None = None
@@ -223,15 +223,15 @@ class PollWish(Message, frozen=True):
 
 
 class Facts(Message, frozen=True):
-    """What all must know; sent when it changes."""
+    """State that all programs need; sent on change."""
 
     programs: Annotated[tuple[Program, ...], Meta(max_length=MOST_PROGRAMS)]
     commanders: Annotated[dict[DeviceId, ProgramId], Meta(max_length=MOST_DEVICES)]
     """Ids of the programs that command, by device."""
     stops: StopsByDevice
-    """How many stops each device was given, by program."""
+    """Stops given to each device, by program."""
     paused: Annotated[dict[DeviceId, tuple[ProgramId, Notice]], Meta(max_length=MOST_DEVICES)]
-    """Who leaves which device alone, and why."""
+    """Program that paused polling of each device, and why."""
     stopped: StopTimes = {}
     """When each device was stopped last."""
     departed: Annotated[tuple[Program, ...], Meta(max_length=MOST_PROGRAMS)] = ()
@@ -239,7 +239,7 @@ class Facts(Message, frozen=True):
 
 
 class News(Message, frozen=True):
-    """What the line does; sent again and again, and the owner's sign of life."""
+    """State of the line, sent repeatedly; also the owner's heartbeat."""
 
     state: LineState
     counters: LineCounters

@@ -1,4 +1,4 @@
-"""Whether the owner of a line lives, by what a client hears of it, and what is done if it hangs."""
+"""True if the owner of a line lives, by what a client hears of it, and what is done if it hangs."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class KeeperProcess:
 
     @property
     def remedy(self) -> str:
-        """Who can end it if this program cannot, for a person."""
+        """Advice on ending it if this program cannot."""
         return self._remedy.format(pid=self._pid)
 
     def kill(self) -> bool:
@@ -108,7 +108,7 @@ class OwnerWatch:
         self.frozen = False
         """True while it does not answer."""
         self.remedy = ""
-        """Who can end it if this program cannot, for a person."""
+        """Advice on ending it if this program cannot."""
         self._process: KeeperProcess | None = None
         self._killed: float | None = None
         self._looks = 0

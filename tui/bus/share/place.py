@@ -1,4 +1,4 @@
-"""Where programs that share a line meet: the lock that decides who owns it, and the socket.
+"""Meeting place of programs that share a line: the lock that decides ownership, and the socket.
 
 The lock lies where nobody takes it away (the state folder), and tells where the socket is.
 """
@@ -39,12 +39,12 @@ LONGEST_LOCK = 1 << 14
 
 
 class Owner(msgspec.Struct, frozen=True):
-    """What a lock file tells of the program that holds it."""
+    """Entry of the owner in its lock file."""
 
     version: Number
     program: Program
     socket: Text
-    """Where it listens; empty where it does not yet, or has ended."""
+    """Address of its socket; empty before it listens and after it ended."""
     quiet_until: MonotonicTime = 0.0
     """Monotonic time until which a reply to an owner that has ended may come."""
     stopped: StopTimes = {}
@@ -73,7 +73,7 @@ class SharePlace:
     """The line without its spelling."""
     lock_folder: Path
     socket_folders: tuple[Path, ...]
-    """Where the socket may lie, the best first."""
+    """Folders for the socket, the best first."""
     group: int | None = None
     """The group of users that may attach; None for this user alone."""
 
@@ -112,7 +112,7 @@ class OwnerLock:
 
     @property
     def held(self) -> bool:
-        """Whether this program owns the line."""
+        """True if this program owns the line."""
         return self._file is not None
 
     def take(self) -> bool:
@@ -181,7 +181,7 @@ class OwnerLock:
 
     @property
     def stands(self) -> bool:
-        """Whether the lock file is still the one that others would try."""
+        """True if the lock file is still the one that others would try."""
         if self._file is None:
             return False
         try:
@@ -216,7 +216,7 @@ class OwnerLock:
 
 
 def owner_of(place: SharePlace) -> Owner | None:
-    """Who owns a line, as its lock file tells; None where it tells nothing that is understood."""
+    """Return the owner of a line from its lock file; None if that is empty or not understood."""
     return owner_of_lock(place.lock_path)
 
 
@@ -276,7 +276,7 @@ def reached(path: Path, within: float) -> socket.socket:
 
 
 def has_ended(program: Program) -> bool:
-    """Whether a program of this machine surely is no more; in doubt it lives."""
+    """Return True if a program of this machine surely is no more; in doubt it lives."""
     if program.process[0] != pid_namespace():
         return False
     try:

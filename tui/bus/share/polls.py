@@ -45,7 +45,7 @@ class ServedPlan:
     client: Client
     message: Subscribe
     rates: dict[PlannedRead, float]
-    """How often each of its reads is sent in a second."""
+    """Rate of each of its reads per second."""
     task: asyncio.Task[None] | None = None
     read_at: dict[PlannedRead, float] = field(default_factory=dict)
     """The time of the last reply to each read."""
@@ -276,7 +276,7 @@ def plan_refusal(plan: PollPlan, limits: Limits) -> str:
 def _answer_of(
     reply: PolledReply, device: int, address: int, count: int, function: int
 ) -> Reply | LineError:
-    """What a message brings for one read. Raises NoMessage."""
+    """Return the reply or error in a message for one read. Raises NoMessage."""
     if reply.failure is not None:
         return error_of(*reply.failure)
     if len(reply.pdu) != 2 + 2 * count or reply.pdu[:2] != bytes([function, 2 * count]):

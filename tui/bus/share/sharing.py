@@ -53,7 +53,7 @@ KEEPER_STARTS = 20.0
 
 
 class Sharing:
-    """How one program shares one line; lives in the line's loop."""
+    """Sharing of one line by one program; lives in the line's loop."""
 
     def __init__(self, place: SharePlace, inside: LineInside, *, keeper: bool = False) -> None:
         """With `keeper` a process is started that owns the line; without, this program does."""

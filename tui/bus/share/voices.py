@@ -1,4 +1,4 @@
-"""How what is done in one program reaches the others."""
+"""Publication of a program's actions to the others."""
 
 from __future__ import annotations
 

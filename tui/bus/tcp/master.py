@@ -156,7 +156,7 @@ class TcpMaster:
 
 
 def _result(unit: bytes, sending: Sending, awaited: int) -> ExchangeResult:
-    """What a reply with the right transaction id is."""
+    """Return the result for a reply with the right transaction id."""
     expectation = sending.expectation
     assert expectation is not None
     device, pdu = unit[6], unit[HEADER_LENGTH:]

@@ -1,4 +1,4 @@
-"""What carries the bytes of a line: a port or a connection, opened and ready."""
+"""Transport of the bytes of a line: a port or a connection, opened and ready."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Transport(Protocol):
     """Bytes out, bytes in, and exact pauses in between."""
 
     note: str
-    """What is out of the ordinary about this port, empty when nothing is."""
+    """Unusual properties of this port; empty if none."""
 
     def start(self, receiver: Receiver) -> None:
         """Begin to receive; called once, in the line's loop."""

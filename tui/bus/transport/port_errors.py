@@ -1,4 +1,4 @@
-"""What a serial port itself counts: characters that arrived broken, and breaks on the line."""
+"""Error counts of a serial port: broken characters and breaks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PortErrors(NamedTuple):
     """Characters that the port or the system let go."""
 
     def since(self, before: PortErrors) -> PortErrors:
-        """What has been added; a driver that was loaded anew counts from 0."""
+        """Return the errors since then; a driver that was reloaded counts from 0."""
         grown = [now - then for now, then in zip(self, before, strict=True)]
         return self if min(grown) < 0 else PortErrors(*grown)
 

@@ -23,18 +23,18 @@ _OWN_SIGN = re.compile(r"[^0-9A-Za-z#+.:=@_-]")
 
 @dataclass(frozen=True, slots=True)
 class PortName:
-    """What a port is called for good."""
+    """Lasting name of a port."""
 
     path: str
     """A link that leads to this adapter only, else the port's own path."""
     adapter: str = ""
     """USB vendor, product and serial number of the adapter; empty where there is none."""
     shared: bool = False
-    """Whether its by-id name is no name of its own: its make has it, not the adapter."""
+    """True if its by-id name is no name of its own: its make has it, not the adapter."""
 
     @property
     def lasting(self) -> bool:
-        """Whether the path stays the adapter's, or at least its socket's."""
+        """True if the path stays the adapter's, or at least its socket's."""
         return bool(self.adapter)
 
 
@@ -51,7 +51,7 @@ class _UsbDevice:
 
 
 def lasting_name(path: str, links: Path | None = None, system: Path | None = None) -> PortName:
-    """What the port at a path is called for good; the links are followed as they lead now.
+    """Return the lasting name of the port at a path; links are followed as they are now.
 
     `links` and `system` are the folders of device links and of ports, those of this machine
     unless given.
@@ -82,7 +82,7 @@ def _links_to(folder: Path, real: str) -> Iterator[str]:
 
 
 def _has_twin(usb: _UsbDevice, port: str, system: Path) -> bool:
-    """Whether another adapter says the same of itself, its serial number too."""
+    """Return True if another adapter says the same of itself, its serial number too."""
     kind = _NUMBER.sub("", port)
     try:
         names = [name for name in os.listdir(system) if _NUMBER.sub("", name) == kind]

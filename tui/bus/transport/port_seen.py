@@ -1,4 +1,4 @@
-"""What can be seen of a serial port without opening it: rights, holders, its adapter's latency."""
+"""Facts about a serial port found without opening it: rights, holders, adapter latency."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class PortSeen:
     path: str
     there: bool = True
     permitted: bool = True
-    """Whether this user may read and write it."""
+    """True if this user may read and write it."""
     group: str = ""
     """The group whose users may, where the port has one."""
     user: str = ""
     in_group: bool = False
-    """Whether the user was put into the group and has not logged in since."""
+    """True if the user was put into the group and has not logged in since."""
     holder: str = ""
     """Programs that hold it, this one aside; with their process ids."""
     others: str = ""

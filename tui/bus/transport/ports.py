@@ -48,7 +48,7 @@ def _by_number(path: str) -> list[tuple[int, str]]:
 
 
 def is_pseudo_terminal(path: str) -> bool:
-    """Whether a path is the slave side of a pseudo-terminal, which has no parity."""
+    """Return True if a path is the slave side of a pseudo-terminal, which has no parity."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):
@@ -61,7 +61,8 @@ def is_pseudo_terminal(path: str) -> bool:
 
 
 def _is_no_port(path: str) -> bool:
-    """Whether there is something that is surely no serial port: a file, a folder, /dev/null."""
+    """Return True if there is something that is surely no serial port: a file, a folder,
+    /dev/null."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):
@@ -122,7 +123,7 @@ def _has_open(process: str, path: str) -> bool:
 
 
 def _name(pid: int) -> str:
-    """What a process is called; of a Python program the name of its script."""
+    """Return the name of a process; for a Python program that of its script."""
     try:
         with open(f"/proc/{pid}/comm", encoding="utf-8", errors="replace") as file:
             name = file.read().strip()
@@ -162,7 +163,7 @@ def open_serial(path: str, baud: int, format: str, *, alone: bool = True) -> ser
 
 
 def _has_parity(port: serial.Serial) -> bool:
-    """Whether a port took the parity it was asked for; a refusal can be silent on POSIX."""
+    """Return True if a port took the parity it was asked for; a refusal can be silent on POSIX."""
     if port.parity == serial.PARITY_NONE or sys.platform == "win32":
         return True
     import termios
@@ -201,7 +202,7 @@ def _open(path: str, baud: int, format_: str, *, alone: bool) -> serial.Serial:
 def port_error(
     path: str, baud: int, format_: str, error: Exception
 ) -> PortBusy | PortMissing | PortRefused:
-    """What a person is told where a port could not be opened so."""
+    """Return the error for a port that could not be opened."""
     number = getattr(error, "errno", None)
     text = str(error)
     if number in BUSY:

@@ -138,7 +138,7 @@ class PosixSerial:
             self._take()
 
     def errors(self) -> PortErrors | None:
-        """What the port has counted of broken characters; None where it does not tell."""
+        """Return the port's counts of broken characters; None if it does not count."""
         return port_errors(self._fd) if self._fd is not None else None
 
     def close(self) -> None:

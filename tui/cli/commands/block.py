@@ -210,7 +210,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
 
 
 def _cut_short(sent: dict[str, bool]) -> str:
-    """What Ctrl-C or a signal has left behind; by slot whether the drive was seen to hold it."""
+    """Report what Ctrl-C or a signal left; by slot, whether the drive was seen to hold it."""
     held = ", ".join(slot for slot, taken in sent.items() if taken) or "none"
     open_yet = ", ".join(slot for slot, taken in sent.items() if not taken)
     rest = f" {open_yet} may have been written too: look at it." if open_yet else ""
@@ -220,7 +220,7 @@ def _cut_short(sent: dict[str, bool]) -> str:
 def _judged(
     session: DriveSession, held: dict[str, int], plans: list[Assignment], wanted: Wanted
 ) -> list[dict[str, Any]]:
-    """What changes, told in a dry run; raises Failure where something of it is refused."""
+    """Return the changes of a dry run; raises Failure if a change is refused."""
     from tui.drive.blocks.assignment import describe, slot_changes
     from tui.drive.blocks.slot_rules import assignment_problems, refusing
 

@@ -128,7 +128,7 @@ async def _reset(watch: CounterWatch) -> None:
 
 
 def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
-    """What was counted, as titles with their texts."""
+    """Yield the counts as titles with their texts."""
     from tui.session.counters.turnarounds import bars
 
     ours = found.since

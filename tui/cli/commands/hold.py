@@ -29,7 +29,7 @@ from .orders import complain
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.timeout_told import Timeout
+    from tui.session.timeout_report import Timeout
 
 DISARMS = (
     "While this runs, the communication timeout gives no protection: if the program or master"
@@ -122,7 +122,7 @@ async def _connected(opened: OpenLine, target: Target) -> DriveSession:
 
 
 def held_text(session: DriveSession, found: Timeout) -> str:
-    """What a drive is kept from."""
+    """Return which reaction of the drive is prevented."""
     who = f"Device {session.device}, {session.profile.name}"
     if not found.known:
         return f"{who}: its communication timeout cannot be read; it is polled often."

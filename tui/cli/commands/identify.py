@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 IDENTITY_KEYS = ("device", "vendor", "reference", "version", "name", "profile")
-"""What JSON tells of an identity, by its own names."""
+"""Names of the fields of an identity in JSON."""
 IDENTITY_TITLES = 11
 """Width of the column of titles, with its gap."""
 

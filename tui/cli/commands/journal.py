@@ -31,7 +31,7 @@ class WantedDrive:
 
 
 def _wanted_drive(_ctx: click.Context, _option: click.Parameter, text: str) -> WantedDrive:
-    """What `2`, `2/LINE` or `LINE` means."""
+    """Parse `2`, `2/LINE` or `LINE`."""
     number, slash, line = text.partition("/")
     if not number.isdecimal() or (slash and not line):
         return WantedDrive(line=text)
@@ -58,8 +58,10 @@ def since(text: str, now: datetime) -> datetime | None:
         if ago := _AGO.fullmatch(text):
             return now - timedelta(seconds=int(ago[1]) * _SECONDS[ago[2]])
         if re.fullmatch(r"\d\d?:\d\d(:\d\d)?", text):
-            of_day = time.fromisoformat(text.rjust(5, "0") if len(text) < 6 else text.rjust(8, "0"))
-            then = datetime.combine(now.date(), of_day).astimezone()
+            clock_time = time.fromisoformat(
+                text.rjust(5, "0") if len(text) < 6 else text.rjust(8, "0")
+            )
+            then = datetime.combine(now.date(), clock_time).astimezone()
             return then if then <= now else then - timedelta(days=1)
         return datetime.fromisoformat(text).astimezone()
     except (ValueError, OverflowError, OSError):

@@ -83,7 +83,7 @@ def lines(as_json: bool) -> None:
 
 
 def _faults(one: NamedLine) -> Iterator[str]:
-    """What keeps a name from being used, as far as can be told without opening its line."""
+    """Yield the problems of a name, as far as they are known without opening its line."""
     from tui.bus.errors import LinkSyntaxError
     from tui.drive.errors import DriveError
     from tui.drive.profile import library

@@ -1,4 +1,4 @@
-"""What every command that commands a drive needs: arming, watching, what became of it."""
+"""Shared parts of commands to drives: arming, watching, results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tui.session.journal import Journal
     from tui.session.monitor.snapshot import Snapshot
     from tui.session.starts.keeper import StartKeeper
-    from tui.session.timeout_told import TimeoutWatch
+    from tui.session.timeout_report import TimeoutWatch
     from tui.session.work import Permit
 
 COMMAND_POLL_INTERVAL = 0.02
@@ -74,7 +74,7 @@ def close_journal(journal: Journal) -> None:
 
 
 def moved(journal: Journal) -> bool:
-    """Whether a command was sent, answered or not; a reference alone moves nothing."""
+    """Return True if a command was sent, answered or not; a reference alone moves nothing."""
     return any(not entry.why.startswith("reference") for entry in journal.sent)
 
 
@@ -167,7 +167,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
 
 
 def _way_on(error: Exception | None) -> str:
-    """What lets a command through that was refused, where something does."""
+    """Return how to unblock a refused command, if possible."""
     from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 
     refused = isinstance(error, StartNotRecorded) and not isinstance(error, StartOvertaken)

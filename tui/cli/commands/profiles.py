@@ -176,7 +176,7 @@ def _list(as_json: bool) -> None:
 
 
 def _remark(listing: Listing) -> str:
-    """What sets a file apart: whose it is, that it is broken, that another counts."""
+    """Return the remark on a file: its owner, broken, or overridden."""
     from tui.drive.profile import library
 
     if listing.hidden_by is not None:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 ALIKE = 3
 """More than so many that are left out for one reason are told without their values."""
 CODES_NAMED = 12
-"""How many codes are named for one reason; --dry-run names all."""
+"""Number of codes named for one reason; --dry-run names all."""
 
 
 @click.command()
@@ -164,14 +164,14 @@ def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> No
     """The plan: what is written in its order, and what is left out with its reason."""
     from tui.drive.settings.write_sequence import ordered
 
-    items = {item.code: item for item in plan.of_kind("write")}
+    items = {item.code: item for item in plan.items_of_kind("write")}
     held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}
     for edit in ordered(session.profile, plan.edits, held):
         item = items[edit.code]
         text = f"write  {item.code}: {item.old} -> {item.new}  {item.text}"
         messages.tell(text.rstrip(), indent=7)
     left: dict[str, list[RestoreItem]] = {}
-    for item in plan.of_kind("skip"):
+    for item in plan.items_of_kind("skip"):
         if item.reason != "no setting":
             left.setdefault(item.text, []).append(item)
     for text, same in left.items():
@@ -243,14 +243,15 @@ async def _restore(
 
 
 def say_plan_left_out(plan: RestorePlan, messages: Messages) -> None:
-    """What was left out, by reason; roundings each, as somebody wrote these values by hand."""
+    """Report omitted settings by reason, and each rounding, as a person wrote these values by
+    hand."""
     reasons: dict[str, list[str]] = {}
-    for item in plan.of_kind("skip"):
+    for item in plan.items_of_kind("skip"):
         if item.reason == "rounding":
             messages.tell(f"left out: {item.text.rstrip('.')}. Use --round to write it anyway.")
         elif item.reason != "no setting":
             reasons.setdefault(item.reason, []).append(item.code)
-    for item in plan.of_kind("write"):
+    for item in plan.items_of_kind("write"):
         if item.text:
             messages.tell(item.text)
     for reason, codes in reasons.items():

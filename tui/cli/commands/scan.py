@@ -149,7 +149,7 @@ def _settings_text(scan: Scan) -> str:
 
 
 def _hint(scan: Scan) -> str:
-    """What to look at where nobody answers."""
+    """Return what to check if no drive answers."""
     if scan.remarks:
         return "drivepanel why LINE -d ADDRESS names the cause and the next steps."
     look = "Are the drives on, and are the two wires those of the line?"

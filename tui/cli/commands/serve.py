@@ -213,7 +213,7 @@ def _opened(stack: ExitStack, served: ServedLine, plant: PlantWish | None) -> Op
 
 
 def _reached(places: ServedAt, wish: GatewayWish | None) -> str:
-    """Where what is served can be reached, in a few words."""
+    """Return the addresses of the server in a few words."""
     parts = [""]
     if wish is not None:
         parts.append(f"Modbus TCP at {places.tcp}, {_may(wish)}")
@@ -225,7 +225,7 @@ def _reached(places: ServedAt, wish: GatewayWish | None) -> str:
 
 
 def _may(wish: GatewayWish) -> str:
-    """What clients may do, in a few words."""
+    """Return the rights of clients in a few words."""
     may = ["reads"]
     if wish.rules.writes:
         may.append(f"writes of {', '.join(sorted(wish.rules.writes))}")

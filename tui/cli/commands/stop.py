@@ -125,7 +125,7 @@ def _devices(text: str | None) -> list[int]:
 
 
 def has_order(session: DriveSession, order: OrderId) -> bool:
-    """Whether the family has such an order at all."""
+    """Return True if the family has such an order at all."""
     charts = session.profile.data.charts
     return any(one.id == order for chart in charts for one in chart.orders)
 

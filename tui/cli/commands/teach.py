@@ -106,7 +106,7 @@ async def _look(teacher: Teacher, code: str, value: str, unit: str, *, as_json: 
 
     lesson = await teacher.look(code, value, unit)
     if as_json:
-        print_json({**_of_drive(teacher), **_lesson_json(code, lesson)})
+        print_json({**_drive_fields(teacher), **_lesson_json(code, lesson)})
     else:
         say(lesson.text)
         if teacher.proposal() == code:
@@ -126,13 +126,13 @@ def _tell_change(teacher: Teacher, text: str, *, as_json: bool) -> None:
     from ..shared.output import print_json
 
     if as_json:
-        print_json({**_of_drive(teacher), "text": text, "reference": teacher.reference or None})
+        print_json({**_drive_fields(teacher), "text": text, "reference": teacher.reference or None})
     else:
         say(text)
 
 
 def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
-    """What is taught and what was begun, of one parameter or of all."""
+    """Report taught scales and begun lessons, of one parameter or of all."""
     from ..shared.output import print_json
 
     codes = [p.code for p in teacher.family.parameters if teacher.looks(p.code)]
@@ -140,7 +140,7 @@ def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
     if as_json:
         kept = {code: _kept_json(teacher, code) for code in rows}
         reference = teacher.reference or None
-        print_json({**_of_drive(teacher), "taught": kept, "reference": reference})
+        print_json({**_drive_fields(teacher), "taught": kept, "reference": reference})
         return
     for code in rows:
         scale = teacher.scales.get(code)
@@ -157,7 +157,7 @@ def _tell_trouble(teacher: Teacher) -> None:
         say(f"drivepanel: {teacher.trouble}", err=True)
 
 
-def _of_drive(teacher: Teacher) -> dict[str, Any]:
+def _drive_fields(teacher: Teacher) -> dict[str, Any]:
     session = teacher.session
     return {
         "line": session.line_text,

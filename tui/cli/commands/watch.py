@@ -165,7 +165,7 @@ def watch(
 
 @dataclass(slots=True)
 class CyclesSeen:
-    """What was told so far."""
+    """Cycles reported so far."""
 
     cycles: int = 0
     silent: str = ""
@@ -174,7 +174,7 @@ class CyclesSeen:
     """The highest status of the drives that were not there at the start."""
 
     def at_the_end(self, wish: CsvWish) -> str:
-        """What was told and written, in a sentence."""
+        """Return the summary in a sentence."""
         count = wish.file.rows if wish.file is not None else 0
         rows = f"; {count} rows written to {wish.path}" if wish.path is not None else ""
         return f"Ended by Ctrl-C after {self.cycles} cycles{rows}."

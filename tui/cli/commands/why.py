@@ -96,7 +96,7 @@ async def _looked_after(
     """
     from tui.drive.profile import library
     from tui.session.drive import DriveSession
-    from tui.session.timeout_told import Timeout
+    from tui.session.timeout_report import Timeout
 
     from ..shared.left_alone import look_after
     from ..shared.output import drive_json
@@ -173,7 +173,7 @@ def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool
 
 
 def why_json(found: Diagnosis) -> dict[str, Any]:
-    """What was found, for a program."""
+    """Return the diagnosis as JSON."""
     sight, heard = found.sight, found.sight.heard
     late = sight.turnaround
     return {

@@ -13,7 +13,7 @@ class TurnaroundField(DocumentPart):
 
 
 class OurCountersField(DocumentPart):
-    """What was counted here; `exceptions` by their code, `turnarounds` as a histogram."""
+    """Counts of this program; `exceptions` by their code, `turnarounds` as a histogram."""
 
     frames: int
     replies: int

@@ -11,7 +11,7 @@ import sys
 
 import msgspec
 
-from .of_drives import (
+from .drive_documents import (
     CommandDocument,
     CountersDocument,
     CycleDocument,
@@ -29,8 +29,8 @@ from .of_drives import (
     StatusDocument,
     StopDocument,
 )
-from .of_listening import HeardExchangeDocument, HeardSummaryDocument
-from .of_others import (
+from .listening_documents import HeardExchangeDocument, HeardSummaryDocument
+from .other_documents import (
     BundleDocument,
     CheckDocument,
     InputsDocument,
@@ -46,7 +46,7 @@ from .of_others import (
     SimulationReady,
     WiringDocument,
 )
-from .of_settings import (
+from .setting_documents import (
     BackupDocument,
     BlockChangeDocument,
     BlockFileDocument,

@@ -7,7 +7,7 @@ from typing import Literal
 import msgspec
 from msgspec import UNSET, UnsetType
 
-QualityTold = Literal["good", "stale", "bad"]
+QualityText = Literal["good", "stale", "bad"]
 
 
 class DocumentPart(msgspec.Struct, forbid_unknown_fields=True):
@@ -34,7 +34,7 @@ class ValueField(DocumentPart):
     unit: str
     text: str
     taught: bool
-    quality: QualityTold
+    quality: QualityText
     unsure: bool | UnsetType = UNSET
 
 
@@ -47,7 +47,7 @@ class WatchedValueField(DocumentPart):
     unit: str
     text: str
     taught: bool
-    quality: QualityTold
+    quality: QualityText
     time: str | None
     error: str | None
     unsure: bool | UnsetType = UNSET
@@ -63,7 +63,7 @@ class TimeoutField(DocumentPart):
 
 
 class HeardField(DocumentPart):
-    """What was seen while a drive was asked; counts are of requests unless told otherwise."""
+    """Traffic while a drive was polled; counts are of requests unless stated otherwise."""
 
     asked: int
     answered: int
@@ -114,7 +114,7 @@ class StateField(DocumentPart):
 
 
 class EditField(DocumentPart):
-    """What became of one setting."""
+    """Result of one setting."""
 
     code: str
     typed: str | None
@@ -201,7 +201,7 @@ class LookField(DocumentPart):
 
 
 class ResetField(DocumentPart):
-    """How a fault is reset."""
+    """Reset of a fault."""
 
     way: str | None
     confidence: str
@@ -211,7 +211,7 @@ class ResetField(DocumentPart):
 
 
 class ControlField(DocumentPart):
-    """Who has the control, and the commands that change that."""
+    """Holder of the control, and the commands that change it."""
 
     taken: bool | None
     take: str | None

@@ -6,7 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from .of_drives import DriveDocument
+from .drive_documents import DriveDocument
 from .parts import HeardField
 
 
@@ -34,10 +34,10 @@ class WhyDocument(DriveDocument, kw_only=True):
     command: Literal["why"]
     rung: str
     answers: bool
-    """Whether the drive answers and nothing is wrong: status 0, else 3."""
+    """True if the drive answers and nothing is wrong: status 0, else 3."""
     certainty: Literal["certain", "likely", "possible"]
     others: list[str]
-    """What else it could be; empty if it is certain."""
+    """Other possible causes; empty if it is certain."""
     text: str
     next: list[str]
     seen: HeardField

@@ -19,7 +19,7 @@ PASSWORD_SETTING = "DRIVEPANEL_MQTT_PASSWORD"
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 SHAPE = "write mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS"
 NO_LEVEL = re.compile(r"[/+#\s\x00-\x1f\x7f]+")
-"""What has a meaning of its own in a topic, or none."""
+"""Characters with a meaning of their own in a topic, or forbidden in one."""
 
 
 class Broker(NamedTuple):

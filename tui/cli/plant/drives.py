@@ -37,7 +37,7 @@ TIMEOUT_READ_AGAIN = 20.0
 """Seconds after which a drive's communication timeout is read anew."""
 
 GATEWAY = "serve"
-"""What a program is called on a line whose clients may start motors."""
+"""Name of the program on a line whose clients may start motors."""
 
 Sign = Callable[[int], float | None]
 """When whoever started the motor of a device was last heard; None where nobody is known to have."""
@@ -57,7 +57,7 @@ class PlantLine:
     drives: tuple[PlantDrive, ...]
 
     def sight(self, now: float) -> LineSight:
-        """What is known of it; `now` is on the monotonic clock."""
+        """Return the state of the line; `now` is on the monotonic clock."""
         line = self.opened.line
         drives = tuple(one.sight(now) for one in self.drives)
         return LineSight(self.name, self.opened.text, line.state, line.counters, drives)
@@ -137,7 +137,7 @@ class PlantDrive:
         self._good = 0.0
 
     def sight(self, now: float) -> DriveSight:
-        """What is known of it; `now` is on the monotonic clock."""
+        """Return the state of the drive; `now` is on the monotonic clock."""
         if self.cycle is None:
             return DriveSight(self.device, self._session, None, self._error, self._contact)
         return drive_sight(self.device, self._session, self.cycle, now)
@@ -271,7 +271,7 @@ async def _learn_timeout(session: DriveSession) -> None:
 
 
 def _is_orphan(session: DriveSession) -> bool:
-    """Whether whoever started the motor has ended, and did not mean to leave it running.
+    """Return True if whoever started the motor has ended, and did not mean to leave it running.
 
     So has the client of another program's gateway that commands the drive no more. Reads files.
     """

@@ -67,7 +67,7 @@ class MetricSample(NamedTuple):
 
 
 class MetricHead(NamedTuple):
-    """What a metric is."""
+    """Name, type and help of a metric."""
 
     kind: str
     help: str
@@ -159,14 +159,14 @@ def _escaped(text: str) -> str:
 def _samples(lines: Iterable[LineSight], version: str, now: float) -> Iterator[MetricSample]:
     yield MetricSample("build_info", {"version": version}, 1)
     for line in lines:
-        yield from _of_line(line)
+        yield from _line_samples(line)
         for drive in line.drives:
             where = {"line": line.name, "device": str(drive.device)}
-            yield from _of_counters(where, line.counters.devices.get(drive.device))
-            yield from _of_drive(where, drive, now)
+            yield from _counter_samples(where, line.counters.devices.get(drive.device))
+            yield from _drive_samples(where, drive, now)
 
 
-def _of_line(line: LineSight) -> Iterator[MetricSample]:
+def _line_samples(line: LineSight) -> Iterator[MetricSample]:
     where, counted = {"line": line.name}, line.counters
     yield MetricSample("line_connected", where, line.state.status is LineStatus.CONNECTED)
     for name, number in (
@@ -190,7 +190,7 @@ def _of_line(line: LineSight) -> Iterator[MetricSample]:
     yield MetricSample("line_stray_frames", where, minute.strays)
 
 
-def _of_counters(where: Labels, counted: DeviceCounters | None) -> Iterator[MetricSample]:
+def _counter_samples(where: Labels, counted: DeviceCounters | None) -> Iterator[MetricSample]:
     counted = counted or DeviceCounters()
     for name, number in (
         ("requests", counted.requests),
@@ -210,7 +210,7 @@ def _of_counters(where: Labels, counted: DeviceCounters | None) -> Iterator[Metr
     yield MetricSample("drive_turnaround_seconds", where, total, "_count")
 
 
-def _of_drive(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSample]:
+def _drive_samples(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSample]:
     yield MetricSample("drive_up", where, drive.cycle is not None and drive.contact == "answers")
     for contact in get_args(Contact):
         yield MetricSample("drive_contact", {**where, "contact": contact}, contact == drive.contact)
@@ -232,7 +232,7 @@ def _of_drive(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSa
             fault = {**where, "fault": state.fault.code, "name": state.fault.name}
             yield MetricSample("drive_fault_info", fault, 1)
     for code, reading in drive.cycle.readings.items():
-        yield from _of_value({**where, **_who(drive.session, code)}, reading, now)
+        yield from _value_samples({**where, **_who(drive.session, code)}, reading, now)
 
 
 def _who(session: DriveSession, code: str) -> Labels:
@@ -241,7 +241,7 @@ def _who(session: DriveSession, code: str) -> Labels:
     return {"code": code, **({"quantity": quantity} if quantity else {})}
 
 
-def _of_value(who: Labels, reading: Reading, now: float) -> Iterator[MetricSample]:
+def _value_samples(who: Labels, reading: Reading, now: float) -> Iterator[MetricSample]:
     good = reading.quality == "good"
     yield MetricSample("value_good", who, good)
     if reading.raw is None:

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     import aiomqtt
 
 log = logging.getLogger(__name__)
-_of_client = logging.getLogger(f"{__name__}.client")
+_client_log = logging.getLogger(f"{__name__}.client")
 # it tells every message that a broker sends unasked; what counts is raised
-_of_client.setLevel(logging.CRITICAL)
+_client_log.setLevel(logging.CRITICAL)
 
 MQTT_KEEPALIVE = 10
 """Seconds; a broker sends the last will after 1.5 of these at the latest."""
@@ -51,7 +51,7 @@ class MqttPublisher:
         self._ended = False
         self._trouble = ""
         self.connected = False
-        """Whether a broker takes messages now."""
+        """True if a broker takes messages now."""
 
     def news(self) -> None:
         """Something was read, or the state of a line has changed."""
@@ -116,7 +116,7 @@ class MqttPublisher:
             username=broker.user,
             password=broker.password,
             identifier=client_id(broker.root),
-            logger=_of_client,
+            logger=_client_log,
             will=aiomqtt.Will(will, OFFLINE, qos=1, retain=True),
             keepalive=MQTT_KEEPALIVE,
             tls_context=ssl.create_default_context() if broker.tls else None,
@@ -185,7 +185,7 @@ def client_id(root: str) -> str:
 
 
 def why_lost(error: Exception) -> str:
-    """What a person is told of a lost connection: the system's words without their number."""
+    """Return the cause of a lost connection: the system's words without their number."""
     return re.sub(r"^\[(Errno|SSL)[^]]*\] ", "", str(error))
 
 

@@ -36,7 +36,7 @@ class Changes:
 
 
 def sights_of(lines: Sequence[PlantLine]) -> list[LineSight]:
-    """What is known of each line now."""
+    """Return the current state of each line."""
     now = time.monotonic()
     return [line.sight(now) for line in lines]
 

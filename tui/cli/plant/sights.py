@@ -1,4 +1,4 @@
-"""What is known of lines and their drives at a moment, for who hands it on to the plant."""
+"""State of lines and their drives at a moment, for publication to the plant."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ LINE_COUNTS = (
 
 
 def status_topic(root: str) -> str:
-    """Where it stands whether this program publishes."""
+    """Return the topic with the state of this publisher."""
     return f"{root}/status"
 
 

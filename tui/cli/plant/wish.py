@@ -1,4 +1,4 @@
-"""What is to go out to the plant, as options say it."""
+"""Options for publication to the plant."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .topics import line_topics
 
 @dataclass(frozen=True, slots=True)
 class PlantWish:
-    """Where values go, and how often they are read."""
+    """Destinations of values, and the rate of reading."""
 
     metrics: tuple[str, int] | None
     broker: Broker | None
@@ -29,7 +29,7 @@ class PlantWish:
 def plant_wish(
     metrics: str | None, mqtt: str | None, password_file: Path | None, every: float | None
 ) -> PlantWish | None:
-    """What the options ask for; None for nothing. Raises UsageError."""
+    """Return the requested publication; None if none. Raises UsageError."""
     if password_file is not None and mqtt is None:
         raise click.UsageError("--mqtt-password-file requires --mqtt.")
     if metrics is None and mqtt is None:
@@ -88,7 +88,7 @@ def warn_of_plain_password(broker: Broker) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address is reached from this computer only."""
+    """Return True if an address is reached from this computer only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

@@ -13,7 +13,7 @@ YES = frozenset({"y", "yes"})
 
 
 def may_ask() -> bool:
-    """Whether there is a person at a terminal to ask."""
+    """Return True if there is a person at a terminal to ask."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
@@ -29,7 +29,7 @@ async def says_yes(question: str) -> bool:
 
 
 def _forget_typed() -> None:
-    """What was typed before the question was seen is no answer to it."""
+    """Discard input typed before the question was shown."""
     if os.name == "posix":
         import termios
 

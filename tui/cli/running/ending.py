@@ -13,7 +13,7 @@ from ..shared.signals import handled, signal_name
 
 @dataclass(slots=True)
 class Ending:
-    """Whether the command is to end, and why; belongs to the loop."""
+    """True if the command is to end, and why; belongs to the loop."""
 
     event: asyncio.Event = field(default_factory=asyncio.Event)
     why: str = ""

@@ -1,4 +1,4 @@
-"""Whether the thread of a line still turns, as seen from outside of it."""
+"""True if the thread of a line still turns, as seen from outside of it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class LinePulse:
 
     @property
     def alive(self) -> bool:
-        """Whether it beat a moment ago."""
+        """True if it beat a moment ago."""
         return not self._worker.done() and time.monotonic() - self._last < STILL_AFTER
 
     async def _beat(self) -> None:

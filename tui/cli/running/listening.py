@@ -28,12 +28,12 @@ class HearingRun:
         self._output = output
         self._file = file
         self._wall = time.time() - time.monotonic()
-        """What makes a time since 1970 of one of the monotonic clock."""
+        """Offset from the monotonic clock to seconds since 1970."""
         self._hearing = Hearing(line, families, self._tell, self._keep)
 
     @property
     def text(self) -> str:
-        """What was heard and written, in a sentence."""
+        """Summary of the traffic and of the files, in a sentence."""
         tally = self._hearing.listener.tally
         text = f"Heard {tally.exchanges} exchanges in {tally.frames} frames"
         if self._file is None:

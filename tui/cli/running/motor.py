@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.timeout_told import TimeoutWatch
+    from tui.session.timeout_report import TimeoutWatch
 
 RUN_POLL_INTERVAL = 0.05
 CYCLES_AT_REST = 2
@@ -48,7 +48,7 @@ STOPS_THAT_MAY_FAIL = 2
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What `run` was asked for; `seconds` is how long."""
+    """Options of `run`; `seconds` is the duration."""
 
     order: OrderId
     reference: str | None
@@ -57,7 +57,7 @@ class Wish:
     unrecorded: bool
     as_json: bool
     take_control: bool = False
-    """Whether the control is taken from the terminals first."""
+    """True if the control is taken from the terminals first."""
 
 
 @dataclass(slots=True)
@@ -71,7 +71,7 @@ class Run:
     ending: Ending
     watch: TimeoutWatch | None = None
     ordering: bool = False
-    """Whether the run order is on its way, so that it may be sent at any time."""
+    """True if the run order is on its way, so that it may be sent at any time."""
 
     async def carry_out(self) -> None:
         """Run the motor until the end; stop it then, whatever went wrong, or leave it running."""
@@ -87,7 +87,7 @@ class Run:
             self.telling.tell("left-running", self._left_alone())
 
     def _left_alone(self) -> str:
-        """What becomes of the motor where nobody asks its drive."""
+        """Return the drive's reaction if polling stops."""
         return left_alone_text(self.console.session, watch=self.watch)
 
     async def _started(self) -> bool:
@@ -165,7 +165,7 @@ class Run:
                 await asyncio.wait_for(self.ending.event.wait(), RUN_POLL_INTERVAL)
 
     def _at_rest(self, latest: Snapshot) -> bool:
-        """Whether it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
+        """Return True if it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
         if latest.error:
             return False
         kind = latest.state.kind
@@ -218,7 +218,7 @@ class Run:
                 raise Failure(f"Device {session.device}: {report.text}", DRIVE_REFUSED)
 
     def _stands(self) -> bool:
-        """Whether the motor is seen at rest, though the drive did not take the stop."""
+        """Return True if the motor is seen at rest, though the drive did not take the stop."""
         latest = latest_of(self.console)
         enabled = latest.state.motion == "running"
         return self._at_rest(latest) and not enabled and self._frequency(latest) == 0

@@ -1,4 +1,4 @@
-"""What is told of a search over a line: hits at once, how far it is, and how it ended."""
+"""Output of a scan: hits at once, progress, and the result."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SETTING_WIDTH = 10
 INDENT = 3 + 2 + SETTING_WIDTH + 2
-"""Where the text of a hit begins."""
+"""Column of the text of a hit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Hit:
 
     @property
     def sure(self) -> str:
-        """How sure it is which drive it is: identified, likely, unknown."""
+        """Certainty of the identity: identified, likely, unknown."""
         if self.identity.profile is not None:
             return "identified"
         return "likely" if self.identity.candidates else "unknown"
@@ -40,7 +40,7 @@ class Hit:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a search is."""
+    """Progress of a search."""
 
     setting: LineSetting | None
     requested: int
@@ -72,7 +72,7 @@ class ScanTelling:
         self._on_terminal = sys.stderr.isatty()
 
     def families(self, found: Sequence[WatchingFamily]) -> None:
-        """Who may be there and acts when it is asked no more, before the first request."""
+        """Report possible drives that react to lost polling, before the first request."""
         text = watching_text(found)
         if not text:
             return
@@ -114,7 +114,7 @@ class ScanTelling:
         self.note(f"{result.error} The address is taken{twice}.")
 
     def progress(self, progress: Progress) -> None:
-        """How far it is, in one line that is written over; on a terminal only."""
+        """Show the progress in one line that is overwritten; on a terminal only."""
         if not self._on_terminal:
             return
         width = get_terminal_size().columns - 1

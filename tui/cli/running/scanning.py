@@ -42,9 +42,9 @@ class Scan:
     settings: list[LineSetting] = field(default_factory=list)
     """Those to be tried, that of the line first; none over a network."""
     costs: SettingCosts | None = None
-    """What they take; None where no other is tried."""
+    """Estimate for other settings; None if none is tried."""
     yes: bool = False
-    """Whether other settings are tried although drives that were found may act meanwhile."""
+    """True if other settings are tried although drives that were found may act meanwhile."""
     hits: list[Hit] = field(default_factory=list)
     tried: list[LineSetting] = field(default_factory=list)
     held_back: str = ""
@@ -97,7 +97,7 @@ class Scan:
 
     @property
     def setting(self) -> LineSetting | None:
-        """What the line is open at; None over a network."""
+        """Setting at which the line is open; None over a network."""
         from tui.bus.link import SerialLink
 
         link = self.opened.line.link
@@ -137,7 +137,7 @@ class Scan:
 
     @asynccontextmanager
     async def _held(self) -> AsyncIterator[Fleet]:
-        """What asks the drives of this setting on, until the line is left."""
+        """Keep polling the drives of this setting until the line is left."""
         from tui.session.fleet import Fleet
         from tui.session.journal import Journal
 
@@ -176,7 +176,7 @@ class Scan:
         self.tell.slow(later, self.costs.seconds(later), text)
 
     def _progress(self, search: Search) -> Progress:
-        """How far it is; the slow settings are a step of their own."""
+        """Return the progress; the slow settings are a step of their own."""
         later, left, found = self.settings[len(self.tried) :], search.left, len(self.hits)
         if self.costs is not None:
             slow = self.setting is not None and self.setting.slow
@@ -239,7 +239,7 @@ class Scan:
         return f"{NONE_TRIED}."
 
     async def _acts(self, session: DriveSession) -> str:
-        """What a drive does once it is asked no more, in a sentence; empty for nothing."""
+        """Return a drive's reaction to lost polling in a sentence; empty for none."""
         from tui.session.monitor.timeout import timeout_now
 
         await look_after(self.opened, session, self.line_text).learn()

@@ -1,4 +1,4 @@
-"""What a program tells systemd, by the protocol of sd_notify: ready, alive, ending.
+"""Messages to systemd by the protocol of sd_notify: ready, alive, ending.
 
 A datagram to the socket that NOTIFY_SOCKET names; without it nothing is told to anybody.
 """

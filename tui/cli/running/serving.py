@@ -54,7 +54,7 @@ class OpenedLine:
 
 @dataclass(frozen=True, slots=True)
 class ServedAt:
-    """Where what is served can be reached; None for what is not."""
+    """Addresses of the servers; None for those that are off."""
 
     tcp: str | None = None
     metrics: str | None = None

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .stop_telling import StopTelling
 
 BLIND_TRIES = 3
-"""How often the first word goes to a drive that answers nothing."""
+"""Number of first stop words to a drive that does not answer."""
 REMEMBERED_WITHIN = 0.5
 """Seconds in which the starts on record are read."""
 
@@ -40,7 +40,7 @@ class StoppableDrive:
 
 @dataclass(frozen=True, slots=True)
 class StopWish:
-    """How the drives of a line are to be stopped."""
+    """Options for stopping the drives of a line."""
 
     opened: OpenLine
     profile_id: str | None

@@ -1,4 +1,4 @@
-"""What is told of drives that are stopped: lines as each stands, or one JSON document."""
+"""Output of stops: a line for each drive, or one JSON document."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class StopTelling:
         self._first: dict[int, list[dict[str, Any]]] = {}
 
     def sent_first(self, device: int, sent: Sequence[SentFirst], says: str) -> None:
-        """What went out before a drive had said what it is, and what it says."""
+        """Report the word sent before a drive was identified, and its answer."""
         for one in sent:
             if not self.as_json:
                 with suppress(OSError):

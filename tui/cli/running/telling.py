@@ -1,4 +1,4 @@
-"""What is told of a motor that runs, as lines or as JSON."""
+"""Output about a running motor, as lines or as JSON."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What several commands use: options, output, errors, logs, signals."""
+"""Parts shared by several commands: options, output, errors, logs, signals."""

@@ -1,4 +1,4 @@
-"""What `drivepanel block` prints: tables for a person, or one JSON document."""
+"""Output of `drivepanel block`: tables for a person, or one JSON document."""
 
 from __future__ import annotations
 

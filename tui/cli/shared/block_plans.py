@@ -1,4 +1,4 @@
-"""What a `block` command wants the slots to be: as typed, out of a file, or the factory's."""
+"""Slot contents requested by `block`: typed, from a file, or the factory's."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the arguments ask for."""
+    """Slots requested by the arguments."""
 
     action: str
     words: tuple[str, ...]
@@ -28,7 +28,7 @@ class Wanted:
 async def plans_of(
     session: DriveSession, wanted: Wanted
 ) -> tuple[dict[str, int], list[Assignment]]:
-    """What the slots hold, and the assignments that are wanted in their place."""
+    """Return the slots' contents, and the assignments requested for them."""
     from tui.drive.blocks.assignment import MappingError, assignment, factory, place_of
     from tui.drive.blocks.picking import pick
     from tui.session.blocks.mapping import Mapper

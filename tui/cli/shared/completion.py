@@ -1,4 +1,4 @@
-"""What a shell may complete: lines, profiles, codes; nothing of it asks a drive."""
+"""Completions for a shell: lines, profiles, codes; no drive is polled."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def complete_line(_: click.Context, __: click.Parameter, incomplete: str) -> Ite
 
 
 def complete_side(context: click.Context, option: click.Parameter, incomplete: str) -> Items:
-    """What `compare` compares: a file, a LINE, or the factory."""
+    """Complete a side of `compare`: a file, a LINE, or the factory."""
     factory = [CompletionItem("factory", help="Compare with the factory settings.")]
     found = [item for item in factory if item.value.startswith(incomplete)]
     return found or complete_line(context, option, incomplete) or [FILE]

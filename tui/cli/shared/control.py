@@ -15,14 +15,15 @@ GIVES_BACK = f"drivepanel {GIVE_BACK_OPTION} gives it back, in the panel g on Mo
 
 
 def taking_of(session: DriveSession) -> ControlTaking | None:
-    """What can be done about a drive's control, by what was read of it."""
+    """Return what can be done about a drive's control, from what was read."""
     from tui.drive.control_taking import control_taking
 
     return control_taking(session.profile, session.image.raws)
 
 
 def control_json(session: DriveSession) -> dict[str, Any] | None:
-    """Who has the control, and the commands that change that; null where a drive has none."""
+    """Return the holder of the control and the commands that change it; null if a drive has
+    none."""
     found = taking_of(session)
     if found is None:
         return None
@@ -46,7 +47,7 @@ def control_row(session: DriveSession) -> list[tuple[str, str]]:
 
 
 def way_to_take(session: DriveSession) -> str:
-    """How the control is taken, for a command that was refused; empty where that is not it."""
+    """Return how to take control, for a refused command; empty if that does not help."""
     found = taking_of(session)
     if found is None or not found.can_take or found.taken is not False:
         return ""

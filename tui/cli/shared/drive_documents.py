@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def drive_documents() -> DriveDocuments:
-    """How both commands write their JSON."""
+    """Return the JSON documents of both commands."""
     from tui.session.bundle.subject import DriveDocuments
 
     return DriveDocuments(_why, _counters)

@@ -1,4 +1,4 @@
-"""What a drive does, who commands it, and what it would do left alone: read, and told."""
+"""State of a drive, its commander, and its reaction to lost polling: read and reported."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.reading import Reading
-    from tui.session.timeout_told import Timeout, TimeoutWatch
+    from tui.session.timeout_report import Timeout, TimeoutWatch
 
 log = logging.getLogger(__name__)
 
@@ -39,9 +39,9 @@ SHOWN_QUANTITIES: dict[Quantity, str] = {
     "frequency_reference": "Reference",
     "motor_current": "Current",
 }
-"""What tells how a motor turns, and how it is called here."""
+"""Quantities that show how a motor turns, with their names here."""
 LINE_FIGURES = ("Output frequency", "Current")
-"""What of them stands in the one line of a drive."""
+"""Quantities in the one line of a drive."""
 CHANNEL_NAMES: dict[Quantity, str] = {
     "command_channel": "Commanded by",
     "reference_channel": "Reference from",
@@ -57,7 +57,7 @@ class Status:
     readings: Mapping[str, Reading]
     channels: Mapping[str, str]
     switches: Sequence[str]
-    """What can bring another channel into force, as sentences."""
+    """Possible channel changes, as sentences."""
     refused: str
     """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
@@ -66,7 +66,7 @@ class Status:
     left: LeftBehind | None = None
     """Its motor, if the program that started it has exited and no program commands it."""
     finding: FaultFinding | None = None
-    """What its fault or its alarm points at; None where it has neither."""
+    """Probable causes of its fault or alarm; None without either."""
     unread: Sequence[str] = ()
     """Codes of words that could not be read in time."""
 
@@ -84,7 +84,7 @@ def shown_codes(profile: Profile) -> list[str]:
 
 
 def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, str]:
-    """What is SHOWN by its name, with units; `-----` where it was not read just now."""
+    """Return the SHOWN values by name, with units; `-----` if not read just now."""
     values = {}
     for quantity, name in SHOWN_QUANTITIES.items():
         parameter = profile.quantity(quantity)
@@ -234,7 +234,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
 
 
 def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
-    """What is SHOWN, by quantity; null where the family does not tell it or it was not read.
+    """Return the SHOWN values by quantity; null if the family lacks it or it was not read.
 
     What was taught stands there by its code.
     """
@@ -254,16 +254,16 @@ def status_table(status: Status) -> list[tuple[str, str]]:
     """Titles and texts of `status` for a person."""
     state, profile = status.state, status.session.profile
     found = fault_rows(status.finding)
-    of_alarm = status.finding is not None and bool(status.finding.alarm)
+    is_alarm = status.finding is not None and bool(status.finding.alarm)
     return [
         ("Device", f"{status.session.device}, {profile.name}"),
         ("State", f"{state.headline} ({state.name})"),
         ("Direction", state.direction or ""),
         *([("Left behind", status.left.sentence(status.session.line_text))] if status.left else []),
         ("Fault", fault_text(state) or "none"),
-        *([] if of_alarm else found),
+        *([] if is_alarm else found),
         ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
-        *(found if of_alarm else []),
+        *(found if is_alarm else []),
         *status.channels.items(),
         *(("Besides", text) for text in status.switches),
         ("Commands", status.refused or "commands can have an effect"),

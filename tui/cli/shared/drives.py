@@ -11,7 +11,7 @@ from .output import print_json
 from .say import say
 
 Work = Callable[[Target], Awaitable[tuple[dict[str, Any], int]]]
-"""What is done at one drive: it says its lines, and gives its JSON and its exit status."""
+"""Work for one drive: reports its lines, returns its JSON and exit status."""
 
 
 async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool = True) -> int:

@@ -1,4 +1,4 @@
-"""How a command ends: done, failed, or cut short by a signal; and what its drives do then."""
+"""End of a command: done, failed, or cut short by a signal; and the reaction of its drives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a drive's fault points at, as the command line tells it: text and JSON."""
+"""Causes of a drive's fault for the command line: text and JSON."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ RESET_BY = "a fault reset"
 
 @dataclass(frozen=True, slots=True)
 class FaultFinding:
-    """What is known of the fault or the alarm that a drive is in, and the values to look at."""
+    """Knowledge about a drive's present fault or alarm, and the values to check."""
 
     profile: Profile
     hint: Hint | None
@@ -46,12 +46,12 @@ class FaultFinding:
 
     @property
     def ready(self) -> bool | None:
-        """Whether the drive says that a reset can work now; None where it does not tell."""
+        """True if the drive says that a reset can work now; None where it does not tell."""
         raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
         return reset_ready(self.profile, raws)
 
     def reset(self) -> ResetText:
-        """How the fault ends."""
+        """Return how the fault is reset."""
         from tui.drive.profile.schema import FaultHelp
 
         help_ = self.hint if isinstance(self.hint, FaultHelp) else None

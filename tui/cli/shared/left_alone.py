@@ -1,4 +1,4 @@
-"""What drives do when a command no longer asks them: their communication timeout."""
+"""Reaction of drives when a command stops polling them: their communication timeout."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .say import say
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.timeout_told import Timeout
+    from tui.session.timeout_report import Timeout
 
 TOLD_WITHIN = 3.0
 """Seconds in which a drive tells its timeout at the end of a command, on a quick line."""
@@ -30,7 +30,7 @@ class LeftAlone:
     session: DriveSession
     line_text: str
     goes_on: bool
-    """Whether the drive is there afterwards: a simulated one ends with its line."""
+    """True if the drive is there afterwards: a simulated one ends with its line."""
 
     async def learn(self) -> None:
         """Have the drive tell its timeout, unless it has; no answer fails nothing."""
@@ -39,7 +39,7 @@ class LeftAlone:
         from tui.session.monitor.timeout import read_timeout
         from tui.session.read.presence import meets_silence
         from tui.session.read.reader import Reader
-        from tui.session.timeout_told import Timeout
+        from tui.session.timeout_report import Timeout
 
         session = self.session
         heard = session.line.device_state(session.device).heard is not None
@@ -71,7 +71,7 @@ class LeftAlone:
 
 
 def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
-    """What a drive does when nobody asks it any more, and what to do about it; empty if nothing."""
+    """Return a drive's reaction when polling stops, and the advice; empty if none."""
     who = f"Device {session.device}, {session.profile.name}"
     if not found.known:
         return (

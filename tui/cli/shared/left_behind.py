@@ -29,7 +29,7 @@ class LeftBehind(NamedTuple):
         )
 
     def sentence(self, line_text: str) -> str:
-        """Who started it, and the advice."""
+        """Return the program that started it, and the advice."""
         return f"{self.text[0].upper()}{self.text[1:]}. {self.advice(line_text)}"
 
     def as_json(self) -> dict[str, Any]:

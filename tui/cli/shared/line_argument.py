@@ -53,7 +53,7 @@ class LineArgument(click.Argument):
         return _resolved(ctx, text)
 
     def is_line(self, text: str) -> bool:
-        """Whether a word is surely meant for this argument."""
+        """Return True if a word is surely meant for this argument."""
         return bool(_WRITTEN_OUT.match(text)) or is_known_name(text)
 
     def _others(self, ctx: click.Context) -> list[click.Argument]:
@@ -62,7 +62,7 @@ class LineArgument(click.Argument):
         ]
 
     def _is_left_out(self, ctx: click.Context, opts: Mapping[str, Any]) -> bool:
-        """Whether what stands in its place belongs to the arguments behind it."""
+        """Return True if what stands in its place belongs to the arguments behind it."""
         text = opts.get(self.name or "")
         if not isinstance(text, str) or self.resolve_envvar_value(ctx) is None:
             return False
@@ -107,8 +107,8 @@ def _resolved(ctx: click.Context, text: str) -> str:
         usual |= {"device": (named.device,), "devices": (named.device,)}
     if named.profile is not None:
         usual["profile_id"] = lambda: _profile_here(ctx, named)
-        of_drive = "" if named.device is None else f"{named.device}="
-        usual["profile_ids"] = (f"{of_drive}{named.profile}",)
+        device_prefix = "" if named.device is None else f"{named.device}="
+        usual["profile_ids"] = (f"{device_prefix}{named.profile}",)
     ctx.default_map = {key: one for key, one in usual.items() if key in _names(ctx)}
     return named.line
 
@@ -207,7 +207,7 @@ def takes_line_as(
 
 
 def line_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """What goes with any LINE: that it is accepted as it is now, and with whom it is shared."""
+    """Add the options of any LINE: accept it as it is now, and share it with a group."""
     return _accept_option(share_group_option(command))
 
 

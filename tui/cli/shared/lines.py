@@ -1,4 +1,4 @@
-"""What is a LINE among the words of the command line."""
+"""Detection of LINEs among the words of the command line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _KINDS = re.compile(r"(?:serial|tcp|rtu-tcp|sim):.*|COM\d+(?:,.*)?", re.IGNORECA
 
 
 def is_line(text: str) -> bool:
-    """Whether a word is meant for a LINE, rightly written or not: a kind, a path, a port."""
+    """Return True if a word is meant for a LINE, rightly written or not: a kind, a path, a port."""
     path = text.partition(",")[0]
     if is_written_out(text) or os.path.exists(path):
         return True
@@ -18,12 +18,12 @@ def is_line(text: str) -> bool:
 
 
 def is_written_out(text: str) -> bool:
-    """Whether a word is a LINE by its signs alone, as no code of a parameter is."""
+    """Return True if a word is a LINE by its signs alone, as no code of a parameter is."""
     return bool(_KINDS.fullmatch(text)) or "/" in text or "\\" in text
 
 
 def is_known_name(text: str, *, doubtful: bool = False) -> bool:
-    """Whether the settings file names a line so; `doubtful`: or may do, as it has faults."""
+    """Return True if the settings file names a line so; `doubtful`: or may do, as it has faults."""
     if not _NAME.fullmatch(text):
         return False  # the file need not be looked at
     from tui.session.connect.named_lines import is_name, line_settings

@@ -1,4 +1,4 @@
-"""Where what was heard goes: lines of text, or JSON, one object a line."""
+"""Output of monitored traffic: lines of text, or one JSON object a line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tui.session.listening.words import HeardValue, WordSpan
 
 FURTHER = 24
-"""Where the rest of a line goes on that does not fit."""
+"""Indent of continuation lines."""
 
 
 class HeardOutput(Protocol):

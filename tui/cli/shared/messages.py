@@ -1,4 +1,4 @@
-"""What a command says on its way: lines for a person, a list of sentences in JSON."""
+"""Messages of a running command: lines for a person, a list of sentences in JSON."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ class Messages:
         self.texts: list[str] = []
 
     def tell(self, text: str, *, indent: int = 0) -> None:
-        """What is to be known; what does not fit a terminal goes on so far from the left."""
+        """Report a notice; continuation lines are indented by so many columns."""
         self.texts.append(text)
         if not self.as_json:
             say(text, indent=indent)
 
     def complain(self, text: str) -> None:
-        """What went wrong: on standard error in any case."""
+        """Report a problem; on standard error in any case."""
         self.texts.append(text)
         say(f"drivepanel: {text}", err=True)

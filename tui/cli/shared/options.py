@@ -69,14 +69,14 @@ rated_current_option = click.option(
 
 
 class Target(NamedTuple):
-    """What the shared options name."""
+    """Line, drive and profile that the shared options name."""
 
     line_text: str
     device: int
     profile_id: str | None
     rated_current: float | None = None
     force_profile: bool = False
-    """Whether a profile counts that the drive contradicts; never for what moves a motor."""
+    """True if a profile counts that the drive contradicts; never for what moves a motor."""
     others: tuple[int, ...] = ()
     """Further addresses on the same line, where a command takes several."""
 

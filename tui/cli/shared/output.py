@@ -230,7 +230,7 @@ def _cells(reading: Reading) -> tuple[str, ...]:
 
 
 def _remark(reading: Reading) -> str:
-    """What a table says beside a value: what it is in its rating's unit, or what is wrong."""
+    """Return the remark beside a value: its rating's unit, or what is wrong."""
     if reading.raw is None:
         return "no value"
     if reading.quality != "good":

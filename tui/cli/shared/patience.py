@@ -1,4 +1,4 @@
-"""How long a command waits for what a drive tells, on a line that others use too."""
+"""Waiting times of commands for drives on a shared line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command says to a person: text as it is written, never a command to the terminal."""
+"""Output of a command for a person: plain text, never a control sequence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands about settings and parameter sets share."""
+"""Shared parts of the commands about settings and parameter sets."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def write_down(
 
 
 def complain_absent(messages: Messages, absent: Mapping[str, str]) -> None:
-    """What could not be read, and why; what has one reason in one line."""
+    """Report unreadable parameters and why; those with one reason in one line."""
     reasons: dict[str, list[str]] = {}
     for code, why in absent.items():
         reasons.setdefault(_REGISTER.sub("", why), []).append(code)
@@ -181,7 +181,7 @@ class ResultTelling:
         self.results: dict[str, Result] = {}
         self._of = 0
         self._alike = ""
-        """What was told of the last one that was not written, without its code."""
+        """Text of the last unwritten setting, without its code."""
         self._more: list[str] = []
         """Codes of those behind it of which the same is true."""
 
@@ -220,7 +220,7 @@ class ResultTelling:
 
 
 def results_json(results: Iterable[Result]) -> list[dict[str, Any]]:
-    """What became of each edit."""
+    """Return the result of each edit."""
     return [
         {
             **edit_json(result.edit),
@@ -271,7 +271,7 @@ def status_of_results(results: Iterable[Result]) -> int:
 def say_afterwards(
     messages: Messages, after_reset: Iterable[str], unsaved: Sequence[str], *, saved: bool
 ) -> None:
-    """What a person has to know once settings are written."""
+    """Report what a person must know after a write."""
     if waiting := ", ".join(after_reset):
         messages.tell(f"In force only after the next reset of the drive: {waiting}.")
     if unsaved and not saved:

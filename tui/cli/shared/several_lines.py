@@ -39,7 +39,7 @@ class FirstOfLines(LineArgument):
     """The first LINE of a command that takes several; its word is kept as it was typed."""
 
     def is_line(self, text: str) -> bool:
-        """Whether a word is surely meant for this argument."""
+        """Return True if a word is surely meant for this argument."""
         return super().is_line(split_addresses(text)[0])
 
     def process_value(self, ctx: click.Context, value: Any) -> Any:
@@ -61,9 +61,9 @@ class LineWish:
     """As it was typed first, without addresses."""
     drives: tuple[Target, ...]
     all_drives: bool = False
-    """Whether a simulated line is meant with all its drives."""
+    """True if a simulated line is meant with all its drives."""
     addresses: str = ""
-    """What stood behind its `@`; empty for nothing."""
+    """Text after its `@`; empty if none."""
 
     @property
     def text(self) -> str:
@@ -107,7 +107,7 @@ def _is_line(word: str) -> bool:
 
 
 def lines_wished(target: Target, more: Sequence[str]) -> list[LineWish]:
-    """What is meant by the first LINE, which made the target, and those behind it; each line once.
+    """Return the lines of the first LINE, which made the target, and of those after it; each once.
 
     -d and -p count for every LINE; the addresses behind a LINE go before -d. Raises UsageError,
     and LinkSyntaxError for what is no LINE or no address.

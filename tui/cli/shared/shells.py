@@ -13,7 +13,7 @@ from click.shell_completion import (
 )
 
 BREAKS = " \t\n\"'@><=;|&(:"
-"""What readline breaks words at where a shell does not tell."""
+"""Word breaks of readline if a shell does not report its own."""
 KEPT = "@$"
 """Breaks that readline leaves at the beginning of the word."""
 

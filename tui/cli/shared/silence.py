@@ -1,4 +1,4 @@
-"""What to look at where nothing answers, for commands on one line."""
+"""Advice if no drive answers, for commands on one line."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def is_slow(line: ModbusLine, device: int) -> bool:
 
 
 def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool) -> str:
-    """What to look at where nothing answers; empty for a line without settings of its own."""
+    """Return what to check if no drive answers; empty for a line without settings of its own."""
     from tui.bus.link import SerialLink, UsualSettings, parse_link
 
     link = opened.line.link

@@ -67,7 +67,7 @@ def output_lost() -> str:
 
 
 def acts(command: Callable[..., object]) -> bool:
-    """Whether a command's status tells what became of a drive, whoever reads its output."""
+    """Return True if a command's status tells what became of a drive, whoever reads its output."""
     return command.__name__ in ACTING
 
 

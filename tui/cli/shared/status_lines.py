@@ -36,10 +36,10 @@ STATUS_TITLES = 18
 
 @dataclass(frozen=True, slots=True)
 class StatusWish:
-    """What `status` is asked for, beside lines and drives."""
+    """Options of `status` besides lines and drives."""
 
     every: bool
-    """Whether every drive that answers is told, a line each."""
+    """True if every drive that answers is told, a line each."""
     addresses: str | None
     hold: float | None
     """Seconds for which the drives are asked on."""
@@ -52,7 +52,7 @@ class StatusWish:
 
 @dataclass(slots=True)
 class LineField:
-    """What is told of one line."""
+    """State of one line."""
 
     found: list[Status] = field(default_factory=list)
     documents: list[dict[str, Any]] = field(default_factory=list)
@@ -80,7 +80,7 @@ async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: St
     """
     from ..running.holding import hold_lines_on
 
-    each = await asyncio.gather(*(_of_line(opened, wish, wanted) for opened, wish in lines))
+    each = await asyncio.gather(*(_read_line(opened, wish, wanted) for opened, wish in lines))
     if wanted.as_json:
         print_json([document for one in each for document in one.documents])
     else:
@@ -107,7 +107,7 @@ def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:
         say_status(status)
 
 
-async def _of_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> LineField:
+async def _read_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> LineField:
     """The drives of one line."""
     reported = LineField()
     try:
@@ -128,11 +128,11 @@ async def _of_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> Line
             ]
         return reported
     for drive in drives:
-        await _of_drive(opened, wish, drive, reported)
+        await _read_drive(opened, wish, drive, reported)
     return reported
 
 
-async def _of_drive(opened: OpenLine, wish: LineWish, drive: Target, reported: LineField) -> None:
+async def _read_drive(opened: OpenLine, wish: LineWish, drive: Target, reported: LineField) -> None:
     try:
         session = await connect_drive(opened, drive)
         status = await status_of_drive(session, opened)

@@ -1,4 +1,4 @@
-"""Where the cycles of `watch` go: JSON lines, a table that stays in place, lines, a CSV file."""
+"""Outputs of `watch`: JSON lines, a table that stays in place, lines, a CSV file."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def csv_titles(
 
 @contextmanager
 def text_output(watched: Sequence[WatchedDrive], several: Several) -> Iterator[Output]:
-    """What suits standard output: a table on a terminal, else lines."""
+    """Yield the output for standard output: a table on a terminal, else lines."""
     if not sys.stdout.isatty():
         yield LineOutput(several)
         return

@@ -1,11 +1,11 @@
-"""What `status` tells of a drive's watch over the line."""
+"""Communication watch of a drive in `status`."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tui.session.timeout_told import TimeoutWatch
+    from tui.session.timeout_report import TimeoutWatch
 
 
 def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
@@ -21,7 +21,7 @@ def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
 
 
 def watch_text(watch: TimeoutWatch | None) -> str:
-    """What a drive does on a loss of communication, for a person."""
+    """Return a drive's reaction to loss of communication, for a person."""
     if watch is None:
         return "none: it goes on without communication"
     if watch.reaction is not None and not watch.acts:

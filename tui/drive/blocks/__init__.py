@@ -1,1 +1,1 @@
-"""What indirect blocks and scanners bring: assignments, their cost on the wire, their file."""
+"""Indirect blocks and scanners: assignments, their cost on the wire, their file."""

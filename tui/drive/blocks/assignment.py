@@ -1,4 +1,4 @@
-"""What the slots of an indirect block or a communication scanner stand for, and changing that.
+"""Assignments of the slots of an indirect block or communication scanner, and their changes.
 
 An assignment is a value: moving and clearing make another one. Nothing is read or written here.
 """
@@ -49,7 +49,7 @@ class Assignment:
 
     @property
     def length(self) -> int:
-        """How many slots there are up to the last one in use."""
+        """Number of slots up to the last one in use."""
         return max((n for n, raw in enumerate(self.raws, start=1) if raw), default=0)
 
 
@@ -64,12 +64,12 @@ class SlotChange:
 
 
 def has_blocks(profile: Profile) -> bool:
-    """Whether the family has an indirect block or a communication scanner at all."""
+    """Return True if the family has an indirect block or a communication scanner at all."""
     return bool(profile.data.blocks)
 
 
 def assignment(block: Block, raws: Mapping[str, int]) -> Assignment | None:
-    """What the slots hold, given raw values by code; None unless all of them are known."""
+    """Return the assignment for raw values by code; None unless all slots are known."""
     if not set(block.slots) <= raws.keys():
         return None
     return Assignment(block, tuple(raws[slot] & 0xFFFF for slot in block.slots))
@@ -153,7 +153,7 @@ def _name(profile: Profile, block: Block, raw: int) -> str:
 
 
 def describe(profile: Profile, block: Block, raw: int | None) -> str:
-    """What a slot stands for in a few words: a code, `unused`, or the address alone."""
+    """Describe a slot in a few words: a code, `unused`, or the address alone."""
     if raw is None:
         return "-----"
     return "unused" if raw == UNUSED else _name(profile, block, raw)

@@ -1,4 +1,4 @@
-"""What a person names for a slot: a parameter of those that it can stand for, or none."""
+"""Search for the target of a slot: a parameter that it can map, or none."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .assignment import UNUSED, Assignment, MappingError
 from .slot_rules import reason_against
 
 NONE = frozenset({"", "-", "--", "none", "off", "0", "w0", "16#0", "0x0"})
-"""How a person may write that a slot is unused."""
+"""Words for an unused slot."""
 
 
 def raw_of(profile: Profile, block: Block, parameter: Parameter) -> int:

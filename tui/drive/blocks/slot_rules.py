@@ -1,4 +1,4 @@
-"""What a slot of a block or scanner may stand for, and what is wrong with an assignment."""
+"""Rules for the slots of a block or scanner, and problems of an assignment."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .assignment import UNUSED, Assignment, describe, slot_target
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What is wrong with a slot of an assignment, as a sentence."""
+    """Problem of a slot of an assignment, as a sentence."""
 
     slot: str
     text: str
@@ -24,7 +24,7 @@ class Problem:
 def assignment_problems(
     profile: Profile, plan: Assignment, unreadable: Collection[str] = ()
 ) -> list[Problem]:
-    """What is wrong with an assignment, or should be known of it, in the order of the slots.
+    """Return problems and remarks of an assignment, in the order of the slots.
 
     `unreadable` names parameters that this drive said it does not have.
     """
@@ -33,13 +33,13 @@ def assignment_problems(
     for slot, raw in plan.slots.items():
         if raw == UNUSED:
             continue
-        found += _of_slot(profile, plan.block, slot, raw, unreadable)
+        found += _slot_problems(profile, plan.block, slot, raw, unreadable)
         if raw in seen:
             name = describe(profile, plan.block, raw)
             text = f"{slot}: {name} stands in {seen[raw]} already."
             found.append(Problem(slot, text, _writes_block(plan.block)))
         seen.setdefault(raw, slot)
-    return found + _of_shape(plan)
+    return found + _shape_problems(plan)
 
 
 def refusing(found: Iterable[Problem]) -> list[Problem]:
@@ -47,7 +47,7 @@ def refusing(found: Iterable[Problem]) -> list[Problem]:
     return [problem for problem in found if problem.refuses]
 
 
-def _of_slot(
+def _slot_problems(
     profile: Profile, block: Block, slot: str, raw: int, unreadable: Collection[str]
 ) -> list[Problem]:
     parameter = slot_target(profile, block, raw)
@@ -71,8 +71,8 @@ def _of_slot(
     return found
 
 
-def _of_shape(plan: Assignment) -> list[Problem]:
-    """What the shape of the requests makes of the slots in use."""
+def _shape_problems(plan: Assignment) -> list[Problem]:
+    """Return the problems of the slots that follow from the shape of the requests."""
     block, length = plan.block, plan.length
     if not length or not block.fixed_start:
         return []

@@ -68,5 +68,6 @@ def format_named(text: str) -> WordFormat:
 
 
 def is_no_value(profile: Profile, words: Sequence[int]) -> bool:
-    """Whether the drive said in a reply that there is no such word, or that it is protected."""
+    """Return True if the drive said in a reply that there is no such word, or that it is
+    protected."""
     return profile.data.reading.unknown_word in words

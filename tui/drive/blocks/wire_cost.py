@@ -1,4 +1,4 @@
-"""What an assignment costs and saves on the wire, and the requests that use it.
+"""Cost and savings of an assignment on the wire, and the requests that use it.
 
 Also, for families without blocks: what neighboring parameters cost in one read, and which
 stretch of them saves most.
@@ -20,7 +20,7 @@ from .assignment import Assignment, slot_target
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What reading a set of parameters takes on the wire."""
+    """Cost of reading a set of parameters."""
 
     microseconds: int
     requests: int
@@ -36,7 +36,7 @@ class Saving:
 
     @property
     def microseconds(self) -> int:
-        """What the second one saves; negative where it costs more."""
+        """Savings of the second one; negative if it costs more."""
         return self.before.microseconds - self.after.microseconds
 
 
@@ -67,7 +67,7 @@ def cost(
     slots: Mapping[str, int],
     unreadable: Collection[str] = (),
 ) -> Cost:
-    """What reading these takes with the slots in force, by the cheapest plan."""
+    """Return the cost of reading these with the slots in force, by the cheapest plan."""
     plan = plan_reads(profile, codes, timing, slots, unreadable)
     return Cost(plan.microseconds, len(plan.requests) + len(plan.checks))
 
@@ -80,7 +80,7 @@ def saving(
     after: Mapping[str, int],
     unreadable: Collection[str] = (),
 ) -> Saving:
-    """What reading these takes with the slots of today and with those that are proposed."""
+    """Return the cost of reading these with the present and with the proposed slots."""
     return Saving(
         cost(profile, codes, timing, before, unreadable),
         cost(profile, codes, timing, after, unreadable),

@@ -74,7 +74,7 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
 
 
 def _invented(path: TomlPath, invented: list[TomlPath]) -> bool:
-    """Whether a place rests on a value that the file does not have."""
+    """Return True if a place rests on a value that the file does not have."""
     return any(path[: len(one)] == one or one[: len(path)] == path for one in invented)
 
 

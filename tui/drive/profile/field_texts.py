@@ -1,4 +1,4 @@
-"""What each field of a profile is, in a sentence, for its JSON schema.
+"""Description of each field of a profile in a sentence, for its JSON schema.
 
 A field that has a text below it in `schema` is described there; the others are here.
 """
@@ -296,7 +296,7 @@ def _written_below(table: type) -> Mapping[str, str]:
 
 
 def field_text(table: str, field: str) -> str:
-    """What a field of a table is; empty where nobody has said it."""
+    """Return the description of a table's field; empty if there is none."""
     schema = sys.modules["tui.drive.profile.schema"]
     struct = getattr(schema, table, None)
     kinds = struct.__mro__ if isinstance(struct, type) else ()

@@ -1,4 +1,4 @@
-"""Whether tables have the form of a profile: every fault of it, with what is allowed there."""
+"""True if tables have the form of a profile: every fault of it, with what is allowed there."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ABSENT = object()
 
 @dataclass(slots=True)
 class FormFaults:
-    """What is wrong with the form of some tables, and the tables with that set right."""
+    """Form errors of some tables, and the tables with the errors corrected."""
 
     found: list[tuple[TomlPath, str]] = field(default_factory=list)
     invented: list[TomlPath] = field(default_factory=list)
@@ -137,7 +137,7 @@ def _between(low: object, high: object) -> str:
 
 
 def _instead(wrong: object, choice: Any) -> str:
-    """What is allowed in place of something: all of it, or the nearest of very many."""
+    """Return the allowed values: all of them, or the nearest of very many."""
     texts = [str(one) for one in choice]
     near = difflib.get_close_matches(str(wrong), texts, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(near)}?" if near else "."
@@ -168,7 +168,7 @@ def _kind(shape: shapes.Type) -> str:
 
 
 def allowed(one: shapes.Field) -> str:
-    """What a field takes, in words."""
+    """Return the allowed values of a field in words."""
     return _kind(one.type)
 
 

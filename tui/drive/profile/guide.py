@@ -1,4 +1,4 @@
-"""What the faults and alarms of a family point at, by fault and by alarm bit."""
+"""Causes of a family's faults and alarms, by fault and by alarm bit."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ class FaultGuide:
         }
 
     def fault(self, raw: int | None) -> FaultHelp | None:
-        """What a fault points at, by its raw code; None where nothing is known.
+        """Return the help on a fault by its raw code; None if nothing is known.
 
         A family whose trips have no numbers has one help for all of them, that of None.
         """
         return self._found[0].get(raw if self._numbered else None)
 
     def alarm(self, word: str, bit: int) -> AlarmHelp | None:
-        """What an alarm bit points at; None where nothing is known."""
+        """Return the help on an alarm bit; None if nothing is known."""
         return self._found[1].get((word, bit))

@@ -1,4 +1,4 @@
-"""What can be told of a profile without decoding it: its head, and how a drive is asked who it is.
+"""Facts from a profile without decoding it: its head, and how a drive is identified.
 
 Everything is read as TOML. Of a packaged file only the tables that are asked for are; of a file
 of the user's own the whole is, so that a broken one is known for what it is.
@@ -48,7 +48,7 @@ class ProfileFileHead(NamedTuple):
 
 
 class AskedOf(NamedTuple):
-    """How a drive of a family is found on a line."""
+    """Identification of a family's drives on a line."""
 
     prefixes: tuple[str, ...] = ()
     """Beginnings of its reference."""
@@ -72,7 +72,7 @@ def quick_head(path: Path) -> ProfileFileHead:
 
 
 def request_prefixes(path: Path, own: bool, packaged: Path) -> AskedOf:
-    """How a drive of a file's family is found; empty for a broken file."""
+    """Return the identification of a file's family; empty for a broken file."""
     return _requested(path, own, packaged, _stamp(path))
 
 
@@ -107,7 +107,8 @@ def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> Pro
 
 
 def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
-    """How many parameters a packaged file has with those that it shares; None if not plain."""
+    """Return the number of a packaged file's parameters, shared ones included; None if not
+    plain."""
     if "rows_from" not in head:
         return len(_PARAMETER.findall(text))
     if "without" in head or (shared := shared_texts(head, packaged)) is None:

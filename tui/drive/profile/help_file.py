@@ -20,7 +20,7 @@ HelpPlace = tuple[str, int]
 
 
 def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
-    """What is known of a family's faults: its own rows before those of its help file.
+    """Read the help on a family's faults: its own rows before those of its help file.
 
     `folders` hold profiles; the file is sought in their folder `help`, the first found counts.
     From a file that does not stand beside the profile (the first folder) what does not fit is

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Listing(NamedTuple):
-    """What a listing shows of a profile, read from the head of its file."""
+    """Facts about a profile in a list, read from the head of its file."""
 
     id: str
     name: str
@@ -182,7 +182,7 @@ def matching_profiles(reference: str) -> list[str]:
 
 
 def mentions_function(listing: Listing, code: int) -> bool:
-    """Whether a profile declares a Modbus function, without decoding the file."""
+    """Return True if a profile declares a Modbus function, without decoding the file."""
     return code in request_prefixes(listing.path, listing.own, packaged_folder()).functions
 
 

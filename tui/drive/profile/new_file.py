@@ -47,7 +47,7 @@ def new_profile_text(
 
 
 def _until_rows(text: str) -> str:
-    """What stands before the parameters, which are last in a file."""
+    """Return the text before the parameters, which are last in a file."""
     first = _ROWS.search(text)
     return text[: first.start()] if first else text
 

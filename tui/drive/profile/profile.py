@@ -32,7 +32,7 @@ UNVERIFIED = frozenset({"analogy", "unverified"})
 
 
 def is_verified(parameter: Parameter) -> bool:
-    """Whether a manual or a public document of this family confirms the parameter."""
+    """Return True if a manual or a public document of this family confirms the parameter."""
     return parameter.confidence not in UNVERIFIED
 
 
@@ -176,7 +176,7 @@ class Profile:
     def scale(
         self, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
     ) -> Decimal | None:
-        """What one count is worth, given raw values by code.
+        """Return the value of one count, given raw values by code.
 
         `absent` names parameters that the drive said it does not have. None where the scale
         follows another parameter whose value is not known: then the value must be shown raw
@@ -202,7 +202,7 @@ class Profile:
 
 
 def mark_of(profile: Profile, parameter: Parameter) -> str:
-    """What stands beside a value that no document tells for sure: `taught` or `?`."""
+    """Return the mark of a value that no document states for sure: `taught` or `?`."""
     if parameter.code in profile.taught:
         return "taught"
     return "" if is_verified(parameter) else "?"
@@ -216,7 +216,7 @@ def group_by_id(profile: Profile) -> Mapping[str, ParameterGroup]:
 
 
 def group_holds(profile: Profile, parameter: Parameter) -> str:
-    """What the parameter's group holds: settings, commands or measurements."""
+    """Return the kind of the parameter's group: settings, commands or measurements."""
     group = group_by_id(profile).get(parameter.group)
     return group.holds if group is not None else "settings"
 

@@ -146,7 +146,7 @@ def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _key_of(row: Mapping[str, Any], key: str) -> object:
-    """What tells a row apart; a list or a table, which is a fault to be told later, by its text."""
+    """Return the key of a row; the text of a list or table, which is reported as a fault later."""
     value = row.get(key)
     return repr(value) if isinstance(value, list | dict) else value
 

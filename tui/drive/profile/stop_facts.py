@@ -1,4 +1,4 @@
-"""What stops the drives of every family, told without decoding their profiles.
+"""Stop words of all families, known without decoding their profiles.
 
 A stop of a drive that nobody has named yet compares the words of all families. To load them all
 takes seconds on a small computer, so of a packaged file only the charts are read as TOML, and
@@ -39,7 +39,7 @@ class StopFacts:
     places: Mapping[str, int]
     """Address by code, of whole words that function 3 reads."""
     names_itself: bool
-    """Whether its drives know function 43; the others are silent at words that they lack."""
+    """True if its drives know function 43; the others are silent at words that they lack."""
 
     @property
     def addresses(self) -> frozenset[int]:

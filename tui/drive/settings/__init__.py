@@ -1,1 +1,1 @@
-"""What a person changes in a drive: edits, parameter sets, comparison, what may be written."""
+"""Settings of a drive: edits, parameter sets, comparison, write permissions."""

@@ -31,7 +31,7 @@ class Side:
     absent: Mapping[str, str] = field(default_factory=dict)
     """Codes without a value, and why."""
     texts: Mapping[str, str] = field(default_factory=dict)
-    """What stands for a value that is no number: a factory setting that depends on the rating."""
+    """Text instead of a number: a factory setting that depends on the rating."""
     unsure: Mapping[str, str] = field(default_factory=dict)
     """Codes of values that no document of the family tells, and how that is said."""
     left: Mapping[str, str] = field(default_factory=dict)
@@ -146,7 +146,7 @@ def _text(parameter: Parameter, side: Side, value: Value | None) -> str:
 
 
 def _same(a: Value | None, b: Value | None) -> bool:
-    """Whether two values mean the same: 3.0 s is 3.00 s, whatever the words are."""
+    """Return True if two values mean the same: 3.0 s is 3.00 s, whatever the words are."""
     if a is None or b is None:
         return a is b
     if a.number is not None and b.number is not None and a.unit == b.unit:

@@ -1,4 +1,4 @@
-"""What must not be written because another edit, which it builds on, was not; pure functions."""
+"""Edits that must not be written because one they depend on was not; pure functions."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ class Edit:
 
     code: str
     typed: str
-    """What the person typed, encoded anew when its scale changes; empty for a raw value."""
+    """Typed text, encoded again if its scale changes; empty for a raw value."""
     old: int | None
     """Raw value that the drive held when it was staged; None where it was not read."""
     new: int
@@ -33,7 +33,7 @@ class Edit:
     lossy: bool = False
     """True where rounding makes another value of it: 0, or either of two neighbors."""
     warning: str = ""
-    """What is dangerous about it; else empty."""
+    """Danger of the value; else empty."""
 
     @property
     def loss(self) -> str:
@@ -42,7 +42,7 @@ class Edit:
 
     @property
     def remark(self) -> str:
-        """What a person should be told at once: rounding and danger."""
+        """Remark shown immediately: rounding and danger."""
         held = f"{self.code}: {self.typed} is held as {self.text}." if self.rounded else ""
         return f"{held} {self.warning}".strip()
 
@@ -189,7 +189,8 @@ def _encoded(
 def consequences(
     profile: Profile, edits: Edits, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> list[str]:
-    """What changes its engineering value though nobody edits it, because its scale changes."""
+    """List the values that change in engineering units without an edit, because their scale
+    changes."""
     after = edits.after(raws)
     reported: list[str] = []
     for parameter in profile.parameters:

@@ -53,7 +53,7 @@ def factory_sources(parameter: Parameter) -> tuple[str, ...]:
 
 
 def factory_is_sure(parameter: Parameter) -> bool:
-    """Whether a document of this family tells the factory setting."""
+    """Return True if a document of this family tells the factory setting."""
     grounds = parameter.factory_grounds
     known = parameter.confidence if grounds is None else grounds.confidence
     return known not in UNVERIFIED
@@ -65,7 +65,8 @@ def not_factory(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> bool:
-    """Whether a setting holds something else than its factory setting, as far as that is known.
+    """Return True if a setting holds something else than its factory setting, as far as that is
+    known.
 
     What the drive sets itself, by auto-tuning, nobody has changed.
     """
@@ -85,7 +86,8 @@ def _differs(
     raws: Mapping[str, int],
     absent: Collection[str],
 ) -> bool:
-    """Whether what is held means something else than the factory setting; raw values both."""
+    """Return True if what is held means something else than the factory setting; raw values
+    both."""
     held, factory = pair
     if parameter.factory_of is not None:
         # the drive may round its own product the other way

@@ -23,7 +23,7 @@ class LimitsInForce:
     high: Decimal | None
     unit: str
     step: Decimal
-    """What one count is worth."""
+    """Value of one count."""
     low_by: str = ""
     """The parameter whose value the lowest is; empty where it is the parameter's own."""
     high_by: str = ""

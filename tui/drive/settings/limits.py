@@ -28,14 +28,15 @@ def limit_pairs(profile: Profile) -> tuple[tuple[str, str], ...]:
 
 
 def _comparable(profile: Profile, low: str, high: str) -> bool:
-    """Whether both are settings of one unit: what a line commands is checked with the command."""
+    """Return True if both are settings of one unit: what a line commands is checked with the
+    command."""
     pair = profile[low], profile[high]
     return pair[0].unit == pair[1].unit and not any(is_order(profile, one) for one in pair)
 
 
 @lru_cache(maxsize=32)
 def multiple_limits(profile: Profile) -> tuple[tuple[Parameter, Multiple], ...]:
-    """What is limited by so many times another parameter; of each its lowest, then its highest."""
+    """Return parameters limited by a multiple of another: of each its lowest, then its highest."""
     return tuple(
         (parameter, of)
         for parameter in profile.parameters
@@ -57,7 +58,7 @@ def limit_sources(profile: Profile, codes: Iterable[str]) -> set[str]:
 
 
 def limits_are_sure(parameter: Parameter) -> bool:
-    """Whether a document of this family tells the limits."""
+    """Return True if a document of this family tells the limits."""
     grounds = parameter.limit_grounds
     known = parameter.confidence if grounds is None else grounds.confidence
     return known not in UNVERIFIED
@@ -111,6 +112,6 @@ def passed_side(parameter: Parameter, of: Multiple, number: Decimal, limit: Deci
 
 
 def number_in(profile: Profile, code: str, raws: Mapping[str, int]) -> Decimal | None:
-    """What a setting comes to with these raw values; None where they do not have it."""
+    """Return a setting as a number for these raw values; None if they lack it."""
     raw = raws.get(code)
     return None if raw is None else number_of(profile, profile[code], raw, raws)

@@ -12,7 +12,7 @@ class MemoryRefused(DriveError):
 
 
 def save_order(profile: Profile) -> MemoryOrder:
-    """How a family saves its settings; raises MemoryRefused where there is nothing to order."""
+    """Return the command that saves settings; raises MemoryRefused if the family has none."""
     if (order := profile.data.memory.save) is not None:
         return order
     storages = {p.storage for p in profile.parameters if p.access in ("rw", "rw-stopped")}
@@ -28,7 +28,7 @@ def save_order(profile: Profile) -> MemoryOrder:
 
 
 def factory_order(profile: Profile) -> MemoryOrder:
-    """How a family goes back to factory settings; raises MemoryRefused where that is not known."""
+    """Return the command for factory settings; raises MemoryRefused if it is not known."""
     if (order := profile.data.memory.factory) is not None:
         return order
     raise MemoryRefused(

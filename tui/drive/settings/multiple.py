@@ -1,4 +1,4 @@
-"""What a limit or a factory setting comes to that is so many times another parameter."""
+"""Value of a limit or a factory setting that is a multiple of another parameter."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def value_of(
 
 
 def formula_of(of: Multiple) -> str:
-    """How it is worked out: `1.5 x INV`, `100 - tA1`."""
+    """Return the formula: `1.5 x INV`, `100 - tA1`."""
     times, plus = Decimal(of.times), Decimal(of.plus)
     product = of.parameter if abs(times) == 1 else f"{abs(times):f} x {of.parameter}"
     if times < 0:

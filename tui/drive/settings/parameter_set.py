@@ -30,7 +30,7 @@ class SetError(DriveError):
 
 @dataclass(frozen=True, slots=True)
 class SetHead:
-    """Where a parameter set comes from."""
+    """Origin of a parameter set."""
 
     profile: str
     profile_version: str = ""
@@ -42,7 +42,7 @@ class SetHead:
     panel: str = ""
     """Version of the panel that wrote it."""
     identity: Mapping[str, str] = field(default_factory=dict)
-    """What the drive said of itself: vendor, reference, version, name."""
+    """Identity reported by the drive: vendor, reference, version, name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class ParameterSet:
     unknown: Mapping[str, str] = field(default_factory=dict)
     """Codes in the file that the profile does not have, with their values as written."""
     lines: Mapping[str, int] = field(default_factory=dict)
-    """Where each code stands in its file."""
+    """Line of each code in its file."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """By code, what is to be known of a value that was edited by hand: its rounding."""
     lossy: frozenset[str] = frozenset()

@@ -1,4 +1,4 @@
-"""Whether settings belong to one rating of drive and motor, and whether two drives are of one."""
+"""True if settings belong to one rating of drive and motor, and whether two drives are of one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def rating_codes(profile: Profile) -> list[str]:
 def same_rating(
     profile: Profile, held: Held, source: ParameterSet, *, across: bool = False
 ) -> bool | None:
-    """Whether set and drive are of one rating; None where one of them does not tell."""
+    """Return True if set and drive are of one rating; None where one of them does not tell."""
     if across:
         return False
     reported = source.head.identity.get("reference", "")
@@ -42,5 +42,5 @@ def same_rating(
 
 
 def rated(parameter: Parameter) -> bool:
-    """Whether a setting belongs to one rating of drive and motor, or to one model."""
+    """Return True if a setting belongs to one rating of drive and motor, or to one model."""
     return parameter.rated or parameter.quantity in RATED or parameter.unit in ("A", "kW", "HP")

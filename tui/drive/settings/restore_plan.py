@@ -1,4 +1,4 @@
-"""What restoring a parameter set to a drive would write, and why it leaves the rest; pure."""
+"""Plan of a restore: the writes, and why the rest is omitted; pure functions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SkipReason = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What a person wants beyond the plain restoring."""
+    """Options of a restore."""
 
     line_settings: bool = False
     """Write address, baud and format too, which may cut this very line."""
@@ -51,7 +51,7 @@ class Held:
     lacking: Collection[str] = ()
     """Codes that the drive said it does not have."""
     reference: str = ""
-    """What the drive calls itself; empty where that is not known."""
+    """Reference reported by the drive; empty if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,21 +69,21 @@ class RestoreItem:
 
 @dataclass(frozen=True, slots=True)
 class RestorePlan:
-    """What would be written, in `edits`, and every item with its reason."""
+    """Planned writes in `edits`, and every item with its reason."""
 
     items: tuple[RestoreItem, ...]
     edits: Edits
     same_rating: bool | None
     """None where one side does not tell its model."""
     needs_stop: bool
-    """Whether some of it is written with the motor stopped only."""
+    """True if some of it is written with the motor stopped only."""
     across: bool
-    """Whether the set is of another family: only common quantities are carried over."""
+    """True if the set is of another family: only common quantities are carried over."""
 
-    def of_kind(self, kind: ItemKind) -> list[RestoreItem]:
+    def items_of_kind(self, kind: ItemKind) -> list[RestoreItem]:
         """The items of one kind."""
         return [item for item in self.items if item.kind == kind]
 
     def count(self, kind: ItemKind) -> int:
-        """How many items are of one kind; what is no setting does not count."""
-        return sum(1 for item in self.of_kind(kind) if item.reason != "no setting")
+        """Return the number of items of one kind; what is not a setting does not count."""
+        return sum(1 for item in self.items_of_kind(kind) if item.reason != "no setting")

@@ -56,7 +56,7 @@ def plan_restore(
     source_profile: Profile,
     options: Options = NO_OPTIONS,
 ) -> RestorePlan:
-    """What it takes to make a drive hold a parameter set.
+    """Plan the writes that make a drive hold a parameter set.
 
     `profile` and `held` are the drive's, `source_profile` is the set's. Values of another family
     are carried over by quantity, in engineering values.
@@ -117,7 +117,7 @@ class _Planner:
                 self._skip(code, "absent", f"it is not in the set: {why}")
 
     def add_quantities(self) -> None:
-        """What both families name as the same quantity."""
+        """Add values that both families name as the same quantity."""
         taken: set[str] = set()
         for quantity in ACROSS:
             theirs = self.source_profile.quantity(quantity)
@@ -188,7 +188,7 @@ class _Planner:
         return shown(self.profile, parameter, raw, self.source.raws).display
 
     def _holds(self, parameter: Parameter, text: str) -> bool:
-        """Whether the drive shows the same value, so that nothing is left out."""
+        """Return True if the drive shows the same value, so that nothing is left out."""
         held = self.held
         raw = held.raws.get(parameter.code)
         if raw is None:

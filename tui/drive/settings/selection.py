@@ -41,12 +41,12 @@ FILTERS: tuple[FilterId, ...] = (
 
 
 HOME_QUANTITIES: tuple[Quantity, ...] = ("acceleration", "high_speed", "line_address")
-"""What a person looks for first: the group of the first of them is shown at the start."""
+"""Quantities that a person looks for first: the group of the first one is shown at the start."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What a list shows: all that passes a filter, or one group of the profile."""
+    """Contents of a list: all that passes a filter, or one group of the profile."""
 
     filter: FilterId = "all"
     group: str = ""
@@ -54,7 +54,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class FilterContext:
-    """What a filter decides by."""
+    """Facts by which a filter decides."""
 
     profile: Profile
     raws: Mapping[str, int] = field(default_factory=dict)
@@ -75,7 +75,7 @@ def group_order(profile: Profile) -> list[str]:
 
 
 def start_up_codes(profile: Profile) -> list[str]:
-    """What a first commissioning sets and looks at, in the order of its steps."""
+    """Return the parameters of a first commissioning, in the order of its steps."""
     return [code for step in profile.data.start_up for code in step.parameters]
 
 
@@ -113,7 +113,7 @@ def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
 
 
 def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool:
-    """Whether a parameter belongs to a filter."""
+    """Return True if a parameter belongs to a filter."""
     code, profile = parameter.code, facts.profile
     raw = facts.raws.get(code)
     match chosen:
@@ -139,7 +139,7 @@ def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool
 
 
 def match(profile: Profile, parameter: Parameter, words: Collection[str]) -> int | None:
-    """How well every word is found, the best with 0; None where one is not.
+    """Return how well every word is found, the best with 0; None if one is not found.
 
     0: it is the code, 1: the code begins with it, 2: in the code, 3: in name or address, 4: in
     the group or a value's name.

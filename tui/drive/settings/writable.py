@@ -1,4 +1,4 @@
-"""Whether a parameter may be written as a setting now, and if not why; pure functions."""
+"""True if a parameter may be written as a setting now, and if not why; pure functions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Refusal:
 
 
 def is_order(profile: Profile, parameter: Parameter) -> bool:
-    """Whether a word is an order (command, reference, output) rather than a setting."""
+    """Return True if a word is an order (command, reference, output) rather than a setting."""
     if (
         parameter.access == "w"
         or parameter.storage == "ram"
@@ -56,7 +56,7 @@ def is_order(profile: Profile, parameter: Parameter) -> bool:
 
 
 def is_setting(profile: Profile, parameter: Parameter) -> bool:
-    """Whether a parameter is a setting: kept by the drive, no measurement and no order."""
+    """Return True if a parameter is a setting: kept by the drive, no measurement and no order."""
     if parameter.access not in ("rw", "rw-stopped"):
         return False
     if group_holds(profile, parameter) == "measurements":
@@ -65,7 +65,8 @@ def is_setting(profile: Profile, parameter: Parameter) -> bool:
 
 
 def needs_standstill(profile: Profile, parameter: Parameter) -> bool:
-    """Whether the motor must be at rest, by the parameter's access or by its block's rule."""
+    """Return True if the motor must be at rest, by the parameter's access or by its block's
+    rule."""
     block = slot_of(profile, parameter.code)
     return parameter.access == "rw-stopped" or (block is not None and block.write_when == "stopped")
 
@@ -76,7 +77,7 @@ def slot_of(profile: Profile, code: str) -> Block | None:
 
 
 def line_setting(profile: Profile, code: str) -> LinkSetting | None:
-    """What a parameter sets of the drive's side of a line, or None."""
+    """Return the setting of the drive's side of a line that a parameter makes, or None."""
     return next((s for s in profile.data.link.settings if s.parameter == code), None)
 
 
@@ -130,7 +131,7 @@ def option_code(profile: Profile, parameter: Parameter) -> Parameter | None:
 
 
 def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
-    """What a person should know of a parameter before it is written, each in a few words."""
+    """Return remarks on a parameter before it is written, each in a few words."""
     block = slot_of(profile, parameter.code)
     later = parameter.effective == "after-reset" or (
         block is not None and block.effective == "after-reset"
@@ -147,13 +148,14 @@ def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
 
 
 def cuts_line(profile: Profile, parameter: Parameter) -> bool:
-    """Whether writing it at once ends the conversation at the present line settings."""
+    """Return True if writing it at once ends the conversation at the present line settings."""
     setting = line_setting(profile, parameter.code)
     return setting is not None and setting.role in CUTTING and parameter.effective == "at-once"
 
 
 def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
-    """Whether a written value comes into force only when the drive is reset or switched on."""
+    """Return True if a written value comes into force only when the drive is reset or switched
+    on."""
     block = slot_of(profile, parameter.code)
     if block is not None and block.effective == "after-reset":
         return True
@@ -174,7 +176,7 @@ def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
 
 
 def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
-    """What is dangerous about a value of the drive's watch over the line; else empty."""
+    """Return the danger of a value of the drive's communication watch; else empty."""
     watch = profile.data.communication_fault
     if watch is None:
         return ""

@@ -16,11 +16,11 @@ from ..dialogs.files import fault_of_new
 
 
 class BlockKeys(ArmingKeys):
-    """What these keys do; the block editor does the work."""
+    """Actions of the block keys; the block editor does the work."""
 
     @property
     def block_editor(self) -> BlockEditor:
-        """What is known and proposed."""
+        """Known and proposed assignments."""
         return self.console.blocks
 
     def _try(self, work: Callable[[], None]) -> None:

@@ -106,7 +106,7 @@ class BlocksScreen(BlockKeys):
         self.put("cost", cost_lines(block_editor, block, block_editor.proposals.saving(), width))
 
     def _proposed(self) -> str:
-        """How much is proposed and what becomes of it, or why nothing is read."""
+        """Return the number and effect of proposals, or why nothing is read."""
         count = self.block_editor.proposals.count
         slots = "slot" if count == 1 else "slots"
         if not count:
@@ -244,7 +244,7 @@ class BlocksScreen(BlockKeys):
         )
 
     def _follows(self) -> str:
-        """What would be written, and what that means for others."""
+        """Return the pending writes and their effect on others."""
         profile, lines, reported = self.session.profile, [], []
         for block in self.block_editor.proposals.blocks:
             found = self.block_editor.proposals.changes(block)

@@ -187,7 +187,7 @@ def _remarks(
 
 
 def _force_text(slot: Slot) -> str:
-    """Whether a slot of an indirect block counts already, and how that is known."""
+    """Return whether a slot of an indirect block is in force, and how that is known."""
     if slot.force is Force.ACTIVE:
         return "Active: only this parameter can have brought that value; it cannot be read."
     if slot.force is Force.PENDING:
@@ -199,7 +199,7 @@ def _force_text(slot: Slot) -> str:
 def cost_lines(
     block_editor: BlockEditor, block: Block, saving: Saving | None, width: int
 ) -> list[Text]:
-    """What a monitoring cycle costs before and after, and the frame of the block looked at.
+    """Return the cost of a monitoring cycle before and after, and the frame of the selected block.
 
     Always four lines.
     """
@@ -236,13 +236,13 @@ def cost_lines(
 
 
 def _waits_for_a_reset(block_editor: BlockEditor) -> bool:
-    """Whether slots hold what a block does not bring yet: the figures are those of then."""
+    """Return True if slots hold what a block does not bring yet: the figures are those of then."""
     views = block_editor.views.values()
     return any(slot.force is Force.PENDING for view in views for slot in view.slots)
 
 
 def _output_words(block_editor: BlockEditor) -> list[int]:
-    """What the outputs hold now, for the frame; 0 where that is not known."""
+    """Return the output values for the frame; 0 if unknown."""
     for block in block_editor.proposals.blocks:
         view = block_editor.views.get(block.id)
         if block.direction == "write" and view is not None:

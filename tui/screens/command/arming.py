@@ -30,11 +30,11 @@ class ArmingKeys(PanelScreen):
     console: DriveConsole
     session: DriveSession
     passed: Outcome | None = None
-    """What work had come to when a key led on from it: no longer shown."""
+    """Result of work at the time of a key that continued from it: no longer shown."""
 
     @property
     def commander(self) -> Commander:
-        """What arms and commands this drive."""
+        """Commander of this drive."""
         return self.console.commander
 
     def _refuse(self, text: str) -> None:
@@ -42,7 +42,7 @@ class ArmingKeys(PanelScreen):
         raise NotImplementedError
 
     def motor_now(self) -> MotorsNow:
-        """What the motor does now, for a question about this drive."""
+        """Return the motor's present state, for a question about this drive."""
         from ..dialogs.now import MotorsNow
 
         return MotorsNow(self.app, [self.session])
@@ -88,7 +88,7 @@ class ArmingKeys(PanelScreen):
         return self.commander.armed_for is not None
 
     def _require_armed(self) -> bool:
-        """Whether the drive is armed; where it is not, that is told."""
+        """Return True if the drive is armed; where it is not, that is told."""
         if not self._armed():
             self._refuse(self.session.arming.hindrance or self._how_to_arm())
         return self._armed()

@@ -42,7 +42,7 @@ class OrderKeys(TeachKeys):
     """The refusal that a person was asked about last."""
 
     def control(self, now: float) -> Control:
-        """Whether and how the drive is commanded from here, for the screen."""
+        """Return whether and how this panel commands the drive."""
         commander, raws = self.commander, self.session.image.raws
         outcome = commander.outcome
         if outcome is not None:
@@ -69,7 +69,7 @@ class OrderKeys(TeachKeys):
         self._give(self.commander.take_over)
 
     def ask_unrecorded(self) -> None:
-        """Where a start could not be put on record, ask once whether to run all the same."""
+        """Ask once whether to run although the start cannot be recorded."""
         from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 
         outcome, starts = self.commander.outcome, self.session.starts

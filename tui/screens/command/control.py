@@ -1,4 +1,4 @@
-"""Whether and how a drive is commanded from here, as a screen shows it."""
+"""True if and how a drive is commanded from here, as a screen shows it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Hindrance:
     text: str
     way: str
     """A sentence: the key that opens the way, else what is to be done at the drive."""
-    of_channel: bool = False
-    """Whether somebody else commands the drive."""
+    by_channel: bool = False
+    """True if somebody else commands the drive."""
 
     @property
     def sentence(self) -> str:
@@ -30,21 +30,21 @@ class Hindrance:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """Whether and how the drive is commanded from here."""
+    """True if and how the drive is commanded from here."""
 
     armed_for: float | None = None
     """Seconds for which it is armed yet; None when it is not."""
     why_disarmed: str = ""
     outcome: Outcome | None = None
-    """What has become of the last order, while that is news."""
+    """Result of the last command, while it is new."""
     hindrance: Hindrance | None = None
     """Why a run command would have no effect now; None where it would."""
     offer: str = ""
-    """What an earlier program has started and left, and how it is taken over."""
+    """Motor that an earlier program left running, and how it is taken over."""
     barred: str = ""
     """Why the drive cannot be armed from this panel; empty if it can."""
     lost: str = ""
-    """What the drive no longer holds of what was written from here."""
+    """Values written by this panel that the drive no longer holds."""
 
 
 UNARMED = Control()
@@ -52,7 +52,7 @@ UNARMED = Control()
 
 
 def hindrance(profile: Profile, raws: Mapping[str, int]) -> Hindrance | None:
-    """What stands against a run command now, as far as that is known."""
+    """Return the reason against a run command now, as far as known."""
     chart = chart_in_force(profile, raws)
     held = held_back(profile, chart, "forward", raws) if chart is not None else None
-    return Hindrance(held.text, way_by_key(held), held.of_channel) if held else None
+    return Hindrance(held.text, way_by_key(held), held.by_channel) if held else None

@@ -1,4 +1,4 @@
-"""What work on a drive has come to, for as long as that is news."""
+"""Result of work on a drive, while it is new."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class TeachKeys(ArmingKeys):
 
     @property
     def teacher(self) -> Teacher:
-        """What is taught of this drive."""
+        """Taught scales of this drive."""
         return self.console.teacher
 
     def ask_look(self, code: str) -> None:
@@ -123,14 +123,14 @@ class PickWord(KeyQuestion[str | None]):
 
     def __init__(self, console: DriveConsole, codes: Sequence[str], now: MotorsNow) -> None:
         super().__init__(now)
-        self._of_drive, self._codes = console, codes
+        self._drive_console, self._codes = console, codes
 
     def dialog(self) -> ComposeResult:
         """The list and its keys."""
         with Vertical(id="dialog"):
             yield Plain("Which value shall be taught?", id="question")
             yield from self.now_lines()
-            lines = (entry(word_to_teach(self._of_drive, code), id=code_id(at)) for at, code in
+            lines = (entry(word_to_teach(self._drive_console, code), id=code_id(at)) for at, code in
                      enumerate(self._codes))  # fmt: skip
             yield OptionList(*lines, id="choices", compact=True)
             keys = (("Up, Down", "choose"), ("Enter", "asks what is shown"), ("Esc or q", "no"))
@@ -143,7 +143,7 @@ class PickWord(KeyQuestion[str | None]):
 
 
 def code_id(place: int) -> str:
-    """What a line of the list is called; a code may have signs that Textual does not take."""
+    """Return the id of a line of the list; a code may have characters that Textual rejects."""
     return f"word{place}"
 
 
@@ -171,7 +171,7 @@ def words_to_teach(profile: Profile, watched: Sequence[str]) -> list[str]:
 
 
 def fault_of_look(text: str) -> str:
-    """What is wrong with what was typed, or nothing."""
+    """Return the error in a typed reading, or nothing."""
     try:
         parse_display(text)
     except DriveError as error:
@@ -180,7 +180,7 @@ def fault_of_look(text: str) -> str:
 
 
 def _known(console: DriveConsole, code: str) -> str:
-    """What is known of it so far."""
+    """Return what is known so far."""
     raw = console.session.image.raws.get(code)
     now = "" if raw is None else f"It reads raw {raw} now. "
     scale = console.teacher.scales.get(code)

@@ -1,4 +1,4 @@
-"""What Line tells in the place of drives: what happened, what to do, who may be there. Pure."""
+"""Advice on Line instead of drives: the event, the next step, the possible drives. Pure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ADVICE_INDENT = 3
 
 
 class Advice(NamedTuple):
-    """What happened, and what to do next."""
+    """An event, and the next step."""
 
     now: str
     next_step: str

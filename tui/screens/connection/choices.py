@@ -1,4 +1,4 @@
-"""What Line offers: the lines of this machine and those used lately."""
+"""Lines on offer: those of this computer and those used lately."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight",
 
 
 def line_forms() -> tuple[str, ...]:
-    """How a line is written, by examples."""
+    """Return examples of how a line is written."""
     return (
         "serial:/dev/ttyUSB0,19200,8E1 (and ,timeout=2 for slow drives)",
         "tcp:192.168.0.10:502",
@@ -54,7 +54,7 @@ class LineChoice(NamedTuple):
     description: str
     path: str = ""
     name: str = ""
-    """How the settings file calls it."""
+    """Name in the settings file."""
     device: int | None = None
     """The drive that is meant by the name."""
 
@@ -66,7 +66,7 @@ LIST_MARKS: dict[ListMark, tuple[str, Style]] = {
     "shown": ("● ", RUNNING),
     "fault": ("■ ", FAULT),
 }
-"""What stands before a line: open, shown, open below with a drive in fault."""
+"""Marks before a line: open, shown, open below with a drive in fault."""
 
 
 class Group(NamedTuple):
@@ -109,7 +109,7 @@ def _without_settings(line: str) -> str:
 
 
 def _offered_simulated(text: str) -> bool:
-    """Whether it is one of the simulated lines, which are offered anyway."""
+    """Return True if it is one of the simulated lines, which are offered anyway."""
     # by its spelling: what simulates a line takes long to import, and this is the first picture
     offered = [one for one, _ in simulated_lines()[:2]]
     return text.replace(" ", "").casefold() in (*offered, *map(_with_addresses, offered))
@@ -124,7 +124,7 @@ def _with_addresses(line: str) -> str:
 
 
 def fault_of_line(text: str) -> str:
-    """What is wrong with a typed line, or with the name of one, or nothing."""
+    """Return the error in a typed line or its name, or nothing."""
     try:
         named = line_named(text.strip())
         check_line(named.line if named else text)
@@ -134,7 +134,7 @@ def fault_of_line(text: str) -> str:
 
 
 def same_line(one: str, other: str) -> bool:
-    """Whether two texts mean one line with the same settings, however they are spelled."""
+    """Return True if two texts mean one line with the same settings, however they are spelled."""
     if one == other:
         return True
     from tui.bus.link import SerialLink, parse_link

@@ -41,7 +41,7 @@ def form_lines(rows: Sequence[tuple[str, Sequence[Text]]], width: int) -> list[T
 
 
 def drawn_field(value: str, instead: str = "", *, off: bool = False) -> Text:
-    """What stands in a field, or instead of it in an empty one."""
+    """Return the contents of a field, or the hint in an empty one."""
     if not value:
         return Text(plain(instead), EMPTY)
     return Text(plain(value), OFF if off else FIELD_TEXT)

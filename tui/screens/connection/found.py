@@ -40,7 +40,7 @@ def about_drive(drive: FoundDrive) -> str:
 
 
 def next_step(drive: FoundDrive) -> str:
-    """What a person can do about a drive whose profile is not known, or wrong; else nothing."""
+    """Return the next step for a drive whose profile is unknown or wrong; else nothing."""
     if drive.session is not None and drive.session.contradiction:
         own = drive.identity.profile or "its own"
         return f"Not armed: the profile is not its own. Type {own} beside Profile, then s."

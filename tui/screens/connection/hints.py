@@ -1,4 +1,4 @@
-"""What to try next after an error, by its kind."""
+"""Next step after an error, by its kind."""
 
 from __future__ import annotations
 
@@ -20,5 +20,5 @@ HINTS: tuple[tuple[type[Exception], str], ...] = (
 
 
 def hint_for(error: Exception) -> str:
-    """What to try next."""
+    """Return what to try next."""
     return next((hint for kind, hint in HINTS if isinstance(error, kind)), "Try again.")

@@ -30,9 +30,9 @@ class LineForm(Vertical):
     """
 
     typed = False
-    """Whether a person has typed addresses since the last line was opened."""
+    """True if a person has typed addresses since the last line was opened."""
     _there = False
-    """Whether there are fields to type into."""
+    """True if there are fields to type into."""
 
     def __init__(self) -> None:
         super().__init__()

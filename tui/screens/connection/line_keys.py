@@ -125,16 +125,17 @@ class LineKeys(Scanning):
             self.scan([device])
 
     def tell_opening(self, text: str) -> None:
-        """What there is to see until the line is there."""
+        """Show the progress until the line is open."""
         self.advise(f"Opening {text}", "Press Esc to cancel. Other keys are ignored.")
         self.draw_stop_keys()
 
     def _is_good(self) -> bool:
-        """Whether the open line is one with drives, or one on which they are searched for."""
+        """Return True if the open line is one with drives, or one on which they are searched
+        for."""
         return self._connected() and (bool(self.found) or self.scanning)
 
     def is_on_open_line(self) -> bool:
-        """Whether the cursor is on the line that is open."""
+        """Return True if the cursor is on the line that is open."""
         chosen, here = self.lines.chosen, self.app.line_text
         return chosen is not None and bool(here) and same_line(self.line_of(chosen), here)
 

@@ -74,7 +74,7 @@ class LineList(OptionList):
             self.highlighted = self.get_option_index(fits[0])
 
     def forget_named(self) -> None:
-        """What was named is no line."""
+        """Show that no line was named."""
         self._named = ""
         self.look_for_lines()
         self._fill()
@@ -121,7 +121,8 @@ class LineList(OptionList):
         return "fault" if line in self._faulty else "open"
 
     def _may_be_open(self, text: str) -> bool:
-        """Whether a line has to be looked at closer; to know simulated ones takes the simulator."""
+        """Return True if a line has to be looked at closer; to know simulated ones takes the
+        simulator."""
         if not self._open:
             return False
         from tui.session.connect.line_key import SIMULATED_PREFIX

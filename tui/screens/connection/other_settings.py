@@ -96,7 +96,7 @@ class OtherSettings(LineKeys):
     def _costs(
         self, link: SerialLink, settings: Sequence[LineSetting], addresses: int
     ) -> SettingCosts:
-        """What the settings take; reads files."""
+        """Return the duration of the settings; reads files."""
         from tui.session.connect.setting_costs import setting_costs
 
         opened = self.app.opened

@@ -1,4 +1,4 @@
-"""What the table says of each drive, by its monitor or by the last look at it."""
+"""Row of each drive, from its monitor or its last check."""
 
 from __future__ import annotations
 

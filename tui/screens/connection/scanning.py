@@ -29,7 +29,7 @@ class Scanning(LineView):
     _led = False
     unclear: frozenset[int] = frozenset()
     """Addresses whose last identification was damaged: no drive is known to answer there."""
-    """Whether the cursor was led to the drives of the open line."""
+    """True if the cursor was led to the drives of the open line."""
 
     def action_scan(self) -> bool:
         """Search for drives at the addresses given; those that were found stay.
@@ -93,7 +93,8 @@ class Scanning(LineView):
         self.look()
 
     async def _is_not_alone(self, search: Search) -> bool:
-        """Whether another master was heard before a search for unknown drives; that ends it."""
+        """Return True if another master was heard before a search for unknown drives; that ends
+        it."""
         if self.app.fleet is None:
             return False
         heard = True  # also where a key ends it meanwhile
@@ -135,11 +136,11 @@ class Scanning(LineView):
         return bool(text)
 
     def tell_search(self) -> None:
-        """What there is to see while nobody has answered yet."""
+        """Show the search until the first drive answers."""
         self.advise("Drives are searched for.", "Each appears here as it answers; Esc ends it.")
 
     def sum_up(self, devices: Sequence[int]) -> None:
-        """What a search that was done has come to."""
+        """Show the result of a finished search."""
         from tui.session.connect.addresses import addresses_text
 
         if not self.found and self.search is not None and self.search.answered:
@@ -181,7 +182,7 @@ class Scanning(LineView):
 
     @property
     def scanning(self) -> bool:
-        """Whether drives are searched for now."""
+        """True if drives are searched for now."""
         return self.search is not None and self.search.goes_on
 
     async def _equip(self, identity: DriveIdentity) -> None:
@@ -277,7 +278,7 @@ class Scanning(LineView):
 
 
 def _families() -> str:
-    """Who watches the line from the first request on, in a sentence; reads files."""
+    """Name the families with a line timeout from the first request, in a sentence; reads files."""
     from tui.drive.finding import watching_families, watching_text
     from tui.session.connect.strangers import known_profiles
 

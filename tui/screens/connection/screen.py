@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ConnectionScreen(DiagnosisTarget, OtherSettings):
-    """What the cursor and Enter do in the two lists."""
+    """Actions of the cursor and Enter in the two lists."""
 
     CSS_PATH = "connection.tcss"
     BINDINGS: ClassVar = bindings(CONNECTION)
@@ -64,7 +64,7 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
         return drive.console if drive else None
 
     def action_open_chosen(self) -> None:
-        """What Enter does in the lists; a field hands Enter over to the list of lines."""
+        """Open the chosen entry of a list; a field passes Enter to the list of lines."""
         focused = self.focused
         if isinstance(focused, OptionList):
             focused.action_select()

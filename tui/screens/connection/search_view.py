@@ -1,4 +1,4 @@
-"""How far a search is and what it still takes, in the words of Line. Pure functions."""
+"""Progress of a search and its remaining time, in the words of Line. Pure functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ IN_MINUTES = 100
 
 
 def left_text(search: Search | None, later: float) -> str:
-    """What a search still takes, with `later` seconds of those that follow; empty if unknown."""
+    """Return the remaining time of a search, with `later` seconds of those that follow; empty if
+    unknown."""
     if search is None or search.ended or not search.cost:
         return ""
     seconds = search.left + later
@@ -20,7 +21,7 @@ def left_text(search: Search | None, later: float) -> str:
 
 
 def far_text(search: Search, later: float, room: int) -> str:
-    """How far a search is, in `room` cells, and what it still takes where that is known."""
+    """Return the progress of a search in `room` cells, with the remaining time if it is known."""
     left = left_text(search, later)
     if not left:
         return search.text

@@ -1,4 +1,4 @@
-"""What Line shows: lines and fields at the left, the drives of the open line at the right."""
+"""Contents of Line: lines and fields at the left, the drives of the open line at the right."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class LineView(PanelScreen):
         self.later = 0.0
         """Seconds that searches take which follow the present one."""
         self.families = ""
-        """Who may be there and acts when it is asked no more; said while drives are searched."""
+        """Possible drives that react to lost polling; shown while the line is scanned."""
         self._looking: list[Timer] = []
         self._away = self._was_lost = False
         self._typed_at = -math.inf
@@ -217,7 +217,7 @@ class LineView(PanelScreen):
             self.put(place, fit(self.query_one(f"#{place}").size.width))
 
     def _how_far(self, width: int) -> list[Text]:
-        """How far the search is."""
+        """Return the progress of the search."""
         label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Search ")
         far = "no line" if self.app.fleet is None else "s begins"
         if self.search is not None:
@@ -227,12 +227,12 @@ class LineView(PanelScreen):
     # What happened
 
     def say(self, happened: str, next_step: str, kind: str = "") -> None:
-        """What happened, among the events; what to do next, while there is no drive."""
+        """Add the event, and the next step as long as there is no drive."""
         self.app.events.add(kind or "told", happened)
         self.advise(happened, next_step, kind)
 
     def advise(self, now: str, next_step: str, kind: str = "") -> None:
-        """What there is instead of drives, and what to do next."""
+        """Show advice instead of drives, with the next step."""
         self._advice = Advice(now, next_step, kind)
         self._show_advice()
 
@@ -259,7 +259,7 @@ class LineView(PanelScreen):
         self.put("message", [] if self.found else self._advice_lines(width))
 
     def _advice_lines(self, width: int) -> list[Text]:
-        """What happened, what to do next, in the column at the right."""
+        """Return the event and the next step, in the column at the right."""
         return advice_lines(
             self._advice,
             width,

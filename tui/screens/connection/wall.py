@@ -57,7 +57,7 @@ class WallRow(NamedTuple):
     age: float | None = None
     """Seconds since what is told was on the wire."""
     old: bool = False
-    """Whether that is too long ago to be the present."""
+    """True if that is too long ago to be the present."""
 
 
 class WallColumns(NamedTuple):

@@ -14,7 +14,7 @@ from tui.bus.link import SerialLink
 from tui.session.drive import DriveSession
 from tui.session.proof.prover import Prover
 from tui.session.proof.record import proof_entry
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 from tui.session.work import OutcomeKind, Permit, Task
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
@@ -38,7 +38,7 @@ TIMEOUTS_A_PROOF_TAKES = 4.6
 def silence_line(
     session: DriveSession, watch: TimeoutWatch | None, proved: str, width: int
 ) -> Text:
-    """What the drive does on a silent line, whether that was proved, how the drive is reached."""
+    """Return the drive's timeout reaction, whether it was tested, and how the drive is reached."""
     rules, link = session.profile.data.communication_fault, session.line.link
     reported = Text("  On silence    ", FAINT, no_wrap=True)
     if rules is None:
@@ -58,7 +58,7 @@ def silence_line(
 
 
 def warning_lines(session: DriveSession, width: int) -> list[Text]:
-    """What the family warns of when the line falls silent."""
+    """Return the family's warnings about loss of communication."""
     rules = session.profile.data.communication_fault
     lines = []
     for warning in rules.warnings if rules else ():

@@ -16,7 +16,7 @@ from tui.drive.control_source import source_changes, source_codes, source_in_for
 from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
 from tui.session.proof.prover import hidden_at_rest
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, PLAIN, STRONG

@@ -1,4 +1,4 @@
-"""Who commands a drive, drawn: sources, what switches between them, what a change writes."""
+"""Commander of a drive, drawn: sources, switches between them, writes of a change."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def now_lines(
     switches: Sequence[str],
     width: int,
 ) -> list[Text]:
-    """Who commands the drive now, by its own words, by which configuration, and who else may.
+    """Return the present commander by the drive's own words, the configuration, and possible
+    others.
 
     Three lines.
     """
@@ -59,7 +60,7 @@ def left_lines(left: str, width: int) -> list[Text]:
 
 
 def _channel(profile: Profile, latest: Snapshot | None) -> str:
-    """Who commands, by the drive's word for it, where its chart does not tell."""
+    """Return the commander from the drive's channel word, if its chart does not show it."""
     parameter = profile.quantity("command_channel")
     if parameter is None or latest is None or latest.error:
         return NOT_AVAILABLE
@@ -88,7 +89,7 @@ def _way(way: Way, goal: str) -> list[Text]:
 
 
 def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) -> list[Text]:
-    """What would be written, word by word."""
+    """Return the pending writes, word by word."""
     if not found:
         return [Text("   Nothing: the drive is set up so.", STRONG)]
     return [_change(profile, change, width) for change in found]
@@ -114,7 +115,7 @@ def _named(profile: Profile, change: SourceChange, raw: int | None) -> str:
 
 
 def note_lines(source: ControlSource, found: Sequence[SourceChange], width: int) -> list[Text]:
-    """What else is to be known of a configuration."""
+    """Return further facts about a configuration."""
     lines = [Text(f"   {line}", FAINT) for line in wrapped(source.note, width - 4, 2)]
     unsure = [change.parameter.code for change in found if not change.verified]
     if unsure:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .now import MotorsNow
 
 TextCheck = Callable[[str], str]
-"""What is wrong with a text, or nothing."""
+"""Check of a text: its error, or nothing."""
 
 
 class Ask(Question[str | None]):

@@ -50,7 +50,7 @@ class Confirm(KeyQuestion[bool]):
         self._keys = hint(("y" if loses else "y or Enter", yes), ("Esc or q", no))
 
     def dialog(self) -> ComposeResult:
-        """What is asked, what the motor does, what follows, and the keys."""
+        """Compose the question, the motor's state, the consequences, and the keys."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
             yield from self.now_lines()
@@ -59,7 +59,7 @@ class Confirm(KeyQuestion[bool]):
             yield Plain(self._keys, id="hint")
 
     def on_mount(self) -> None:
-        """What is too long for the terminal can be scrolled; that is told."""
+        """Make a text scroll that is too long for the terminal, and show that it does."""
         self.call_after_refresh(self._tell_scrolling)
 
     def _tell_scrolling(self) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def fault_of_new(name: str) -> str:
-    """What is wrong with a name for a new file, or nothing."""
+    """Return the error in a name for a new file, or nothing."""
     if not name.strip():
         return "A name is needed."
     if not name.isprintable():

@@ -33,7 +33,7 @@ class Leave(KeyQuestion[LeaveChoice]):
         self._follows = follows
 
     def dialog(self) -> ComposeResult:
-        """What runs, what happens when it is left, and the keys."""
+        """Compose the running motors, the consequences of leaving, and the keys."""
         with Vertical(id="dialog"):
             yield Plain("A motor runs by your command", id="question")
             yield from self.now_lines()

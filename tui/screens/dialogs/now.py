@@ -1,4 +1,4 @@
-"""What the motors do now, for the question that is asked about them."""
+"""Present state of the motors, for a question about them."""
 
 from __future__ import annotations
 

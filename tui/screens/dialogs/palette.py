@@ -51,7 +51,7 @@ class Palette(Question[FoundAction | None]):
             yield Plain("", id="hint")
 
     def on_mount(self) -> None:
-        """What can be done here."""
+        """List the possible actions."""
         self.query_one(OptionList).can_focus = False
         self._list("")
 
@@ -94,7 +94,7 @@ class Palette(Question[FoundAction | None]):
         self._tell_keys()
 
     def _tell_keys(self) -> None:
-        """What Enter does now."""
+        """Show the effect of Enter."""
         at = self.query_one(OptionList).highlighted
         keys = [("Up, Down", "choose")] if self._found else []
         if at is not None:

@@ -32,13 +32,13 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True, slots=True)
 class FileAbout:
-    """What a file is, found by reading it."""
+    """Kind of a file, found by reading it."""
 
     drive: str = ""
     reported: str = ""
-    """How it compares with what is open, in two or three words."""
+    """Comparison with the open drive, in two or three words."""
     alarm: bool = False
-    """Whether it is of another family, or no file of the kind."""
+    """True if it is of another family, or no file of the kind."""
 
 
 FileReader = Callable[[Path], FileAbout]

@@ -1,4 +1,4 @@
-"""What every question has: no answer by accident, and what the motor does while it is asked.
+"""Common parts of questions: no answer by accident, and the motor's state.
 
 Enter and `y` count only once the question has stood on the screen for a moment: a key that was
 typed before it was there was meant for something else.
@@ -61,7 +61,7 @@ class Question(Framed, ModalScreen[T]):
     NO_KEYS: ClassVar[str] = ""
     """Keys that are no, besides Esc."""
     by_itself = False
-    """Whether it comes while somebody may be typing something else: what is typed on is no answer,
+    """True if it comes while somebody may be typing something else: what is typed on is no answer,
     no is none either."""
     BINDINGS: ClassVar = [Binding("escape", "no", show=False)]
 
@@ -89,7 +89,7 @@ class Question(Framed, ModalScreen[T]):
         yield from self.dialog()
 
     def dialog(self) -> Iterable[Widget]:
-        """What is asked, and its keys."""
+        """Compose the question and its keys."""
         raise NotImplementedError
 
     def on_mount(self) -> None:
@@ -135,12 +135,12 @@ class Question(Framed, ModalScreen[T]):
         self._fit_list()
 
     def now_lines(self) -> Iterable[Plain]:
-        """What the motors do, where the question is about drives."""
+        """Return the motors' states, if the question is about drives."""
         if self._now is not None:
             yield Plain(self._now(), id="now")
 
     def concerns(self, device: int) -> bool:
-        """Whether a stop of this drive voids the question."""
+        """Return True if a stop of this drive voids the question."""
         return self._now is not None and device in self._now.devices
 
     def void(self) -> None:
@@ -170,7 +170,7 @@ class Question(Framed, ModalScreen[T]):
         """Note when the last key came."""
         self._typed_at = self.app.clock.monotonic()
 
-    def action_swallow(self, of_no: bool = False) -> None:
+    def action_swallow(self, as_no: bool = False) -> None:
         """Ignore a key and report why. A no waits only if no key asked the question."""
         self._typed_at = self.app.clock.monotonic()
         self.app.tell(TYPED_ON if self.by_itself else TOO_EARLY)

@@ -38,7 +38,7 @@ LooksWhy = Callable[[], Awaitable["Diagnosis"]]
 
 
 class WhyScreen(Framed, ModalScreen[None]):
-    """What was found; `look` is asked when it opens, and again at N."""
+    """Results of a diagnosis; `look` runs when the screen opens, and again at N."""
 
     CSS_PATH = "why.tcss"
     BINDINGS: ClassVar = [
@@ -100,7 +100,7 @@ class WhyScreen(Framed, ModalScreen[None]):
 
 
 def reason_lines(found: Diagnosis | None, width: int) -> Iterator[Text]:
-    """What fails and what to look at next, in lines; nothing is found yet where it is None."""
+    """Yield the failed check and the next steps, in lines; None: no result yet."""
     if found is None:
         yield Text(LOOKING, FAINT)
         return

@@ -38,7 +38,7 @@ RESET_LINES = 8
 CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
 OPENS = "Enter opens "
 TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
-"""How surely the first cause is known, in a word; `practice` is general practice."""
+"""Certainty of the first cause in a word; `practice` is general practice."""
 TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
     "output_frequency": "",
     "motor_current": "",
@@ -50,7 +50,7 @@ STORED_MARK = " stored"
 STORED_WIDTH = len(STORED_MARK) + 28
 """Columns of what the drive stored; the mark keeps it apart from what was last read here."""
 STORED_UNITS = ("Hz", "A", "h")
-"""What is told of a fault of the history, where the drive stores it."""
+"""Values of a fault in the history, if the drive stores them."""
 
 
 def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
@@ -89,7 +89,7 @@ def _shorten(parts: list[list[Text]], lines: int) -> None:
 
 
 def _shown_count(view: DoctorView) -> int:
-    """How many faults of the history are worth a line: those behind the last one are none."""
+    """Return the number of faults in the history with a line: those after the last one are none."""
     raws = [r.raw if (r := view.readings.get(code)) else None for code in view.history]
     some = [n for n, raw in enumerate(raws) if raw not in (None, view.profile.data.faults.none)]
     return max([1, *(n + 1 for n in some), view.at - len(view.look_at) + 1])

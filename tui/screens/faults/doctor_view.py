@@ -1,4 +1,4 @@
-"""What the Faults screen tells of: a fault, else an alarm, and what it points at."""
+"""Subject of the Faults screen: a fault, else an alarm, and its causes."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tui.session.reading import Reading
 
 @dataclass(frozen=True, slots=True)
 class DoctorView:
-    """What the Faults screen shows at one moment."""
+    """Contents of the Faults screen at one moment."""
 
     profile: Profile
     fault: FaultCode | None
     present: bool
-    """Whether the drive is in this fault now."""
+    """True if the drive is in this fault now."""
     record: FaultRecord | None
     """The trip as the panel saw it, where it did and this is the fault."""
     readings: Mapping[str, Reading]
@@ -30,7 +30,7 @@ class DoctorView:
     at: int = 0
     """The row of the cursor: parameters to look at first, then the history."""
     unread: bool = False
-    """Whether the history is being read yet."""
+    """True if the history is being read yet."""
     raws: Mapping[str, int] = field(default_factory=dict)
     """All raw values that the drive was last seen to hold."""
     alarms: Sequence[tuple[str, int, str]] = ()
@@ -38,7 +38,7 @@ class DoctorView:
 
     @property
     def help(self) -> FaultHelp | None:
-        """What the fault points at; what any may be, on a family whose trips have no numbers."""
+        """Help on the fault; on any fault of a family whose trips have no numbers."""
         if self.fault is None and not self.present:
             return None
         return self.profile.guide.fault(self.fault.raw if self.fault else None)
@@ -53,7 +53,7 @@ class DoctorView:
 
     @property
     def hint(self) -> Hint | None:
-        """What the fault or the alarm points at."""
+        """Help on the fault or the alarm."""
         alarm = self.alarm
         return self.profile.guide.alarm(alarm[0], alarm[1]) if alarm else self.help
 
@@ -72,7 +72,7 @@ class DoctorView:
 
     @property
     def ready(self) -> bool | None:
-        """Whether the drive says that a reset can work now; None where it does not tell."""
+        """True if the drive says that a reset can work now; None where it does not tell."""
         return reset_ready(self.profile, self._good())
 
     @property

@@ -40,7 +40,7 @@ DOCTOR_ROWS = 24
 
 
 class FaultsScreen(OrderKeys):
-    """What the drive is in, or was in last; another fault of its history where one is chosen."""
+    """Present or last fault of the drive; or the chosen one of its history."""
 
     CSS_PATH = "faults.tcss"
     BINDINGS: ClassVar = bindings(FAULTS)
@@ -59,7 +59,7 @@ class FaultsScreen(OrderKeys):
         self._at = 0
         self._offset = 0
         self._before = False
-        """Whether the seconds before the trip are shown in place of the doctor."""
+        """True if the seconds before the trip are shown in place of the doctor."""
 
     @property
     def _recorder(self) -> Recorder:
@@ -110,7 +110,7 @@ class FaultsScreen(OrderKeys):
         self.look()
 
     def doctor(self) -> DoctorView:
-        """What is shown now."""
+        """Return the present contents."""
         latest, record = self.console.monitor.latest, self._recorder.latest
         present = latest is not None and not latest.error and latest.state.kind == "fault"
         fault = latest.state.fault if latest is not None and present else None
@@ -171,7 +171,7 @@ class FaultsScreen(OrderKeys):
         self.put("record", self._past(width, below) if below else [])
 
     def _past(self, width: int, rows: int) -> list[Text]:
-        """What the drive stored of the chosen fault, and the seconds before the trip."""
+        """Return the values stored with the chosen fault, and the seconds before the trip."""
         stored = []
         if self._before:
             codes = self._stored()

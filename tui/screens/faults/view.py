@@ -1,4 +1,4 @@
-"""What a drive stored of a fault, and the seconds before a trip, as lines; pure functions."""
+"""Values stored with a fault, and the seconds before a trip, as lines; pure functions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FAULT_TIME_WIDTH = 8
 def stored_lines(
     profile: Profile, codes: Sequence[str], readings: Mapping[str, Reading], width: int
 ) -> list[Text]:
-    """What the drive kept of the moment of a fault."""
+    """Return the values that the drive stored at the moment of a fault."""
     if not codes:
         return [Text(" The drive stores nothing of this fault.", FAINT)]
     return [

@@ -20,28 +20,28 @@ ERRORS = frozenset({"error", "errors"})
 MOST_DIGITS = 9
 """Of what is taken for a number; Python counts no number of thousands of them."""
 TellFrames = Callable[[Sequence[Frame]], Sequence[str]]
-"""What frames say, a sentence each."""
+"""Return the text of frames, a sentence each."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameChoice:
-    """What was typed: `2 read error RFR`. All of it must hold; of several drives one is enough."""
+    """Typed filter: `2 read error RFR`. All of it must hold; of several drives one is enough."""
 
     devices: frozenset[int] = frozenset()
     functions: frozenset[int] = frozenset()
     errors: bool = False
-    """Whether only what went wrong is meant: refusals, damage, noise, silence."""
+    """True if only what went wrong is meant: refusals, damage, noise, silence."""
     words: tuple[str, ...] = ()
-    """What must occur in the sentence, the note or the bytes of one of its frames."""
+    """Words required in the sentence, the note or the bytes of one of its frames."""
 
     @property
     def is_all(self) -> bool:
-        """Whether every frame is chosen."""
+        """True if every frame is chosen."""
         return self == FrameChoice()
 
 
 def choice_of(text: str) -> FrameChoice:
-    """What a person means: numbers are drives, `f16` and names of functions are functions."""
+    """Parse a filter: numbers are drives, `f16` and names of functions are functions."""
     devices, functions, words, errors = set[int](), set[int](), [], False
     for word in text.casefold().split():
         if _is_number(word):
@@ -58,7 +58,7 @@ def choice_of(text: str) -> FrameChoice:
 
 
 def _is_number(word: str) -> bool:
-    """Whether it is a number; more digits than any has are looked for as they stand."""
+    """Return True if it is a number; more digits than any has are looked for as they stand."""
     return word.isascii() and word.isdigit() and len(word) <= MOST_DIGITS
 
 
@@ -89,7 +89,7 @@ def chosen(
 
 
 def _fits(group: Sequence[Frame], wanted: FrameChoice, *, tcp: bool, last: bool) -> bool:
-    """Whether drive, function and errors are those that are wanted."""
+    """Return True if drive, function and errors are those that are wanted."""
     parts = [pdu for frame in group if (pdu := pdu_of(frame.data, tcp=tcp)) is not None]
     if wanted.devices and not wanted.devices & {pdu.device for pdu in parts}:
         return False
@@ -99,7 +99,8 @@ def _fits(group: Sequence[Frame], wanted: FrameChoice, *, tcp: bool, last: bool)
 
 
 def went_wrong(group: Sequence[Frame], *, tcp: bool, last: bool) -> bool:
-    """Whether an exchange was refused, disturbed or not answered; the `last` may still be."""
+    """Return True if an exchange was refused, disturbed or not answered; the `last` may still
+    be."""
     for frame in group:
         pdu = pdu_of(frame.data, tcp=tcp)
         if frame.note not in ("", "echo") or pdu is None:

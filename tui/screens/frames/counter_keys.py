@@ -21,7 +21,7 @@ RESETS_NOTHING_ELSE = (
 
 
 class CounterKeys(PanelScreen):
-    """What the page of counters does."""
+    """Keys of the page of counters."""
 
     def __init__(self, console: DriveConsole) -> None:
         super().__init__()
@@ -36,7 +36,7 @@ class CounterKeys(PanelScreen):
 
     @property
     def shows_counters(self) -> bool:
-        """Whether the counters are shown now."""
+        """True if the counters are shown now."""
         raise NotImplementedError
 
     def counter_lines(self, width: int, height: int) -> list[Text]:

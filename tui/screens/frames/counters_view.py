@@ -41,7 +41,7 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
 
 
 def our_lines(found: CountersNow) -> list[Text]:
-    """What was counted here: since the line was opened, and since the last reset."""
+    """Return the counts of this program: since the line was opened, and since the last reset."""
     total, since = found.total, found.since
     head = Text(f" {'Ours':<15}{'since open':>12}{time_text(found.seconds):>12}", FAINT)
     rows = [
@@ -66,14 +66,14 @@ def our_lines(found: CountersNow) -> list[Text]:
 
 
 def time_text(seconds: float) -> str:
-    """How long ago: `last 95 s`, `last 12 min`, `last 3 h`."""
+    """Return a duration: `last 95 s`, `last 12 min`, `last 3 h`."""
     if seconds < 2 * 60:
         return f"last {seconds:.0f} s"
     return f"last {seconds / 60:.0f} min" if seconds < 2 * 3600 else f"last {seconds / 3600:.0f} h"
 
 
 def drive_lines(found: CountersNow, width: int) -> list[Text]:
-    """What the drive tells, and what it counted since the first look; refusals by their code."""
+    """Return the counters of the drive since the first reading; refusals by their code."""
     refused = ", ".join(f"{code}: {n}" for code, n in sorted(found.total.exceptions.items()))
     codes = [Text(f"Refused, by code  {refused}", FAINT)] if refused else []
     if found.trouble:
@@ -144,7 +144,7 @@ def bar_lines(shown: Sequence[TurnaroundBar], rows: int) -> list[Text]:
 
 
 def message(found: CountersNow, width: int, room: int) -> list[Text]:
-    """What the counters show, a sentence each; the worst first."""
+    """Return the conclusions from the counters, a sentence each; the worst first."""
     if found.agree:
         text = Text(no_wrap=True).append(" ● ", RUNNING)
         return [text.append(short(found.agreeing, width - 4), PLAIN)]

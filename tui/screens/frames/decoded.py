@@ -24,7 +24,7 @@ RawsOf = Callable[[int], Mapping[str, int]]
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a request has asked for: the words of a read, or none."""
+    """Subject of a request: the words of a read, or none."""
 
     device: int
     function: int

@@ -64,14 +64,14 @@ class FrameListScreen(PanelScreen):
         self._heading = "Frames on the line"
         self._held: tuple[Frame, ...] | None = None
         self._up = 0
-        """How many frames below the last one shown are out of sight."""
+        """Number of frames below the last one shown."""
         self._page: Page = "words"
         self._filter = ""
         self._asking: Literal["", "filter", "find"] = ""
         self._found: Frame | None = None
         self._room = 1
         self._since_epoch = 0.0
-        """What is added to a frame's time; taken once, or times that stay would tremble."""
+        """Offset of a frame's time to 1970; taken once, so that shown times do not change."""
 
     def body(self) -> ComposeResult:
         """One list, and under it the field for what is wanted of it."""
@@ -99,7 +99,7 @@ class FrameListScreen(PanelScreen):
 
     @property
     def _shows_sum(self) -> bool:
-        """Whether the last page stands in the place of the frames."""
+        """True if the last page stands in the place of the frames."""
         return self._page == "sum"
 
     def draw(self, width: int) -> None:
@@ -153,7 +153,7 @@ class FrameListScreen(PanelScreen):
         ]
 
     def _words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
-        """What some frames say; a reply is told by its request, seen or not."""
+        """Return the text of some frames; a reply is explained by its request, seen or not."""
         if not places:
             return []
         first = places[0] - 1 if places[0] else 0
@@ -230,7 +230,7 @@ class FrameListScreen(PanelScreen):
         self.call_after_refresh(self.look)
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """What is typed into the filter has its effect at once."""
+        """Apply a typed filter at once."""
         if self._asking == "filter":
             self._filter = " ".join(event.value.split())
             self._up = 0

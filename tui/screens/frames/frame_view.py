@@ -89,7 +89,7 @@ def frames_text(
 ) -> str:
     """Frames as a text to keep: a line each, tabs between time, gap, direction, words and bytes.
 
-    `since_epoch` is added to the line's times for the time of day; `reported` goes with the `places`.
+    `since_epoch` plus the line time is the time of day; `reported` goes with the `places`.
     """
     between = gaps(frames)
     lines = [f"# {line}" for line in heading]

@@ -1,4 +1,4 @@
-"""What listening came to, as lines of a screen. Pure functions."""
+"""Result of listening, as lines of a screen. Pure functions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MOST_ROWS = 6
 OF_A_DRIVE, HANGING = 3, 5
 """Columns before a sentence about a drive, and before the rest of it."""
 WARNINGS = ("NOT FED", "ANSWERED TWICE", "A SECOND MASTER", "no answer", "damaged", "Broken")
-"""What of a sentence wants to be seen."""
+"""Words of a sentence to be emphasized."""
 
 
 def heard_lines(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..app_port import Panel
 
 RAW_NAME, TEXT_NAME = ".raw.pcapng", ".txt"
-"""How a name ends that is for frames as they are on the line, or for text."""
+"""Endings of file names: frames as on the line, and text."""
 SAVED_AS = (
     "pcapng as Modbus/TCP, which tshark decodes at once; a name with .raw.pcapng as RTU with its"
     " checksums, one with .txt as text, a line a frame with tabs between."
@@ -31,7 +31,7 @@ class KeptFrames(NamedTuple):
     line: str
     tcp: bool
     since_epoch: float
-    """What is added to a frame's time for that since 1970."""
+    """Offset of a frame's time to seconds since 1970."""
 
 
 def ask_where(app: Panel, kept: KeptFrames) -> None:

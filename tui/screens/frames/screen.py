@@ -40,7 +40,7 @@ class OwnFrames:
         return console.session.profile if console else None
 
     def raws(self, device: int) -> Mapping[str, int]:
-        """What was read of a drive."""
+        """Return the values read from a drive."""
         console = self._console(device)
         return console.session.image.raws if console else {}
 
@@ -61,7 +61,7 @@ class FramesScreen(CounterKeys, FrameListScreen):
 
     @property
     def shows_counters(self) -> bool:
-        """Whether the counters stand in the place of the frames."""
+        """True if the counters stand in the place of the frames."""
         return self._shows_sum
 
     def sum_lines(self, width: int, height: int) -> list[Text]:

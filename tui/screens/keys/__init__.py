@@ -1,1 +1,1 @@
-"""What each key does, on which screen: the table of actions, help, finding."""
+"""Keys by screen: the table of actions, help, search."""

@@ -1,4 +1,4 @@
-"""What an action of the panel is, and the names of the screens."""
+"""Actions of the panel, and the names of the screens."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Action(NamedTuple):
     app: bool = False
     """True for an action of the app, False for one of the screen."""
     first: bool = False
-    """Whether the key counts before any widget that has the focus."""
+    """True if the key counts before any widget that has the focus."""
     bound: bool = True
     """False where the widget that has the focus takes the key."""
 

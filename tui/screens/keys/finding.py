@@ -24,7 +24,7 @@ BY_NAME = {
     "ask_stop_as('freewheel')": ("coast",),
     "stop_as('emergency-stop')": ("stop", "emergency"),
 }
-"""What acts on a motor: listed for one of these words, and standing ready for all of them only."""
+"""Actions on a motor: listed for one of these words, and selected for all of them only."""
 NOT_FOUND = ("command_palette", "stop_by_space", "step_reference(")
 """The palette itself, a key that has another one to the same end, and steps of a live motor."""
 WAYS = ("leave", "goto(", "move", "scroll(", "page", "end(", "group(")
@@ -39,16 +39,16 @@ class FoundAction:
 
     action: Action
     screen: str
-    """Where it lives; where one is, for an action of the app."""
+    """Screen of the action; the source's screen for an action of the app."""
     here: bool
-    """Whether it can be done from where one is."""
+    """True if it can be done from where one is."""
     score: int
     ready: bool
-    """Whether Enter may do it at once: each word that was typed begins a word of it."""
+    """True if Enter may do it at once: each word that was typed begins a word of it."""
 
     @property
     def name(self) -> str:
-        """What it does, as a sentence without its point."""
+        """Effect of the action, as a sentence without its point."""
         return self.action.help.removesuffix(".")
 
 
@@ -81,13 +81,14 @@ def _is_left_out(action: Action, words: Sequence[str], *, here: bool) -> bool:
 
 
 def _all_named(action: Action, words: Sequence[str]) -> bool:
-    """Whether each of the names that an action must be called by was typed."""
+    """Return True if each of the names that an action must be called by was typed."""
     typed = [word.casefold() for word in words]
     return all(any(word.startswith(n) for word in typed) for n in BY_NAME.get(action.id, ()))
 
 
 def _mark(action: Action, screen: str, word: str, *, here: bool) -> int:
-    """How well a word fits an action: 0 not at all, 1 inside a word, more at its beginning."""
+    """Return how well a word fits an action: 0 not at all, 1 inside a word, more at its
+    beginning."""
     if here and word in (action.shown, *action.keys.split(",")):
         return 6
     typed = word.casefold()

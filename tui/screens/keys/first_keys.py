@@ -14,12 +14,12 @@ ARRIVED = "F12 arrived: it stops motors from this terminal, as Space and F9 do."
 
 
 def terminal_name() -> str:
-    """What the terminal calls itself."""
+    """Return the name that the terminal reports."""
     return os.environ.get("TERM", "")
 
 
 def was_tried() -> bool:
-    """Whether F12 arrived on this kind of terminal before."""
+    """Return True if F12 arrived on this kind of terminal before."""
     tried = stored_json(_file())
     return isinstance(tried, list) and terminal_name() in tried
 
@@ -33,7 +33,7 @@ def remember() -> None:
 
 
 def unknown_text(data: bytes) -> str:
-    """What to say of a sequence that no known terminal sends."""
+    """Return the message about a sequence that no known terminal sends."""
     shown = "".join("ESC " if byte == 0x1B else chr(byte) for byte in data if byte < 0x7F)
     return (
         f"A key arrived that the panel does not know ({shown.strip()}). If it was F12, it does"

@@ -17,7 +17,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
 
 from ..frame import Framed
-from .table import of_screen
+from .table import screen_actions
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
     ("▶", "green", "the motor runs"),
@@ -38,7 +38,7 @@ HELP_WIDTH, BESIDE_HELP = 76, 6
 """Columns of the list at most, and those of its border, its margin and its scroll bar."""
 SENTENCE_LINES = 6
 WITHOUT_KEY = "^p"
-"""Where an action without a key of its own is found: in the list of all."""
+"""Place of an action without a key of its own: the list of all."""
 HELP_STYLES = {
     "cyan": ATTENTION,
     "green": RUNNING,
@@ -76,7 +76,7 @@ class HelpScreen(Framed, ModalScreen[None]):
 
 def help_lines(screen: str, width: int) -> list[Text]:
     """Keys and signs of a screen, each sentence in a column of its own."""
-    keys = [(action.shown or WITHOUT_KEY, KEY, action.help) for action in of_screen(screen)]
+    keys = [(action.shown or WITHOUT_KEY, KEY, action.help) for action in screen_actions(screen)]
     signs = [(sign, HELP_STYLES[color], meaning) for sign, color, meaning in SIGNS]
     column = max(len(key) for key, _, _ in (*keys, *signs)) + 2
     title = Text(" " * column).append(f"Keys on {screen.capitalize()}", TITLE)

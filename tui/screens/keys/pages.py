@@ -16,7 +16,7 @@ from .action import KEY_NAMES, Action
 from .table import ACTIONS
 
 EVERY_SCREEN = "every screen"
-"""What the table of the app's own actions is called in a page."""
+"""Heading of the app's own actions in a page."""
 TABLE = re.compile(r"(<!-- keys of (?P<of>[a-z ]+) -->\n).*?(<!-- end of keys -->)", re.DOTALL)
 
 

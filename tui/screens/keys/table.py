@@ -32,7 +32,7 @@ from .block_actions import BLOCK_ACTIONS
 from .monitor_actions import COMMAND_ACTIONS, TEACH_ACTIONS, WATCH_ACTIONS
 from .parameter_actions import PARAMETER_ACTIONS
 
-of_app = partial(Action, app=True)
+app_action = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
 STOP = "Stop the drive on its ramp, wherever a space is no text; without an open drive, all."
 STOP_ANYWHERE = "Stop the drive on its ramp, also while text is typed."
@@ -53,7 +53,7 @@ WHILE_TYPING: tuple[KeyLabel, ...] = (
 )
 """Keys of the whole panel that are no letters."""
 STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
-"""What a line of keys says where the stop key means every drive, or none."""
+"""Labels of the stop key if it stops every drive, or none."""
 WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."
 SAVE = "Save what is shown to a file: a backup, an assignment, the record of a trip."
 OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
@@ -150,23 +150,23 @@ ACTIONS: tuple[Action, ...] = (
         ("section(-1)", "shift+tab", "", "The section before."),
         ("leave", "escape", "back", "Go back."),
     ),
-    *(of_app(f"goto({place!r})", key, "", f"Go to {name}.") for place, key, name in PLACES),
-    of_app("step_drive(-1)", "[", "", "The drive before on this line."),
-    of_app("step_drive(1)", "]", "", "The next drive on this line."),
-    of_app("find", "/", "", FIND),
-    of_app("messages", "m", "", "Messages: everything that was said, with its time."),
-    of_app("wiring", "I", "", WIRING_HELP),
-    of_app("why", "N", "", WHY),
-    of_app("hear", "H", "", HEAR),
-    of_app("save_shown", "ctrl+s", "", SAVE),
-    of_app("open_file", "ctrl+o", "", OPEN),
-    of_app("eeprom", "S", "", EEPROM),
-    of_app("command_palette", "ctrl+p", "all", "Find any action by its words."),
-    of_app("help", "?,f1", "help", "Show every key."),
-    of_app("bundle", "", "", BUNDLE),
-    of_app("accept_line", "", "", ACCEPT),
-    of_app("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
-    of_app("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),
+    *(app_action(f"goto({place!r})", key, "", f"Go to {name}.") for place, key, name in PLACES),
+    app_action("step_drive(-1)", "[", "", "The drive before on this line."),
+    app_action("step_drive(1)", "]", "", "The next drive on this line."),
+    app_action("find", "/", "", FIND),
+    app_action("messages", "m", "", "Messages: everything that was said, with its time."),
+    app_action("wiring", "I", "", WIRING_HELP),
+    app_action("why", "N", "", WHY),
+    app_action("hear", "H", "", HEAR),
+    app_action("save_shown", "ctrl+s", "", SAVE),
+    app_action("open_file", "ctrl+o", "", OPEN),
+    app_action("eeprom", "S", "", EEPROM),
+    app_action("command_palette", "ctrl+p", "all", "Find any action by its words."),
+    app_action("help", "?,f1", "help", "Show every key."),
+    app_action("bundle", "", "", BUNDLE),
+    app_action("accept_line", "", "", ACCEPT),
+    app_action("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
+    app_action("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),
 )
 
 
@@ -190,7 +190,7 @@ def bindings(screen: str | None) -> list[BindingType]:
     ]
 
 
-def of_screen(screen: str) -> list[Action]:
+def screen_actions(screen: str) -> list[Action]:
     """Actions that work on a screen: the stop first, then the screen's own and the app's."""
     return [action for action in ACTIONS if screen in action.screens]
 
@@ -201,7 +201,9 @@ def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
     `stops` says whom the stop key stops.
     """
     first = stop_keys(stops, typing=False)[0]
-    keys = [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
+    keys = [
+        (action.id, action.shown, action.label) for action in screen_actions(screen) if action.label
+    ]
     named = [first if key[0] == first[0] else key for key in keys]
     return fitting(named, width, NEVER_DROPPED)
 
@@ -237,7 +239,7 @@ SHELL_KEYS = {"ctrl+z": "Ctrl+Z", "ctrl+backslash": "Ctrl+\\"}
 
 
 def elsewhere(screen: str, key: str, character: str | None = None) -> str:
-    """Where a key that a screen does not know has a meaning, in a sentence; empty if nowhere.
+    """Return which screen uses a key that this one does not know; empty if none.
 
     Of a key with a sign the table has the `character`, as `*`, and not its name.
     """
@@ -259,7 +261,7 @@ def elsewhere(screen: str, key: str, character: str | None = None) -> str:
 def once_closed(screen: str, key: str, character: str | None = None) -> str:
     """Report where a key works that the dialog over a screen does not know; empty if nowhere."""
     keys = {key, character}
-    here = next((a for a in of_screen(screen) if keys & {*a.keys.split(",")}), None)
+    here = next((a for a in screen_actions(screen) if keys & {*a.keys.split(",")}), None)
     if here is not None:
         return f"{here.shown} works once this is closed (Esc): {here.help}"
     return elsewhere(screen, key, character)
@@ -284,9 +286,9 @@ __all__ = [
     "Action",
     "bindings",
     "keys_line",
-    "of_screen",
     "once_closed",
     "opening_line",
+    "screen_actions",
     "stop_keys",
     "typing_line",
 ]

@@ -1,4 +1,4 @@
-"""How many rows each part of Monitor has in a terminal of some size; pure functions."""
+"""Number of rows of each part of Monitor for a terminal's size; pure functions."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Arrangement:
     width: int
     height: int
     wide: bool
-    """Whether words stand side by side below the trends of frequency and current."""
+    """True if words stand side by side below the trends of frequency and current."""
     big: bool
-    """Whether the readouts are large."""
+    """True if the readouts are large."""
     top: int
     values: int
     columns: int

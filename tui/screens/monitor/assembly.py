@@ -32,7 +32,7 @@ WORDS_MOST = 6
 
 
 def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
-    """What each place shows, in exactly as many lines as it has."""
+    """Return the lines of each place, in exactly its number of rows."""
     lead = [Text("")] * room.lead
     big = room.width - room.state_width - 2
     state = state_lines(view, room.state_width)
@@ -50,7 +50,8 @@ def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
 
 
 def word_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
-    """What another chosen word changes: the words side by side, or the place of the trend."""
+    """Return the parts that change with the chosen word: the words side by side, or the trend's
+    place."""
     if room.wide:
         return _side_by_side(view, room, words)
     return {"trend": _trend_or_word(view, room, words)}
@@ -125,7 +126,7 @@ def watched_words(profile: Profile) -> list[Parameter]:
 
 
 def codes_beside(profile: Profile) -> list[str]:
-    """What is read seldom: ends of bars, channels, inputs and outputs."""
+    """Return the slowly read codes: ends of bars, channels, inputs and outputs."""
     codes = [v.high for v in profile.data.monitoring.values if profile.get(v.high)]
     for quantity in ("command_channel", "reference_channel"):
         parameter = profile.quantity(quantity)

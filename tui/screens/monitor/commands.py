@@ -25,7 +25,7 @@ def order_keys(view: View, keys: Sequence[KeyLabel]) -> Text:
 
 
 def works_now(view: View, action: str) -> bool:
-    """Whether an order can work now, as far as is known without asking the drive."""
+    """Return True if an order can work now, as far as is known without asking the drive."""
     if view.control.armed_for is None or view.lost or view.snapshot is None:
         return False
     in_fault = view.snapshot.state.kind == "fault"

@@ -9,7 +9,7 @@ LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analogue 5V, 12mA, 50%."
 
 
 class InputKeys(RunKeys):
-    """Where the line is simulated, a text sets the inputs of the drive that is shown."""
+    """Keys that set the inputs of a simulated drive by a text."""
 
     def action_inputs(self) -> None:
         """Ask for inputs and set them; a real line has none that can be set from here."""

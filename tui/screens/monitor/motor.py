@@ -44,7 +44,7 @@ VALUE_CELLS = 24
 VALUE_CELLS_MOST = 30
 BAR_CELLS, END_CELLS = 8, 4
 NO_ROOM = "on 3"
-"""Where what there is no room for is read."""
+"""Hint at what does not fit."""
 
 
 @lru_cache(maxsize=8)
@@ -87,7 +87,7 @@ def motor_lines(view: View, width: int, rows: int, columns: int) -> list[Text]:
 
 
 def value_cells(cells: int, barred: bool) -> int:
-    """How many cells of a column name, number and unit have."""
+    """Return the width of a column with name, number and unit in cells."""
     with_bar = VALUE_CELLS + 2 + BAR_CELLS + END_CELLS
     return VALUE_CELLS if barred and cells >= with_bar else min(cells - 2, VALUE_CELLS_MOST)
 

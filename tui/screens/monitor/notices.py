@@ -1,4 +1,4 @@
-"""What a person must read on Monitor beside the message: sentences, whole; pure functions."""
+"""Notices on Monitor beside the message: whole sentences; pure functions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def notice_lines(view: View, width: int) -> list[Text]:
 
 
 def line_figures(view: View) -> Text:
-    """How fast the drive is read and how well the line answers."""
+    """Return the read rate of the drive and the line's share of good replies."""
     rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
     wished = 1 / view.period
     held = rate > HELD * wished or not rate

@@ -33,7 +33,7 @@ class RunKeys(OrderKeys):
 
     _line: RunLine | None = None
     _around: dict[str, Reading] | None = None
-    """What the line tells beside the reference: limits and ramp."""
+    """Facts beside the reference: limits and ramp."""
 
     def action_run_line(self, purpose: Purpose) -> None:
         """Open the line, where the drive is armed and a command can have an effect."""
@@ -65,12 +65,12 @@ class RunKeys(OrderKeys):
 
     @property
     def line_is_open(self) -> bool:
-        """Whether keys are those of the line."""
+        """True if keys are those of the line."""
         return self._line is not None
 
     @property
     def takes_letters(self) -> bool:
-        """Whether the line takes them."""
+        """True if the line takes them."""
         return self.line_is_open or super().takes_letters
 
     def run_line_lines(self, now: float, width: int) -> list[Text] | None:
@@ -141,7 +141,7 @@ class RunKeys(OrderKeys):
 
     @property
     def takes_text(self) -> bool:
-        """Whether digits that come at once may be typed: while the line is open."""
+        """True if digits that come at once may be typed: while the line is open."""
         return self._line is not None
 
     def action_step_reference(self, steps: int) -> None:
@@ -156,7 +156,7 @@ class RunKeys(OrderKeys):
         super().action_step_reference(steps)
 
     def _would_start(self) -> bool:
-        """Whether the drive is enabled and stands at 0 Hz: a reference turns the motor."""
+        """Return True if the drive is enabled and stands at 0 Hz: a reference turns the motor."""
         latest = self.console.latest
         return latest is not None and latest.state.motion == "running" and self._output() == 0
 
@@ -176,12 +176,12 @@ def _after_esc(way: str) -> str:
 
 
 def _alone(event: Key) -> bool:
-    """Whether a key was pressed by itself; one that no terminal has sent was."""
+    """Return True if a key was pressed by itself; one that no terminal has sent was."""
     stroke = stroke_of(event)
     return stroke is None or stroke.alone
 
 
 def _steps(event: Key) -> bool:
-    """Whether an arrow counts: of several that came at once only the first does."""
+    """Return True if an arrow counts: of several that came at once only the first does."""
     stroke = stroke_of(event)
     return stroke is None or stroke.steps

@@ -61,7 +61,7 @@ RUN_HEADINGS: Mapping[Purpose, str] = {
 
 @dataclass(frozen=True, slots=True)
 class RunLine:
-    """What stands in the line."""
+    """Contents of the run line."""
 
     purpose: Purpose
     text: str
@@ -73,9 +73,9 @@ class RunLine:
     stamp: int
     """The drive's count of stops when the line was asked for: a later stop voids it."""
     fresh: bool = True
-    """Whether it is the proposal yet, which the first digit replaces."""
+    """True if it is the proposal yet, which the first digit replaces."""
     fault: str = ""
-    """What is wrong with it, once Enter was pressed."""
+    """Error in it, once Enter was pressed."""
 
     def typed(self, character: str) -> RunLine | None:
         """With one more character; None for one that a number has not."""
@@ -108,16 +108,16 @@ class RunLine:
 
     @property
     def reference(self) -> str | None:
-        """What is given to the drive; None where it takes none from here."""
+        """Reference for the drive; None if it takes none from this panel."""
         return f"{self.text}{self.unit}" if self.unit else None
 
     def counts(self, now: float) -> bool:
-        """Whether Enter was meant for this line: it stood there long enough to be read."""
+        """Return True if Enter was meant for this line: it stood there long enough to be read."""
         return now - self.opened >= SETTLED
 
     @property
     def is_zero(self) -> bool:
-        """Whether what stands in it turns no motor."""
+        """True if what stands in it turns no motor."""
         try:
             return bool(self.unit) and Decimal(self.text or "0") == 0
         except InvalidOperation:
@@ -201,7 +201,7 @@ def run_lines(
 
 
 def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
-    """What is wrong with the reference, why the command has no effect, or that it is 0."""
+    """Return the error in the reference, why the command has no effect, or that it is 0."""
     if line.fault:
         message, style = line.fault, ALARM
     elif hindrance and line.purpose != "reference":
@@ -216,7 +216,7 @@ def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Styl
 def _first(
     line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal | None
 ) -> Text:
-    """What Enter does, the reference as typed, and its limits."""
+    """Return the effect of Enter, the typed reference, and its limits."""
     first = Text(" ")
     first.append(RUN_HEADINGS[line.purpose], STRONG)
     if not line.unit:
@@ -261,7 +261,8 @@ def _around(
 def _there_in(
     line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal
 ) -> list[str]:
-    """How long it takes from the output of now: a motor that turns otherwise slows down first."""
+    """Return the ramp time from the present output: a motor turning the other way slows down
+    first."""
     rated, up, down = (
         _number(profile, quantity, readings)
         for quantity in ("rated_frequency", "acceleration", "deceleration")

@@ -59,7 +59,7 @@ class MonitorScreen(InputKeys):
         self._timer: Timer | None = None
         self._still: Timer | None = None
         self._reported: object = None
-        """What of the latest snapshot is shown at once, as it was shown last."""
+        """Urgent parts of the latest snapshot as last shown."""
         self._looked_at = -math.inf
         self._run_rows = 0
         self._placed: tuple[Arrangement, int, int] | None = None
@@ -141,7 +141,7 @@ class MonitorScreen(InputKeys):
             self._place(self._room())
 
     def _room(self) -> Arrangement:
-        """How many rows each part has."""
+        """Return the number of rows of each part."""
         return arrange(*self.size, len(other_values(self.session.profile)))
 
     def _place(self, room: Arrangement) -> None:
@@ -240,7 +240,7 @@ class MonitorScreen(InputKeys):
 
 
 def fault_of_rating(text: str) -> str:
-    """What is wrong with a typed rated current, or nothing."""
+    """Return the error in a typed rated current, or nothing."""
     try:
         number = Decimal(text.strip().replace(",", "."))
     except InvalidOperation:

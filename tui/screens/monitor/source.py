@@ -1,4 +1,4 @@
-"""What Monitor shows, gathered from the drive and its line."""
+"""Data for Monitor, gathered from the drive and its line."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class ViewSource:
         return next((fault.when for fault in active if fault.device == device), "")
 
     def _stop(self, now: float) -> StopReport | None:
-        """What a stop of this drive has come to; a good end is told for a while only."""
+        """Return the result of a stop of this drive; a good result for a while only."""
         fleet, session = self._app.fleet, self._console.session
         report = fleet.stopper.reports.get(session.device) if fleet else None
         if report is None or self._is_overtaken(report):
@@ -71,7 +71,7 @@ class ViewSource:
         return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
 
     def _is_overtaken(self, report: StopReport) -> bool:
-        """Whether something newer is true: a later command, or a motor that runs again."""
+        """Return True if something newer is true: a later command, or a motor that runs again."""
         outcome, latest = self._console.session.work.outcome, self._console.latest
         if outcome is not None and outcome.time > report.since:
             return True

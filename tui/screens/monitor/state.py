@@ -1,4 +1,4 @@
-"""What the drive does, in words, and who tells it to: the block at the right; pure functions."""
+"""State of the drive in words, and its commander: the block at the right; pure functions."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
         return Text("r runs it" if armed else "a arms, r runs", STRONG), []
     if hindrance is None:
         return Text(state.headline, STRONG), []
-    if hindrance.of_channel:
+    if hindrance.by_channel:
         return Text("no command from here", STRONG), []
     return Text("not ready", STRONG), [
         Text(line, PLAIN) for line in wrapped(hindrance.text, width, 2)
@@ -124,7 +124,7 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
 
 
 def _running(view: View, state: DriveState) -> str:
-    """Whether the motor is at its reference, or which way it is going."""
+    """Return whether the motor is at its reference, or which way it is going."""
     output, wanted = (_hertz(view, q) for q in ("output_frequency", "frequency_reference"))
     if state.reached and wanted is not None and abs(wanted) < STANDSTILL:
         return "enabled, at 0 Hz"
@@ -164,7 +164,7 @@ def _pair(label: str, text: str, style: Style, width: int) -> Text:
 
 
 def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
-    """Who gives the command or the reference."""
+    """Return the source of the command or the reference."""
     state = view.snapshot.state if view.snapshot and not view.lost else None
     reported = (
         ""
@@ -206,7 +206,7 @@ def _is_fed(view: View) -> bool:
 
 
 def _heard(view: View) -> tuple[str, Style]:
-    """How long ago the drive was heard, which feeds its watch."""
+    """Return how long ago the drive answered, which keeps its timeout from running out."""
     if view.heard is None:
         return NOT_AVAILABLE, FAINT
     age = max(0.0, view.now - view.heard)
@@ -216,7 +216,7 @@ def _heard(view: View) -> tuple[str, Style]:
 
 
 def countdown(view: View) -> str:
-    """What a drive that is not asked does, and when; nothing where it does nothing."""
+    """Return a drive's reaction when polling stops, and the time; empty if none."""
     left = view.time_left
     if left is None or view.watch is None:
         return ""

@@ -20,7 +20,7 @@ LABEL_CELLS = 5
 LEGEND_CELLS = 14
 TREND_PLACES: dict[Quantity, int] = {"output_frequency": 0, "motor_current": 1}
 WANTED_PLACE = 2
-"""Where a point of the trend has the reference."""
+"""Row in which a point of the trend has the reference."""
 TREND_NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
 ROUND_TOPS: Sequence[float] = (1, 2, 5, 10, 20, 50, 60, 100, 200, 500, 1000, 2000, 5000, 10000)
 
@@ -99,7 +99,7 @@ def _label(row: int, rows: int, high: float | None, *, signed: bool) -> str:
 
 
 def _legend(view: View, quantity: Quantity, parameter: Parameter) -> list[Text]:
-    """What is drawn, and which keys change the window."""
+    """Return the plotted quantities, and the keys that change the window."""
     lines = []
     if quantity == "output_frequency":
         lines.append(Text.assemble(("━", WANTED), (" reference", FAINT)))

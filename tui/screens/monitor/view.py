@@ -1,4 +1,4 @@
-"""What the Monitor screen shows at one moment."""
+"""Contents of the Monitor screen at one moment."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tui.session.drive_state import with_direction
 from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Reading
-from tui.session.timeout_told import TimeoutWatch
+from tui.session.timeout_report import TimeoutWatch
 from tui.widgets.drive_signs import age_text
 
 USUAL_SPAN = 60.0
@@ -34,22 +34,22 @@ class View:
     now: float
     read_only: bool = False
     low_bandwidth: bool = False
-    """Whether the trend is left out and the screen looked at less often."""
+    """True if the trend is left out and the screen looked at less often."""
     plain: bool = False
-    """Whether it is drawn in signs of ASCII."""
+    """True if it is drawn in signs of ASCII."""
     watch: TimeoutWatch | None = None
     """The drive's watch over the line, where it has one that runs."""
     heard: float | None = None
     """When the drive last answered anybody on this line."""
     control: Control = UNARMED
     stop: StopReport | None = None
-    """What became of a stop that was ordered lately."""
+    """Result of a recent stop."""
     was: str = ""
-    """What the drive did when it was last known."""
+    """Last known state of the drive."""
     span: float = USUAL_SPAN
     """Seconds that the trend shows."""
     stands_by: bool = False
-    """Whether the motor stands and the next command from here runs it."""
+    """True if the motor stands and the next command from here runs it."""
     fault_at: str = ""
     """Time of day at which the fault was seen first; empty where that is not known."""
     word: int | None = None
@@ -65,11 +65,11 @@ class View:
         return reading.aged(self.now, stale_after(cycle, often=often))
 
     def slow(self, code: str) -> bool:
-        """Whether the value is one that need not come with every cycle."""
+        """Return True if the value is one that need not come with every cycle."""
         return any(v.parameter == code and v.rate != "fast" for v in self.values)
 
     def rare(self, code: str) -> bool:
-        """Whether the value is one of those read seldom beside the monitoring set."""
+        """Return True if the value is one of those read seldom beside the monitoring set."""
         return code not in {value.parameter for value in self.values}
 
     @property
@@ -86,7 +86,7 @@ class View:
 
     @property
     def lost(self) -> bool:
-        """Whether nothing on the screen is known to be current."""
+        """True if nothing on the screen is known to be current."""
         if self.line.status is not LineStatus.CONNECTED:
             return True
         return self.snapshot is not None and bool(self.trouble)

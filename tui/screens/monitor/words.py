@@ -60,11 +60,11 @@ SHORTEST_NAME = 6
 PLAIN_ANSWERS = frozenset(
     {"", "yes", "no", "on", "off", "none", "normal", "0", "1", "in force", "in progress"}
 )
-"""What a bit says that is no more than yes or no: alone it would not tell of what."""
+"""Texts of bits that are no more than yes or no: alone they would not say of what."""
 DENIALS = frozenset({"no", "off", "none", "normal", "0"})
 """Words of a bit that deny its name."""
 GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
-"""What a bit that is 1 says without more than its name does."""
+"""Texts of bits that add nothing to the name of a bit that is 1."""
 ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
 ALL_BITS_CELLS = 13
 
@@ -103,7 +103,7 @@ def word_line(view: View, parameter: Parameter, width: int) -> Text:
 
 
 def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
-    """What the bits say that is true, in short, and whether it is an alarm."""
+    """Yield the texts of active bits in short form, and whether each is an alarm."""
     for bit in parameter.bits:
         on = bool(raw >> bit.bit & 1)
         if _counts(bit, raw) and _holds(bit, on) and (words := short_bit(bit, on=on)):
@@ -135,7 +135,7 @@ def _alarms(view: View) -> tuple[str, Style]:
 
 
 def short_bit(bit: Bit, *, on: bool) -> str:
-    """What a bit says, in a word or two; empty where that is so while all is well."""
+    """Return a bit's text in a word or two; empty for the normal state."""
     message = bit.name if on and bit.on.casefold() in GENERIC else _bit_words(bit, on, 60)
     for words in (message.casefold(), *([bit.name.casefold()] if on else [])):
         if words in SHORT_NAMES:
@@ -156,7 +156,7 @@ def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
 
 
 def bit_columns(width: int) -> int:
-    """How many bits stand side by side."""
+    """Return the number of columns of bits."""
     return max(1, (width - 1) // BIT_CELLS)
 
 

@@ -1,4 +1,4 @@
-"""What is known of the parameter under the cursor, as lines; pure functions."""
+"""Details of the parameter under the cursor, as lines; pure functions."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TALL_FROM = 32
 def parameter_lines(
     editor: Editor, code: str, width: int, height: int, step: str = ""
 ) -> list[Text]:
-    """What one parameter is, on so many lines, the last for what happened to it.
+    """Return the details of one parameter in so many lines, the last for its news.
 
     `step` is what a first commissioning does with it, where that is what is looked at.
     """
@@ -86,7 +86,7 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
 
 
 def _taught(editor: Editor, parameter: Parameter) -> list[str]:
-    """What a person has taught of it, or that it can be taught."""
+    """Return the scale that a person taught, or that it can be taught."""
     session = editor.session
     if (scale := session.profile.taught.get(parameter.code)) is not None:
         return [f"Taught: {scale.text}; L looks again"]
@@ -132,7 +132,7 @@ def _effect(editor: Editor, parameter: Parameter) -> list[str]:
 
 
 def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
-    """Where it lies, raw, and how surely that is known."""
+    """Return its address and raw value, and how certain that is."""
     raw, edit = editor.values.raws.get(parameter.code), editor.staging.edits.get(parameter.code)
     hexadecimal = f"16#{parameter.address:04X}"
     number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
@@ -154,7 +154,7 @@ def _word(raw: int) -> str:
 
 
 def _news(editor: Editor, parameter: Parameter) -> Text:
-    """What happened to it last: another's change, a refusal, an old value, a remark."""
+    """Return the last event: another's change, a refusal, an old value, a remark."""
     code = parameter.code
     edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
     if code in editor.staging.changed_elsewhere:
@@ -196,7 +196,7 @@ def _keys_to_write(editor: Editor, what: str) -> str:
 
 
 def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
-    """What a changed setting was, and how surely that is known."""
+    """Return the factory value of a changed setting, and how certain that is."""
     message = f"Not the factory value, {factory_text(editor, parameter)}"
     grounds = parameter.factory_grounds
     if grounds is None or factory_is_sure(parameter):

@@ -125,7 +125,7 @@ class EditNumber(Question[str | None]):
 
 
 def about_number(editor: Editor, parameter: Parameter) -> str:
-    """What a number may be: held, staged, as it left the factory; limits in force, the step."""
+    """Return the hints on a number: held, staged, factory; limits in force, the step."""
     now = f"drive holds {value_text(editor, parameter.code)}"
     edit, factory = editor.staging.edits.get(parameter.code), factory_text(editor, parameter)
     reported = [now, *([f"staged {edit.text}"] if edit else [])]

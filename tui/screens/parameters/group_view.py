@@ -24,7 +24,7 @@ FILTER_LABELS: dict[str, str] = {
     "unverified": "Unverified",
     "all": "Everything",
 }
-"""How a filter is called."""
+"""Names of the filters."""
 STYLES = {"staged": ATTENTION, "unsaved": ALARM}
 """Filters whose number is a state that wants to be seen."""
 
@@ -37,7 +37,7 @@ class GroupEntry:
     count: int | None = None
     """None where the number tells nothing."""
     pinned: bool = False
-    """Whether it stands above the groups however far they are scrolled."""
+    """True if it stands above the groups however far they are scrolled."""
 
     @property
     def label(self) -> str:

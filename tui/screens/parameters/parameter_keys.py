@@ -1,4 +1,4 @@
-"""What the keys of the Parameters screen work on: the list, what is staged, the messages."""
+"""Subjects of the keys of the Parameters screen: the list, staged edits, messages."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class ParameterKeys(TeachKeys):
         self.session = console.session
         self.listed = ParameterList()
         self.reading = ""
-        """How far the reading for a file or a comparison is; empty while there is none."""
+        """Progress of reading for a file or a comparison; empty without one."""
 
     @property
     def editor(self) -> Editor:
-        """What is known and staged; stays with the drive while the panel runs."""
+        """Known values and staged edits; stays with the drive while the panel runs."""
         return self.console.editor
 
     def list_again(self) -> None:

@@ -33,7 +33,7 @@ class ParameterList:
 
     chosen: Choice = field(default_factory=Choice)
     searched: bool = False
-    """Whether it shows what was found in place of what was chosen."""
+    """True if it shows what was found in place of what was chosen."""
     items: Sequence[TableLine] = field(default_factory=list)
     at: int = 0
     """The line of the cursor."""
@@ -49,7 +49,7 @@ class ParameterList:
 
     @property
     def count(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return sum(1 for item in self.items if item.code)
 
     @property
@@ -165,6 +165,6 @@ class ParameterList:
 
 
 def shows_steps(listed: ParameterList) -> bool:
-    """Whether a list shows the steps of a first commissioning."""
+    """Return True if a list shows the steps of a first commissioning."""
     chosen = listed.chosen
     return chosen.filter == "start-up" and not chosen.group and not listed.searched

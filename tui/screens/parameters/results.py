@@ -1,4 +1,4 @@
-"""What became of each edit that was to be written, and the question before the rest."""
+"""Result of each edit to be written, and the question before the rest."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OUTCOME_WORDS = {
     EditOutcome.HELD_BACK: "HELD BACK",
     EditOutcome.WAITS: "waits",
 }
-"""What became of an edit, in a word; else it was not written."""
+"""Results of an edit in a word; any other was not written."""
 
 
 class Results(KeyQuestion[bool | None]):
@@ -63,7 +63,7 @@ class Results(KeyQuestion[bool | None]):
 
 
 class RestQuestion(KeyQuestion[bool]):
-    """Whether the edits behind one that failed are written all the same."""
+    """True if the edits behind one that failed are written all the same."""
 
     NO = False
     by_itself = True
@@ -74,7 +74,7 @@ class RestQuestion(KeyQuestion[bool]):
         self._applied = applied
 
     def dialog(self) -> ComposeResult:
-        """What failed, what was held back with it, and what could be written yet."""
+        """Compose the failures, the edits held back with them, and those still possible."""
         count = len(self._applied.waits)
         one = count == 1
         with Vertical(id="dialog"):
@@ -92,7 +92,7 @@ class RestQuestion(KeyQuestion[bool]):
 
 
 def results_head(applied: Applied) -> str:
-    """How many were written, and how many were not."""
+    """Return how many were written, and how many were not."""
     done, failed = len(applied.written), len(applied.results) - len(applied.written)
     head = f"{done} written and read back" if done else "Nothing written"
     return f"{head}; {failed} not written, still staged" if failed else head

@@ -113,7 +113,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             self.put("groups", lines)
 
     def _where(self) -> str:
-        """What is listed, and where the cursor is in it."""
+        """Return the listed parameters, and the cursor's place among them."""
         listed = self.listed
         if self.reading:
             return self.reading

@@ -1,4 +1,4 @@
-"""What a file of a parameter set is beside the drive that is open; touches no drive."""
+"""Comparison of a parameter set's file with the open drive; reads nothing."""
 
 from __future__ import annotations
 

@@ -218,7 +218,7 @@ class SetKeys(ParameterKeys):
             self._refuse(str(error))
             return
         editor.staging.take_plan(plan)
-        left = [item for item in plan.of_kind("skip") if item.reason != "no setting"]
+        left = [item for item in plan.items_of_kind("skip") if item.reason != "no setting"]
         count = len(plan.edits)
         keys = self.how_to_write("all" if count > 1 else "it") if count else ""
         self.note(f"{count} staged from {editor.other_label}.", keys)

@@ -1,4 +1,4 @@
-"""What of a parameter set is not staged, and why."""
+"""Values of a parameter set that are not staged, and why."""
 
 from __future__ import annotations
 

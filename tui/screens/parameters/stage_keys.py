@@ -14,7 +14,7 @@ WAITING_NAMED = 3
 
 
 class StageKeys(ParameterKeys):
-    """What is typed is checked and staged; nothing here reaches the drive."""
+    """Keys that check and stage typed values; nothing here reaches the drive."""
 
     def action_edit(self) -> None:
         """A dialog for the parameter under the cursor."""
@@ -37,7 +37,7 @@ class StageKeys(ParameterKeys):
         self.app.push_screen(dialog, reported)
 
     def _only_teaches(self, code: str) -> bool:
-        """Whether all that can be done to a parameter is to teach its scale."""
+        """Return True if all that can be done to a parameter is to teach its scale."""
         refused = self.editor.refusal(code)
         read_only = refused is not None and refused.reason == "read-only"
         return read_only and not why_not_taught(self.session.family, code)
@@ -48,7 +48,7 @@ class StageKeys(ParameterKeys):
             self.ask_look(self.listed.code)
 
     def _may_edit(self, code: str) -> bool:
-        """Whether it may be staged; a motor that runs hinders only the writing."""
+        """Return True if it may be staged; a motor that runs hinders only the writing."""
         refused = self.editor.refusal(code)
         if refused is None or refused.reason == "running":
             if code in self.editor.values.raws:

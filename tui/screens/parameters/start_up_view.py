@@ -9,14 +9,15 @@ from tui.widgets.drawing import wrapped
 from .table_view import TableLine
 
 TEXT_WIDTH, TEXT_LINES = 50, 4
-"""What is told of a step without parameters: it fits beside the groups of the smallest screen."""
+"""Size of the text of a step without parameters: it fits beside the groups of the smallest
+screen."""
 
 GROUNDS_WORDS = {
     "analogy": "as on a sister family",
     "unverified": "its place from no document",
     "practice": "general practice",
 }
-"""How surely a step belongs there, where the family's own documents do not say it."""
+"""Certainty that a step belongs there, if the family's own documents do not state it."""
 
 
 def start_up_items(profile: Profile) -> list[TableLine]:
@@ -33,7 +34,7 @@ def start_up_items(profile: Profile) -> list[TableLine]:
 
 
 def step_help(profile: Profile, code: str) -> str:
-    """What the step is about that a parameter belongs to; empty for one of no step."""
+    """Return the topic of a parameter's step; empty without a step."""
     step = next((one for one in profile.data.start_up if code in one.parameters), None)
     return "" if step is None else _words_of_step(step)
 

@@ -43,7 +43,8 @@ class Columns:
 
     @classmethod
     def of(cls, width: int) -> Columns:
-        """What fits into a list of that width, the least important columns left out first."""
+        """Return the columns that fit a list of that width; the least important are dropped
+        first."""
         if width >= 150:
             wide = cls(0, value=14, staged=14, other=14, number=9, address=15, range=30)
         elif width >= 90:
@@ -146,7 +147,7 @@ def _value_style(editor: Editor, parameter: Parameter, changed: bool) -> Style:
 
 
 def _staged(editor: Editor, code: str, width: int) -> Text:
-    """What is staged, or what was held before a write; always as wide."""
+    """Return the staged value, or the value before a write; always of the same width."""
     edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
     text = Text(no_wrap=True)
     if edit is None:
@@ -160,5 +161,5 @@ def _staged(editor: Editor, code: str, width: int) -> Text:
 
 
 def _kept(editor: Editor, code: str) -> str:
-    """Whether it waits for a reset of the drive, or to be kept in its EEPROM."""
+    """Return whether it waits for a reset of the drive, or to be saved in its EEPROM."""
     return "R" if code in editor.waits_for_reset else "S" if code in editor.unsaved else " "

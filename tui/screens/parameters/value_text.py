@@ -1,4 +1,4 @@
-"""What is held, staged and possible of a parameter, as text; pure functions."""
+"""Held, staged and possible values of a parameter, as text; pure functions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CONFIDENCE_WORDS: dict[Confidence, str] = {
     "analogy": "a sister family",
     "unverified": "no document",
 }
-"""Where the knowledge of a parameter comes from."""
+"""Source of the knowledge about a parameter."""
 
 
 def value_text(editor: Editor, code: str) -> str:
@@ -44,7 +44,7 @@ def factory_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def is_changed(editor: Editor, parameter: Parameter) -> bool:
-    """Whether a setting is not as from the factory."""
+    """Return True if a setting is not as from the factory."""
     values = editor.values
     return not_factory(editor.session.profile, parameter, values.raws, values.lacking)
 
@@ -57,7 +57,7 @@ def text_of(editor: Editor, parameter: Parameter, raw: int) -> str:
 
 
 def old_text(editor: Editor, code: str) -> str:
-    """What the parameter held before it was written last; empty where it was not written."""
+    """Return the parameter's value before the last write; empty if it was not written."""
     result = editor.staging.results.get(code)
     return result.edit.old_text if result is not None and result.done else ""
 
@@ -71,7 +71,7 @@ def limits_now(
 
 
 def range_text(editor: Editor, parameter: Parameter) -> str:
-    """What it may hold: the limits in force, or how many names there are."""
+    """Return its range: the limits in force, or the number of names."""
     if parameter.access == "r" or parameter.bits:
         return ""
     if is_enumeration(parameter):
@@ -81,6 +81,6 @@ def range_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def step_text(editor: Editor, parameter: Parameter) -> str:
-    """What one step is worth, with its unit; empty for what is no number."""
+    """Return the value of one step with its unit; empty if it is not a number."""
     limits = limits_now(editor, parameter)
     return f"{limits.step:f} {limits.unit}".rstrip() if limits is not None else ""

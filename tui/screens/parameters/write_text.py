@@ -1,4 +1,4 @@
-"""What a writing will do, in words, before it is done."""
+"""Description of a write, in words, before it is done."""
 
 from __future__ import annotations
 

@@ -45,5 +45,5 @@ def _line(line: PageLine) -> Text:
 
 
 def section_tops(page: Sequence[PageLine]) -> list[int]:
-    """Where the sections begin."""
+    """Return the first line of each section."""
     return [number for number, line in enumerate(page) if line.kind == "title"]

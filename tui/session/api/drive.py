@@ -53,7 +53,7 @@ class Drive:
 
     @property
     def reference(self) -> str:
-        """What it says it is; empty where it does not."""
+        """Reference that it reports; empty if none."""
         return self._session.known_identity.reference
 
     def read(self, *codes: str) -> dict[str, DriveValue]:

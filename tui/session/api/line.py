@@ -46,7 +46,7 @@ def open_drives(text: str, *, read_only: bool = False, accept: bool = False) -> 
 
 
 def _warn(trouble: str) -> None:
-    """What is wrong with the journal: the script goes on."""
+    """Warn about the journal: the script goes on."""
     warnings.warn(trouble, RuntimeWarning, stacklevel=1)
 
 
@@ -70,7 +70,7 @@ class DriveLine:
 
     @property
     def changed(self) -> tuple[str, ...]:
-        """What is not as it was; while there is anything, nothing but a stop is written."""
+        """Differences from the stored line; while there is one, only stops are written."""
         return self._opened.known.changed if self._opened.known is not None else ()
 
     async def _session(self, address: int, profile: str | None) -> DriveSession:

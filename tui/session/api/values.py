@@ -1,4 +1,4 @@
-"""What a script is given of a drive: values, samples, and what went wrong."""
+"""Results for a script: values, samples, and errors."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class DriveValue:
     unit: str
     raw: int | None
     good: bool
-    """Whether it was read now; in a sample, in that very cycle."""
+    """True if it was read now; in a sample, in that very cycle."""
     time: datetime
     """When its reply came, UTC."""
     error: str = ""

@@ -41,13 +41,13 @@ LOOK_AFTER_ERROR = 1.0
 
 @dataclass(slots=True)
 class BlockEditor:
-    """What is known of a drive's blocks, what is proposed, and the work on them."""
+    """Known and proposed assignments of a drive's blocks, and the work on them."""
 
     session: DriveSession
     monitor: Monitor
     journal: Journal
     views: dict[str, BlockView] = field(default_factory=dict)
-    """What was seen of each block when it was last compared, by its id; replaced as a whole."""
+    """Each block at its last comparison, by its id; replaced as a whole."""
     proposals: Proposals = field(init=False)
     words: UserWords = field(default_factory=tuple)
     word_raws: list[int | None] = field(default_factory=list)
@@ -65,12 +65,12 @@ class BlockEditor:
 
     @property
     def busy(self) -> bool:
-        """Whether something is being written."""
+        """True if something is being written."""
         return self.session.work.busy_for(self)
 
     @property
     def message(self) -> Outcome | None:
-        """What the last work on the drive has come to."""
+        """Result of the last work on the drive."""
         return self.session.work.outcome
 
     # Reading
@@ -170,11 +170,11 @@ class BlockEditor:
         self._run(work, "Writing, each slot read back", stamp)
 
     def example(self) -> str:
-        """What may be typed to write through the outputs. Raises MappingError."""
+        """Return an example of a text that writes through the outputs. Raises MappingError."""
         return example(self.session.profile, self._outputs(), self.session.image.raws)
 
     def intended(self, text: str) -> ConfirmedWrite:
-        """What `LFRD=1500 ACC=5.0` would write through the outputs of now, and what follows.
+        """Parse `LFRD=1500 ACC=5.0` for the present outputs, with the consequences.
 
         Raises ValueRefused, UnknownParameter and MappingError with what is wrong.
         """
@@ -241,7 +241,7 @@ class BlockEditor:
             self._say(str(refused), OutcomeKind.REFUSED)
 
     def _look_again(self) -> None:
-        """What was not done to its end: the person looks at what the drive holds now."""
+        """Compare again: unfinished work leaves an unknown state."""
         with suppress(LineError):
             self.session.line.spawn(self._see_again, f"blocks {self.session.device} again")
 
@@ -262,7 +262,7 @@ class BlockEditor:
 
 
 def _verdict(views: list[BlockView]) -> tuple[str, bool]:
-    """What a comparison of all blocks has come to, and whether all is well."""
+    """Return the result of comparing all blocks, and whether all is well."""
     wrong: list[str] = []
     counted = 0
     for view in views:

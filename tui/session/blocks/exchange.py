@@ -31,7 +31,7 @@ from .write import AssignmentRefused
 
 @dataclass(frozen=True, slots=True)
 class Exchanged:
-    """What one exchange has written through the outputs, and the inputs that came back."""
+    """Result of one exchange: values written through the outputs, and the inputs."""
 
     outputs: dict[str, int]
     """Raw values by code of the parameter, as they were written."""
@@ -86,7 +86,7 @@ class _Exchange:
 
     @property
     def targets(self) -> list[Parameter]:
-        """What the places of the write stand for, in their order."""
+        """Parameters of the written places, in their order."""
         return self.checks.targets
 
     async def carry_out(self, permit: Permit) -> Exchanged:
@@ -122,12 +122,12 @@ class _Exchange:
         return True
 
     async def _read_scales(self) -> None:
-        """What scales and units depend on: errors and the journal tell engineering values."""
+        """Read the sources of scales and units: errors and the journal show engineering values."""
         sources = [code for parameter in self.targets for code in depends_on(parameter)]
         await self.retrying.ask_raws(dict.fromkeys(sources))
 
     async def _held(self) -> dict[str, int]:
-        """What the outputs hold now, with all that an indirect block could stand for."""
+        """Return the present outputs, with all targets of an indirect block."""
         codes = [p.code for p in self.targets]
         if self.outputs.block.effective == "after-reset":
             codes += [choice.parameter for choice in self.outputs.block.choices]

@@ -1,4 +1,4 @@
-"""What speaks against writing through the outputs of a block or scanner, before and after."""
+"""Reasons against writing through the outputs of a block or scanner, before and after."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ExchangeChecks:
     places: range = field(init=False)
     """The slots from the first to the last that a person names."""
     targets: list[Parameter] = field(init=False)
-    """What the places of the write stand for, in their order."""
+    """Parameters of the written places, in their order."""
 
     def __post_init__(self) -> None:
         profile, block = self.session.profile, self.outputs.block

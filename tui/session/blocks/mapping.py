@@ -1,4 +1,4 @@
-"""What the slots of a drive's blocks stand for now, what they bring, and whether that is right.
+"""Mapping of the slots of a drive's blocks, the values that they return, and their check.
 
 What a slot brings is compared with direct reads before and after. The slots of a scanner are
 read again after each use: a word counts only when its slot still stands for the same. What an
@@ -34,7 +34,7 @@ COMPARISONS_MOST = 2 * SURE
 
 
 class Force(StrEnum):
-    """Whether a slot already brings what was chosen for it."""
+    """True if a slot already brings what was chosen for it."""
 
     ACTIVE = "active"
     PENDING = "pending"
@@ -48,9 +48,9 @@ class Slot:
 
     code: str
     raw: int | None
-    """What the slot holds in the drive; None where it could not be read."""
+    """Value of the slot in the drive; None if it could not be read."""
     parameter: Parameter | None = None
-    """What it stands for; None where it is unused or holds an address nobody knows."""
+    """Mapped parameter; None if the slot is unused or holds an unknown address."""
     word: int | None = None
     """The raw value that came through the block."""
     text: str = NOT_AVAILABLE
@@ -79,7 +79,7 @@ class BlockView:
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether a slot does not seem to bring what it stands for."""
+        """True if a slot does not seem to bring what it stands for."""
         read = self.slots if self.block.direction == "read" else ()
         return any(
             slot.verdict is SlotMatch.DIFFERS
@@ -89,7 +89,7 @@ class BlockView:
 
     @property
     def is_unproved(self) -> bool:
-        """Whether it is not sure of a slot's word yet what it is."""
+        """True if it is not sure of a slot's word yet what it is."""
         return any(s.word is not None and s.force is Force.UNPROVED for s in self.slots)
 
     @property
@@ -104,7 +104,7 @@ class BlockView:
 
 
 def wire_timing(session: DriveSession) -> WireTiming:
-    """What the session's line takes for an exchange, by its settings and what was measured."""
+    """Return the time of an exchange, from the line's settings and measurements."""
     link = session.line.link
     turnaround = session.line.device_state(session.device).usual_turnaround or USUAL_TURNAROUND
     if isinstance(link, TcpLink):
@@ -189,7 +189,8 @@ class Mapper:
         return BlockView(block, tuple(found), trouble)
 
     def _to_ask(self, block: Block, chosen: Iterable[Parameter | None]) -> list[str]:
-        """What is read directly: the chosen ones; for an indirect block all that could be."""
+        """Return the codes to read directly: the chosen ones; for an indirect block all possible
+        ones."""
         wanted = [p.code for p in chosen if p is not None]
         if block.effective == "after-reset" and block.direction == "read" and wanted:
             wanted += [choice.parameter for choice in block.choices]
@@ -257,7 +258,7 @@ class Mapper:
         return shown(profile, parameter, raw, retrying.raws, retrying.lacking).display
 
     def _force(self, proof: SlotEvidence, slot: str, raw: int) -> tuple[Force, str]:
-        """Whether the slot is in force, and what it brings where that is something else."""
+        """Return whether the slot is in force, and the value that it returns instead."""
         # the monitor compares all the time, and may have proved it
         known = proof.block.effective == "at-once" or self.in_force().get(slot) == raw
         if known or proof.holds(slot, raw):

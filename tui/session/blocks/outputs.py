@@ -1,4 +1,4 @@
-"""What a person means to write through the outputs of a block or scanner, and what follows."""
+"""Values to be written through the outputs of a block or scanner, and the consequences."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class ConfirmedWrite:
     wanted: Mapping[str, int]
     """Raw values by code."""
     follows: str
-    """What goes out, and what that means, a sentence a line."""
+    """Frames and their consequences, a sentence a line."""
 
 
 def output_codes(profile: Profile, outputs: Assignment) -> dict[str, Parameter]:
-    """What the output slots stand for, by code."""
+    """Return the parameters of the output slots by code."""
     found = (slot_target(profile, outputs.block, raw) for raw in outputs.raws)
     return {parameter.code: parameter for parameter in found if parameter is not None}
 
@@ -41,7 +41,7 @@ def example(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> str:
-    """What may be typed for the first two of these outputs: what they hold now."""
+    """Return an example text for the first two of these outputs: their present values."""
     first = list(output_codes(profile, outputs).values())[:2]
     return " ".join(
         f"{p.code}={typed_text(profile, p, raws.get(p.code, 0), raws, absent)}" for p in first
@@ -57,7 +57,7 @@ def intended(
     text: str,
     absent: Collection[str] = (),
 ) -> ConfirmedWrite:
-    """What a text like `LFRD=1500 ACC=5.0` means.
+    """Parse a text like `LFRD=1500 ACC=5.0`.
 
     `raws` are known raw values, for scales; `absent` are codes that the drive lacks. Raises
     ValueRefused and UnknownParameter with what is wrong.
@@ -136,7 +136,7 @@ def _lines(
 
 
 def _moves(profile: Profile, code: str) -> bool:
-    """Whether a word is a command or a reference of the line."""
+    """Return True if a word is a command or a reference of the line."""
     commands = {chart.command for chart in profile.data.charts}
     return code in commands or profile[code].quantity in REFERENCE_QUANTITIES
 

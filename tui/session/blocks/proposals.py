@@ -1,4 +1,4 @@
-"""What is proposed for the blocks of one drive, beside what it holds; nothing is written here.
+"""Proposals for the blocks of one drive, beside its present assignment; nothing is written here.
 
 It belongs to the thread of the screen and is kept until it is written or dropped.
 """
@@ -34,9 +34,9 @@ class Proposals:
 
     session: DriveSession
     busy: Callable[[], bool]
-    """Whether something is being written: nothing is proposed meanwhile."""
+    """True if something is being written: nothing is proposed meanwhile."""
     plans: dict[str, Assignment] = field(default_factory=dict)
-    """What is proposed, by the id of the block, where that is not today's assignment."""
+    """Proposals by the id of the block, if they differ from the present assignment."""
     seen: dict[str, dict[str, int]] = field(default_factory=dict)
     """The slots as the person saw them when a proposal was begun, by the id of the block."""
     _costs: dict[object, Saving] = field(default_factory=dict)
@@ -47,22 +47,22 @@ class Proposals:
         return sorted(self.session.profile.data.blocks, key=lambda b: b.direction != "read")
 
     def today(self, block: Block) -> Assignment | None:
-        """What the drive holds; None while that is not known."""
+        """Return the present assignment; None while it is not known."""
         raws = self.session.image.raws
         return assignment(block, {slot: raws[slot] for slot in block.slots if slot in raws})
 
     def proposed(self, block: Block) -> Assignment | None:
-        """What is proposed, else today's assignment."""
+        """Return the proposal, else the present assignment."""
         return self.plans.get(block.id) or self.today(block)
 
     @property
     def assignments(self) -> list[Assignment]:
-        """What is proposed, else today's assignment, of every block of which that is known."""
+        """Proposal, else present assignment, of every block for which one is known."""
         return [plan for block in self.blocks if (plan := self.proposed(block))]
 
     @property
     def count(self) -> int:
-        """How many slots writing the proposals would change now."""
+        """Number of slots that writing the proposals would change now."""
         return sum(len(self.changes(block)) for block in self.blocks)
 
     def propose(self, plan: Assignment) -> None:
@@ -127,12 +127,12 @@ class Proposals:
         return plan
 
     def changes(self, block: Block) -> list[SlotChange]:
-        """What writing the proposal would change now."""
+        """Return the changes of writing the proposal now."""
         plan, today = self.plans.get(block.id), self.today(block)
         return slot_changes(today.slots, plan) if plan and today else []
 
     def problems(self, block: Block) -> list[Problem]:
-        """What is wrong with the proposal, or with today's assignment where there is none."""
+        """Return the problems of the proposal, or of the present assignment if there is none."""
         plan = self.proposed(block)
         return (
             assignment_problems(self.session.profile, plan, self.session.image.lacking)

@@ -41,7 +41,7 @@ async def read_words(session: DriveSession, words: UserWords) -> list[int | None
 
 
 def load_words(session: DriveSession) -> UserWords:
-    """What was kept for this drive on this line; four unassigned words where nothing was."""
+    """Return the stored words of this drive on this line; four unassigned words if none."""
     kept = _kept().get(_key(session), [])
     words: list[UserWord] = []
     for one in kept[:COUNT] if isinstance(kept, list) else []:

@@ -37,7 +37,7 @@ Sent = Callable[[SlotChange, bool], None]
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What was written, in order."""
+    """Written slots, in order."""
 
     changes: tuple[SlotChange, ...]
     after_reset: bool
@@ -47,7 +47,7 @@ class Written:
 
     @property
     def text(self) -> str:
-        """What was done, and what is to be done yet, for a person."""
+        """Result, and the steps that remain, for a person."""
         if not self.changes:
             return "Nothing was to be changed."
         codes = ", ".join(dict.fromkeys(change.slot for change in self.changes))

@@ -38,7 +38,7 @@ class Bundle:
     missing: dict[str, str]
     """Why a file is not in it, by its name."""
     omitted: dict[str, int]
-    """How often something was omitted, by its kind."""
+    """Number of omissions by kind."""
 
 
 def archive(results: Sequence[PartResult], redaction: Redaction, stem: str) -> Bundle:

@@ -52,7 +52,7 @@ def line_parts(subject: BundleSubject) -> Iterator[Part]:
 
 
 def record_parts(subject: BundleSubject) -> Iterator[Part]:
-    """What was recorded on this computer; the profiles, once the drives are known."""
+    """Yield the records of this computer; the profiles, once the drives are known."""
     yield Part(
         "journal.json",
         "The journal of this line for the last day: writes, trips, tests. The form is that of"

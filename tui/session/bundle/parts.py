@@ -28,7 +28,7 @@ class PartFile:
 
     content: Content
     note: str = ""
-    """What it lacks, as a sentence; empty if it is whole."""
+    """Missing contents, as a sentence; empty if it is complete."""
     more: Mapping[str, Content] = field(default_factory=dict)
     """Further files in the same folder, by name."""
 
@@ -40,7 +40,7 @@ class Part:
     name: str
     """Its name in the bundle, with forward slashes."""
     about: str
-    """What it contains, as a sentence."""
+    """Contents, as a sentence."""
     collect: Callable[[], Awaitable[PartFile]]
     limit: float = 10.0
     """Seconds."""

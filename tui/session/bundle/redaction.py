@@ -27,7 +27,7 @@ OMITTED_KINDS = {
     HOME: "home folders",
     SECRET: "passwords, tokens and credentials in URLs",
 }
-"""What is omitted, by the text that replaces it."""
+"""Kinds of omitted data, by the text that replaces them."""
 COMMON_NAMES = frozenset(
     {
         "root", "admin", "administrator", "user", "guest", "pi",
@@ -60,7 +60,7 @@ _HOME_PATH = re.compile(r"(?:/home|/Users|[A-Za-z]:\\{1,2}Users)[/\\]{1,2}([^/\\
 
 
 class Names(NamedTuple):
-    """What must not leave this computer."""
+    """Names that must not leave this computer."""
 
     users: frozenset[str] = frozenset()
     hosts: frozenset[str] = frozenset()
@@ -79,7 +79,7 @@ class Redaction:
         self._pattern: re.Pattern[str] | None = None
         self._instead: dict[str, str] = {}
         self.counts: Counter[str] = Counter()
-        """How often something was removed, by the text that replaces it."""
+        """Number of removals, by the text that replaces them."""
 
     def learn(self, content: object) -> None:
         """Note the names and passwords that a text, or the texts of a JSON document, reveal."""

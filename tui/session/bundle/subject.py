@@ -33,7 +33,7 @@ OpensDrive = Callable[[int], Awaitable["DriveSession"]]
 
 
 class DriveDocuments(NamedTuple):
-    """How the commands `why` and `counters` write their JSON; `None` is a drive without session."""
+    """JSON documents of the commands `why` and `counters`; `None` is a drive without session."""
 
     why: Callable[[str, int, DriveSession | None, Diagnosis], dict[str, Any]]
     counters: Callable[[str, DriveSession, CountersNow, Mapping[str, int]], dict[str, Any]]

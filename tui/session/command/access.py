@@ -1,4 +1,4 @@
-"""What every command does to a drive: reads what it depends on, writes as long as it may."""
+"""Common steps of every command: read its conditions, write as long as permitted."""
 
 from __future__ import annotations
 

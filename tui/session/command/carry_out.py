@@ -46,7 +46,7 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
 
 
 async def _cleared(access: CommandAccess, order: Order) -> str:
-    """What the reference is now, where an order puts words back to their initial values."""
+    """Return the present reference, if a command resets words to their initial values."""
     if not order.clears:
         return ""
     access.session.image.forget(order.clears)

@@ -47,14 +47,14 @@ class Commander:
         self.last_run: tuple[OrderId, str | None] | None = None
         """The run command that was given last, with its reference."""
         self.given = GivenCommands(session)
-        """What was given from here, and whether the drive still holds it."""
+        """Commands given by this program, and whether the drive still holds them."""
         self._lock = threading.Lock()
         self._steps = Decimal(0)
         self._stepping = False
 
     @property
     def outcome(self) -> Outcome | None:
-        """What the last work on the drive has come to."""
+        """Result of the last work on the drive."""
         return self.session.work.outcome
 
     # Arming

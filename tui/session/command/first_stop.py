@@ -25,7 +25,7 @@ from ..journal import Entry, Journal, now_text
 ONE_WORD = Limits(
     functions=frozenset({3, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
 )
-"""What a drive may be sent of which it is not known what it is."""
+"""Requests allowed to an unidentified drive."""
 FIRST_WHY = "stopped, before it said what it is"
 
 
@@ -39,7 +39,7 @@ class SentFirst:
 
     @property
     def taken(self) -> bool:
-        """Whether the drive has answered it well."""
+        """True if the drive has answered it well."""
         return self.answer == "ok"
 
     @property
@@ -53,7 +53,7 @@ class SentFirst:
 
 @dataclass(frozen=True, slots=True)
 class FirstStop:
-    """What was sent first, and what the drive was seen not to be."""
+    """First stop word, and the families excluded by it."""
 
     sent: tuple[SentFirst, ...]
     ruled_out: frozenset[str]
@@ -61,10 +61,10 @@ class FirstStop:
     followers: tuple[str, ...] = ()
     """Families by which it may be stopped on without having said what it is."""
     answered: bool = False
-    """Whether the drive has answered anything."""
+    """True if the drive has answered anything."""
 
     def may_be(self, family: str) -> bool:
-        """Whether a drive that does not say what it is may be stopped as one of a family."""
+        """Return True if a drive that does not say what it is may be stopped as one of a family."""
         if family in self.ruled_out:
             return False
         return family in self.followers or not self.sent
@@ -78,7 +78,7 @@ class FirstStop:
 @dataclass(frozen=True, slots=True)
 class _Look:
     there: bool | None
-    """Whether the drive has such a status word; None where it did not answer."""
+    """True if the drive has such a status word; None where it did not answer."""
     raws: dict[int, int]
 
 

@@ -1,4 +1,4 @@
-"""What was given to a drive from here: its reference, its command words, whether they stand."""
+"""Commands given to a drive by this program: its reference, its command words, their state."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .reference import Reference
 
 
 class GivenCommands:
-    """What the commands keep from one to the next."""
+    """State kept from one command to the next."""
 
     def __init__(self, session: DriveSession) -> None:
         self._session = session
@@ -46,7 +46,7 @@ class GivenCommands:
         self._written = {}
 
     def lost_orders(self) -> str:
-        """What the drive no longer holds of what was written from here, or nothing.
+        """Return the values written by this program that the drive no longer holds, or nothing.
 
         Nothing behind a stop from here, which wrote another word itself.
         """

@@ -64,7 +64,7 @@ class MotorStart:
 
     access: CommandAccess
     sent: bool = False
-    """Whether a run frame went out, or may have."""
+    """True if a run frame went out, or may have."""
 
     @property
     def session(self) -> DriveSession:

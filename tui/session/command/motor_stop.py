@@ -69,7 +69,7 @@ class MotorStop:
     """Several drives are stopped: each is sent a word before anything is read of any."""
     begun: bool = False
     sent: bool = False
-    """Whether its words have gone out."""
+    """True if its words have gone out."""
     taken: bool = False
     """True if the drive has answered them well."""
     over: bool = False
@@ -78,7 +78,7 @@ class MotorStop:
     """Register and words that the drive has answered well."""
     reader: Reader = field(init=False)
     held: dict[str, Reading] = field(default_factory=dict)
-    """What command words held before they were written here: option bits are kept from it."""
+    """Command words before this program wrote them: their option bits are kept."""
     _unheeded: bool = False
 
     def __post_init__(self) -> None:
@@ -177,7 +177,7 @@ class MotorStop:
             await self.reader.read(unsure, priority=Priority.STOP)
 
     def _sure(self, codes: Iterable[str]) -> dict[str, int]:
-        """What is surely held now: just read, or not to be changed since the motor has run."""
+        """Return values known for sure: just read, or constant since the motor has run."""
         session, image = self.session, self.session.image
         fresh, trusted = image.fresh(STATE_FRESH), image.trusted
         turns = session.state(STATE_FRESH).motion in ("running", "stopping")
@@ -278,7 +278,7 @@ class MotorStop:
         return f" (it has no {wanted}: {'ramp stop' if way == 'stop' else way})"
 
     def _why_not(self, hertz: float | None) -> str:
-        """What still enables a drive that does not obey."""
+        """Return the reason why a drive that does not obey is still enabled."""
         state = self.session.state(STATE_FRESH)
         who = "from its terminals or keypad" if state.local else state.channel
         if hertz == 0:

@@ -1,4 +1,4 @@
-"""What a stop of drives has come to, for a person."""
+"""Result of a stop of drives, for a person."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def not_proved(read_as: str = "") -> str:
 
 
 class Phase(StrEnum):
-    """How far a stop has come."""
+    """Progress of a stop."""
 
     SENDING = "sending"
     """Its frame waits for the line."""
@@ -46,7 +46,7 @@ OVER = frozenset({Phase.STOPPED, Phase.FAILED})
 
 
 class StopReport(NamedTuple):
-    """What became of a stop so far; ordered at `time`, and so since `since` (monotonic)."""
+    """Result of a stop so far; ordered at `time`, in this phase since `since` (monotonic)."""
 
     device: int
     phase: Phase
@@ -62,17 +62,17 @@ class StopSummary(NamedTuple):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more is awaited."""
+        """True if nothing more is awaited."""
         return all(one.phase in OVER for one in self.reports)
 
     @property
     def failed(self) -> bool:
-        """Whether some drive could not be stopped from here."""
+        """True if some drive could not be stopped from here."""
         return any(one.phase in NOT_STOPPING for one in self.reports)
 
     @property
     def head(self) -> str:
-        """What it has come to."""
+        """Result."""
         if self.failed:
             which = ", ".join(str(r.device) for r in self.reports if r.phase in NOT_STOPPING)
             return f"NOT STOPPED from here: device {which}. Stop it at the machine."

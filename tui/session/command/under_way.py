@@ -35,7 +35,7 @@ class UnderWay:
     stop: MotorStop
     worker: LineWorker
     times: int
-    """How often the drive had been armed then."""
+    """Number of times the drive had been armed then."""
 
     def is_lost(self, begins_late: bool, is_late: bool) -> bool:
         """True if it ended, or did not begin or get on in time, without having been sent."""
@@ -46,7 +46,7 @@ class UnderWay:
         return self.worker.done() or is_late or (begins_late and connected and not stop.begun)
 
     def goes_out(self, session: DriveSession, order: OrderId) -> bool:
-        """Whether it does all that another stop of the drive would do now.
+        """Return True if it does all that another stop of the drive would do now.
 
         Its words are on their way still, and nothing was written since: that needs arming.
         """

@@ -10,7 +10,7 @@ KEYS: Mapping[WayOut, str] = {
     "set-up": "6 opens Control.",
     "take-control": "t takes the control.",
 }
-"""What a key of the panel does about it."""
+"""Remedy by a key of the panel."""
 
 
 def way_by_key(held: HeldBack) -> str:
@@ -19,7 +19,7 @@ def way_by_key(held: HeldBack) -> str:
 
 
 def block_reason_text(held: HeldBack) -> str:
-    """What speaks against a command with the way out, where the panel may not be open."""
+    """Return the reason against a command with the remedy, for use outside the panel."""
     key = KEYS.get(held.way, "")
     return " ".join(
         part for part in (held.text, held.remedy, f"In the panel {key}" if key else "") if part

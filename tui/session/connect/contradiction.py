@@ -1,4 +1,4 @@
-"""Whether a drive says of itself that it is another than the profile it is taken by."""
+"""True if a drive says of itself that it is another than the profile it is taken by."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Contradiction(DriveError):
 
 
 async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdentity | None:
-    """What a drive says of itself; None where it says nothing.
+    """Return the identity that a drive reports; None if it reports none.
 
     Silence and refusals are no contradiction: families without function 43 do either. One that was
     silent is asked for its status word, so that it does not count as absent. Raises ChecksumFault
@@ -65,7 +65,7 @@ async def read_status(line: Askable, device: int, profile: Profile, priority: Pr
 
 
 def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
-    """How a drive contradicts the profile that it is taken by, for a person; empty if it does not.
+    """Return how a drive contradicts its profile, for a person; empty if it does not.
 
     A drive that names nothing contradicts nothing, nor does one of a kind that no profile knows,
     where the profile names no kinds itself or its own begin alike.
@@ -81,7 +81,7 @@ def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
 
 
 def _may_be(reference: str, profile: Profile) -> bool:
-    """Whether a reference that no profile claims may be of a family all the same."""
+    """Return True if a reference that no profile claims may be of a family all the same."""
     prefixes = [one.upper() for one in profile.data.identification.reference_prefixes]
     if not prefixes:
         return True

@@ -33,7 +33,7 @@ def _number(text: str) -> IPv4Address | IPv6Address | None:
 
 
 def _short_number(text: str) -> IPv4Address | None:
-    """What the system takes for a number, too: 127.1 is 127.0.0.1."""
+    """Return an address that the system accepts as a number, too: 127.1 is 127.0.0.1."""
     if not text[:1].isdigit():
         return None
     try:

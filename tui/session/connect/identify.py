@@ -28,7 +28,7 @@ VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
 
 @dataclass(frozen=True, slots=True)
 class DriveIdentity:
-    """What a drive says of itself, and the profiles that fit."""
+    """Identity reported by a drive, and the profiles that fit."""
 
     device: int
     vendor: str
@@ -48,13 +48,13 @@ class DriveIdentity:
 
 @dataclass(frozen=True, slots=True)
 class ScanResult:
-    """What one address answered: a drive, or a fault that is not silence."""
+    """Result for one address: a drive, or a fault other than silence."""
 
     device: int
     identity: DriveIdentity | None
     error: str = ""
     by: str = ""
-    """What told who it is: `function 43`, `function 17`, a read; empty where nothing did."""
+    """Source of the identity: `function 43`, `function 17`, a read; empty if none."""
 
 
 async def identify_drive(
@@ -95,7 +95,8 @@ async def identify_drive(
 
 
 async def confirmed_identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
-    """Who a drive is by its answer to function 43; looks for fitting profiles in a thread."""
+    """Return a drive's identity from its answer to function 43; finds fitting profiles in a
+    thread."""
     return await asyncio.to_thread(identity_from, device, answer)
 
 
@@ -128,7 +129,7 @@ async def find_drive(
 async def _identified(
     line: Askable, device: int, there: _Presence, priority: Priority, patience: float | None
 ) -> ScanResult:
-    """Who it is that has shown to be at an address. Raises ChecksumFault, WrongReply."""
+    """Identify the drive that answered at an address. Raises ChecksumFault, WrongReply."""
     likely = patience if there.families else None
     control = partial(_is_intact, line, device, there, priority, likely)
     for function, how in BY_IDENTIFICATION.items():
@@ -149,7 +150,7 @@ async def _identified(
 
 @dataclass(frozen=True, slots=True)
 class _Presence:
-    """What has shown that somebody is at an address."""
+    """Evidence that a device is at an address."""
 
     register: int = 0
     families: tuple[str, ...] = ()
@@ -179,7 +180,7 @@ async def _present(
     priority: Priority,
     within: float | None,
 ) -> _Presence:
-    """How somebody answers at an address, were it with a refusal. Raises NoAnswer."""
+    """Return how a device answers at an address, be it with a refusal. Raises NoAnswer."""
     refused = damaged = False
     register = 0
     for probe in probes:
@@ -206,7 +207,7 @@ def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
 
 
 def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
-    """What a drive says of itself, as text that commands no terminal wherever it is shown."""
+    """Return the identity as text that never controls a terminal."""
     texts = {
         number: plain(value.decode("ascii", errors="replace").strip("\0 "))
         for number, value in answer.objects.items()

@@ -34,7 +34,7 @@ class Askable(Protocol):
 
     @property
     def counters(self) -> LineCounters:
-        """What has happened on the line so far."""
+        """Counts since the line was opened."""
         ...
 
     async def identify(

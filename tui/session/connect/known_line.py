@@ -1,4 +1,4 @@
-"""Whether an open line is still the one that it was: its adapter, and the drives on it.
+"""True if an open line is still the one that it was: its adapter, and the drives on it.
 
 Another adapter under the same name, or another drive at an address, holds all writes to the line
 but stops back until a person says that it is right.
@@ -39,16 +39,17 @@ class KnownLine:
         self._lock = threading.RLock()
         self._found: dict[int, DriveMark] = {}
         self._changed: Mapping[int | None, str] = {}
-        """What differs, by device, with None for the adapter; replaced as a whole."""
+        """Differences by device, with None for the adapter; replaced as a whole."""
         self._accepts = False
         self.way = way
-        """How a person says that it is right."""
+        """Way for a person to accept it."""
         self._name = LineName("")
         self.look()
 
     @property
     def changed(self) -> tuple[str, ...]:
-        """What is not as it was, a sentence each; empty where all of it is. Waits for nothing."""
+        """Differences from the stored line, a sentence each; empty if there are none. Waits for
+        nothing."""
         return tuple(self._changed.values())
 
     @property
@@ -95,7 +96,7 @@ class KnownLine:
             self._keep()
 
     def _say(self, what: int | None, reported: str) -> None:
-        """What is with the adapter or a device now; the line is held while anything differs."""
+        """Record the state of the adapter or a device; the line is held while anything differs."""
         others = {key: text for key, text in self._changed.items() if key != what}
         self._changed = {**others, what: reported} if reported and not self._accepts else others
         reason = f"Nothing is written to this line: {self.text} {self.way}"
@@ -105,7 +106,7 @@ class KnownLine:
         return load_memory().lines.get(self._name.key, LineMark())
 
     def _adapter_changed(self, memory: LinesMemory) -> str:
-        """What is another adapter than it was, as a sentence; else nothing."""
+        """Return how the adapter differs, as a sentence; else nothing."""
         name = self._name
         before = memory.names.get(name.typed)
         if name.typed and before is not None and before != name.key:
@@ -157,7 +158,7 @@ def _mark_of(identity: DriveIdentity | None, profile: str) -> DriveMark:
 
 
 def _fuller(before: DriveMark | None, now: DriveMark) -> DriveMark:
-    """What is known of a drive that said less of itself this time."""
+    """Return the known identity of a drive that reported less of it this time."""
     if before is not None and any(before.stated) and not any(now.stated) and before.fits(now):
         return before
     return now

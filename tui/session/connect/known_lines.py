@@ -1,4 +1,4 @@
-"""What is remembered of lines: which adapter and which drives each had when it was used last.
+"""Stored facts about lines: the adapter and drives of each at its last use.
 
 One file in the state folder. A port is called by its adapter's lasting name where it has one; what
 a person types for it, such as /dev/ttyUSB0, is remembered with the port that it led to.
@@ -43,11 +43,12 @@ class DriveMark:
 
     @property
     def stated(self) -> tuple[str, ...]:
-        """What it says of itself; texts that are all empty where it says nothing."""
+        """Its reported identity; all texts are empty if it reports none."""
         return self.vendor, self.reference, self.version, self.name
 
     def fits(self, now: DriveMark) -> bool:
-        """Whether it may be the same drive; by the profile where one of them says nothing."""
+        """Return True if it may be the same drive; by the profile where one of them says
+        nothing."""
         if any(self.stated) and any(now.stated):
             return self.stated == now.stated
         return not (self.profile and now.profile) or self.profile == now.profile
@@ -63,7 +64,7 @@ class DriveMark:
 
 @dataclass(frozen=True, slots=True)
 class LineMark:
-    """What a line had when it was used last."""
+    """State of a line at its last use."""
 
     adapter: str = ""
     drives: Mapping[int, DriveMark] = field(default_factory=dict)
@@ -79,18 +80,18 @@ class LinesMemory:
 
 @dataclass(frozen=True, slots=True)
 class LineName:
-    """What a line is remembered as."""
+    """Stored name of a line."""
 
     key: str
     """The same for as long as it is the same adapter, host or port; empty for a line that
     nobody finds again, such as the number of a pseudo-terminal."""
     typed: str = ""
-    """How a person names a serial port whose name may come to lead elsewhere; else empty."""
+    """Typed name of a serial port if that may come to mean another port; else empty."""
     port: PortName = NO_PORT
 
 
 def line_name(link: Link) -> LineName:
-    """What the line that a link leads to is remembered as, as its port is named now."""
+    """Return the stored name of the line at a link, from the present name of its port."""
     if not isinstance(link, SerialLink):
         return LineName(line_key(label(link)))
     path = os.path.abspath(link.path) if os.name == "posix" else link.path
@@ -119,12 +120,12 @@ def remembered_text(text: str) -> str:
 
 
 def memory_file() -> Path:
-    """Where it stands."""
+    """Return the path of the file."""
     return state_folder() / "known-lines.json"
 
 
 def load_memory() -> LinesMemory:
-    """What is remembered; nothing of a file, or a part of one, that is damaged."""
+    """Return the stored lines; damaged files and parts are skipped."""
     try:
         stored = json.loads(read_small_text(memory_file(), LONGEST_MEMORY))
     except (OSError, ValueError, RecursionError):

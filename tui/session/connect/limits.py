@@ -8,7 +8,7 @@ from tui.drive.profile.schema import Block
 
 
 def limits_of(profile: Profile) -> Limits:
-    """What a drive of this family may be sent; the line refuses everything else."""
+    """Return the requests allowed to a drive of this family; the line refuses all others."""
     functions = {function.code: function for function in profile.data.functions}
     read, inputs, write, both = (functions.get(code) for code in (3, 4, 16, 23))
     diagnose, reading = functions.get(8), profile.data.reading

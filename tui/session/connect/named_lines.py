@@ -43,7 +43,7 @@ NO_PLACES: Mapping[str, str] = MappingProxyType({})
 
 
 class SettingsError(LinkSyntaxError):
-    """What is wrong with the settings file, by file, line and key."""
+    """Error in the settings file, with file, line and key."""
 
 
 class NamedLine(NamedTuple):
@@ -56,7 +56,7 @@ class NamedLine(NamedTuple):
 
 
 class LineSettings(NamedTuple):
-    """What the settings file says of lines, and what is wrong with it."""
+    """Lines in the settings file, and its errors."""
 
     path: Path
     lines: Mapping[str, NamedLine] = NO_LINES
@@ -80,7 +80,7 @@ def named_lines() -> Mapping[str, NamedLine]:
 
 
 def line_settings() -> LineSettings:
-    """What the settings file says, read anew where it has changed; raises nothing."""
+    """Return the lines of the settings file, read again if it has changed; raises nothing."""
     path = settings_file()
     try:
         reported = os.stat(path)
@@ -90,7 +90,7 @@ def line_settings() -> LineSettings:
 
 
 def is_name(text: str) -> bool:
-    """Whether a text can be the name of a line at all."""
+    """Return True if a text can be the name of a line at all."""
     return _NAME.fullmatch(text) is not None and text.casefold() not in _TAKEN
 
 
@@ -185,7 +185,7 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
 def _faults(
     name: str, reported: object, others: Mapping[str, NamedLine]
 ) -> Iterator[tuple[TomlPath, str]]:
-    """What is wrong with one name."""
+    """Yield the errors of one name."""
     here: TomlPath = (LINES_TABLE, name)
     if not is_name(name):
         yield here, "a name is a letter with up to 31 letters, digits, - and _, and no word of ours"

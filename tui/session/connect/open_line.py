@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Farewell(Protocol):
-    """What is to be said of a drive before its line is closed."""
+    """Report on a drive before its line is closed."""
 
     async def tell(self) -> None:
         """Say it; never raises the line's errors."""
@@ -44,7 +44,7 @@ class OpenLine:
     profiles: Mapping[int, str] = field(default_factory=dict)
     """The profiles that the text of a simulated line names, by address."""
     known: KnownLine | None = None
-    """Whether it is still what it was, where that is looked at; None for a simulated line."""
+    """True if it is still what it was, where that is looked at; None for a simulated line."""
     again: Callable[[SerialLink], ModbusLine] | None = None
     """Makes the line anew at other settings, for this program alone."""
     farewells: dict[int, Farewell] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class OpenLine:
 
     @property
     def label(self) -> str:
-        """How the line is called on a screen."""
+        """Name of the line on a screen."""
         if self.simulation is None:
             from tui.bus.link import label
 

@@ -1,4 +1,4 @@
-"""Whether another master asks drives on a line: heard before anything is sent, and while it is."""
+"""True if another master asks drives on a line: heard before anything is sent, and while it is."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LISTEN = 1.5
 TALK = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of somebody's talk."""
 TOLD_OF_EACH = 3
-"""How many different requests to one address are told."""
+"""Number of different requests to one address that are listed."""
 NOT_AWAITED = ("late or repeated", "noise")
 """Notes of what came in while nothing was due."""
 
@@ -30,7 +30,7 @@ class OtherMaster(LineError):
 
 @dataclass(frozen=True, slots=True)
 class Overheard:
-    """What others said on a line."""
+    """Traffic of other masters on a line."""
 
     requests: tuple[OverheardRequest, ...] = ()
     answered: tuple[int, ...] = ()
@@ -40,7 +40,7 @@ class Overheard:
 
     @property
     def text(self) -> str:
-        """Who is there, in a sentence: what is asked of which addresses; empty for nobody."""
+        """The other master in a sentence: its requests by address; empty if there is none."""
         if self.requests:
             requested = dict.fromkeys(one.device for one in self.requests)
             reported = "; ".join(f"address {device}: {self._of(device)}" for device in requested)
@@ -56,14 +56,15 @@ class Overheard:
         return ""
 
     def _of(self, device: int) -> str:
-        """What is asked of one address."""
+        """Return the requests to one address."""
         texts = list(dict.fromkeys(one.text for one in self.requests if one.device == device))
         more = len(texts) - TOLD_OF_EACH
         return ", ".join(texts[:TOLD_OF_EACH]) + (f" and {more} more" if more > 0 else "")
 
 
 def overheard(frames: Iterable[Frame], since: float) -> Overheard:
-    """What others said since a time of the line's clock; echoes of our own do not count."""
+    """Return the traffic of others since a time of the line's clock; our own echoes do not
+    count."""
     ours: set[bytes] = set()
     requests: list[OverheardRequest] = []
     answered: dict[int, None] = {}

@@ -26,7 +26,7 @@ LATE_WAIT = 0.3
 set to answer 250 ms after a request."""
 
 LEFT_ALONE = "left alone"
-"""How it is known that a drive is there which a program leaves alone on purpose."""
+"""Source of the knowledge about a drive whose polling a program has paused."""
 
 Rests = Callable[[float], Awaitable[None]]
 Found = Callable[[ScanResult], Awaitable[None]]
@@ -55,13 +55,13 @@ class Search:
     ) -> None:
         self.devices = tuple(devices)
         self.of = len(self.devices)
-        """How many addresses are asked in this round."""
+        """Number of addresses in this round."""
         self.requested = 0
-        """How many of them are being asked or were."""
+        """Number of addresses already requested."""
         self.at: int | None = None
         """The address that is being asked."""
         self.again = False
-        """Whether it asks those a second time that were silent."""
+        """True if it asks those a second time that were silent."""
         self.answered: frozenset[int] = frozenset()
         self.ended = ""
         """`done`, `stopped`, or empty while it goes on."""
@@ -74,7 +74,7 @@ class Search:
 
     @property
     def goes_on(self) -> bool:
-        """Whether it has not ended."""
+        """True if it has not ended."""
         return not self.ended
 
     @property
@@ -96,7 +96,7 @@ class Search:
 
     @property
     def text(self) -> str:
-        """How far it is, in few words."""
+        """Progress in few words."""
         found = f"{len(self.answered)} found"
         if self.ended:
             return f"{self.ended}, {found}"
@@ -137,7 +137,7 @@ class Search:
             self.at = None
 
     async def _refused_at_once(self, line: ModbusLine, found: Found) -> bool:
-        """Whether the one device that was named has said who it is.
+        """Return True if the one device that was named has said who it is.
 
         It is asked before all profiles are read, of which the questions to strangers are made:
         that takes longer than most drives do to say it.
@@ -206,7 +206,7 @@ class Search:
 
 
 class _SilentTimes(NamedTuple):
-    """How long the addresses of a round took at which nobody was, in seconds."""
+    """Times taken by the empty addresses of a round, in seconds."""
 
     times: int = 0
     seconds: float = 0.0

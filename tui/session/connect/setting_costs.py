@@ -1,4 +1,4 @@
-"""How long a search takes at other settings of a line, and what is said before the slow ones."""
+"""Duration of a search at other settings of a line, and the message before the slow ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .strangers import known_profiles, strangers_of
 
 @dataclass(frozen=True, slots=True)
 class SettingCosts:
-    """What addresses cost at which nobody is, at each setting of a line; in seconds."""
+    """Time of an empty address at each setting of a line, in seconds."""
 
     each: Mapping[LineSetting, float]
     """One address."""
@@ -24,7 +24,8 @@ class SettingCosts:
         return sum(self.each.get(one, 0.0) for one in settings) * self.addresses
 
     def before_slow(self, settings: Sequence[LineSetting], ends: str) -> str:
-        """What is said before the slow settings are tried; `ends` is the key that ends it."""
+        """Return the message before the slow settings are tried; `ends` is the key that ends
+        them."""
         bauds = [f"{baud}" for baud in dict.fromkeys(one.baud for one in settings)]
         can = families_at(known_profiles(), settings)
         return (
@@ -41,7 +42,8 @@ def setting_costs(
     *,
     patient: bool = False,
 ) -> SettingCosts:
-    """What settings of a line cost; reads files. `wait` is that of a network, in seconds."""
+    """Return the times at settings of a line; reads files. `wait` is that of a network, in
+    seconds."""
     each = {}
     for one in settings:
         there = replace(link, baud=one.baud, format=one.format)

@@ -1,4 +1,4 @@
-"""Where programs of this user meet on a line, and what this one is called there."""
+"""Meeting place of this user's programs on a line, and the name of this one there."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ FOLDER_SETTING = "DRIVEPANEL_SHARE_FOLDER"
 LOCKS = "lines"
 """The folder of the locks, in the state folder."""
 USUAL_GROUP_FOLDER = "/run/drivepanel"
-"""Where users of a group meet, unless the environment names another; the administrator makes it."""
+"""Folder for users of a group, unless the environment names another; the administrator makes it."""
 
 
 def group_folder() -> Path:
-    """Where users of a group meet; it need not be there."""
+    """Return the folder for users of a group; it may not exist."""
     return Path(os.environ.get(FOLDER_SETTING) or USUAL_GROUP_FOLDER)
 
 

@@ -1,4 +1,4 @@
-"""How addresses are asked at which perhaps nobody is: by the profiles, for one line."""
+"""Requests to addresses that may be empty: by the profiles, for one line."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 
 PATIENCE = 2.0
-"""Who is there is waited for so many times longer than an empty address."""
+"""Factor of the wait for a device that is present, compared with an empty address."""
 JITTER = 0.002
 """Seconds by which this computer, or an adapter on USB, is late with what came."""
 
 
 @dataclass(frozen=True, slots=True)
 class Strangers:
-    """How addresses of one line are asked for the first time."""
+    """First requests to the addresses of one line."""
 
     probes: tuple[PresenceProbe, ...]
     within: float | None
@@ -49,7 +49,7 @@ def known_profiles() -> list[Profile]:
 
 
 def strangers_of(link: Link, network_wait: float, *, patient: bool = False) -> Strangers:
-    """How addresses of a line are asked; reads files.
+    """Return the first requests for the addresses of a line; reads files.
 
     A line over a network, or one whose timeout a person has set, is waited for `network_wait`
     seconds, as are all where that is to be `patient`.

@@ -1,1 +1,1 @@
-"""What was exchanged with a drive, as counted here and as the drive itself counts it."""
+"""Exchanges with a drive, counted by this program and by the drive."""

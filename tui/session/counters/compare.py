@@ -1,4 +1,4 @@
-"""What a drive counted against what was sent to it: roll-over, saturation, differences in words.
+"""A drive's counts compared with the requests to it: roll-over, saturation, differences in words.
 
 Pure. Counts are taken at two looks and subtracted. While other frames go over the line, how many
 were sent by the moment at which the drive looked at its counter is known within bounds only; a
@@ -15,7 +15,7 @@ from tui.bus.api import DeviceCounters, LineCounters
 
 MODULO = 0x10000
 MOST = 0xFFFF
-"""Where a count of checksum errors stays."""
+"""Value at which a count of checksum errors stays."""
 STRANGE = 0x8000
 """Frames more than were sent from here, from which on a count that fell was begun anew."""
 
@@ -38,13 +38,13 @@ class Bounds:
     high: int
 
     def since(self, before: Bounds) -> Bounds:
-        """How much it grew since an earlier moment."""
+        """Return the growth since an earlier moment."""
         return Bounds(max(0, self.low - before.high), max(0, self.high - before.low))
 
 
 @dataclass(frozen=True, slots=True)
 class DriveCount:
-    """What the drive told of one pair of its counters, and what we had counted by then."""
+    """One pair of the drive's counters, and our counts at that time."""
 
     frames: int
     """Frames to its address, right and damaged ones, modulo 65536."""
@@ -57,7 +57,7 @@ class DriveCount:
 
     @property
     def saturated(self) -> bool:
-        """Whether it has stopped counting checksum errors."""
+        """True if it has stopped counting checksum errors."""
         return self.damaged >= MOST
 
 
@@ -71,7 +71,7 @@ class Comparison:
     """Frames that it counted since the first look."""
     damaged: int = 0
     anew: bool = False
-    """Whether it began to count anew just before the first look."""
+    """True if it began to count anew just before the first look."""
 
     def with_look(self, now: DriveCount) -> Comparison:
         """With one look more; begun again where either side counts anew."""
@@ -96,7 +96,7 @@ class Comparison:
 
     @property
     def counts_this_line(self) -> bool | None:
-        """Whether it counts the frames of this line; None where that is not known yet."""
+        """True if it counts the frames of this line; None where that is not known yet."""
         if not self.answered.low:
             return None
         return self.frames >= self.answered.low
@@ -123,7 +123,7 @@ def frames_since(before: int, now: int, sent: Bounds) -> int | None:
 
 
 def differences(found: Comparison) -> list[Difference]:
-    """What the drive's counters show, the certain part of it; empty if all agrees."""
+    """Return the certain findings of the drive's counters; empty if all agrees."""
     reported = [Difference("counted-anew", 0, COUNTED_ANEW)] if found.anew else []
     if found.counts_this_line is False:
         text = (
@@ -170,7 +170,8 @@ def _differences(found: Comparison) -> Iterator[Difference]:
 
 
 def own_differences(ours: DeviceCounters) -> list[Difference]:
-    """What our own counts show of a drive that counts nothing itself, or cannot be asked."""
+    """Return the findings of our own counts for a drive without counters, or one that does not
+    answer."""
     found = []
     if ours.checksum:
         text = (
@@ -192,7 +193,7 @@ def _frames(count: int) -> str:
 
 
 def device_since(now: DeviceCounters, before: DeviceCounters) -> DeviceCounters:
-    """What was counted here since; all of it where another program has begun to count."""
+    """Return our counts since then; all of them if another program has begun to count."""
     if now.requests < before.requests or now.replies < before.replies:
         return now
     plain = {

@@ -44,20 +44,20 @@ PairAsked = Callable[[], Awaitable[tuple[int, int] | None]]
 
 @dataclass(frozen=True, slots=True)
 class CountersNow:
-    """What was counted up to now, for a person."""
+    """Present counts, for a person."""
 
     total: DeviceCounters
     """Ours, since the line was opened."""
     since: DeviceCounters
     """Ours, since the counters were looked at first or reset."""
     seconds: float
-    """How long ago that was."""
+    """Seconds since that."""
     line_load: float | None
     """The share of that time in which the line was busy, 0 to 1."""
     device_load: float | None
     """The same with this drive alone."""
     counted_by: str
-    """Who counts ours: the program that owns the line; empty where it is this one."""
+    """Program with our counts: the owner of the line; empty if it is this one."""
     drive: tuple[tuple[str, Comparison], ...]
     """The drive's own, by the name of what counts."""
     trouble: str
@@ -67,7 +67,7 @@ class CountersNow:
 
     @property
     def agree(self) -> bool:
-        """Whether every frame was counted and answered."""
+        """True if every frame was counted and answered."""
         return not self.differences
 
     @property
@@ -106,12 +106,12 @@ class CounterWatch:
 
     @property
     def has_diagnostics(self) -> bool:
-        """Whether the drive tells its counters by function 8."""
+        """True if the drive tells its counters by function 8."""
         return self._has(DAMAGED) and self._has(FRAMES)
 
     @property
     def can_reset_drive(self) -> bool:
-        """Whether the drive's own counters can be reset from here."""
+        """True if the drive's own counters can be reset from here."""
         return self._has(RESET) and not self.session.line.read_only
 
     def _has(self, subfunction: int) -> bool:
@@ -169,7 +169,7 @@ class CounterWatch:
             if self.has_diagnostics:
                 await self._look_by_diagnostics()
             for port in self.session.profile.data.port_counters:
-                await self._take(port.name, partial(self._of_port, port))
+                await self._take(port.name, partial(self._port_counts, port))
         except LineError as error:
             self.trouble = str(error)
 
@@ -183,7 +183,7 @@ class CounterWatch:
         # what was sent is counted around the one request that brings the count of frames
         await self._take(THIS_PORT, pair)
 
-    async def _of_port(self, port: PortCounters) -> tuple[int, int] | None:
+    async def _port_counts(self, port: PortCounters) -> tuple[int, int] | None:
         found = await Reader(self.session).read([port.frames, port.checksum_errors])
         frames, damaged = found[port.frames].raw, found[port.checksum_errors].raw
         return None if frames is None or damaged is None else (frames, damaged)
@@ -232,7 +232,7 @@ class CounterWatch:
         )
 
     def now(self) -> CountersNow:
-        """What was counted up to now."""
+        """Return the present counts."""
         line, ours = self.session.line.counters, self._ours
         seconds = self.session.clock.monotonic() - self._begun
         before = self._line.devices.get(self.session.device, DeviceCounters())

@@ -42,13 +42,13 @@ Asks = Callable[[], Awaitable[object]]
 
 
 def sight_of_port(link: Link, device: int, trouble: LineError | None = None) -> Sight:
-    """What is seen of a line without asking on it; reads files of the system."""
+    """Return the evidence about a line without sending on it; reads files of the system."""
     port = see_port(link.path) if isinstance(link, SerialLink) else None
     return Sight(link, device, trouble=trouble, port=port, adapter=adapter_of(link))
 
 
 def adapter_of(link: Link) -> AdapterSeen:
-    """Whether the adapter that the port's name led to last is somewhere else now."""
+    """Return whether the adapter last used under the port's name is somewhere else now."""
     if not isinstance(link, SerialLink):
         return SAME_ADAPTER
     typed = os.path.abspath(link.path)
@@ -100,7 +100,7 @@ async def sight_of_drive(
 async def _outcomes(
     line: ModbusLine, device: int, profile: Profile | None
 ) -> list[LineError | None]:
-    """How the reads ended, None for an answer. Raises what is no end of an exchange."""
+    """Return the results of the reads, None for an answer. Raises what is no end of an exchange."""
     questions = await asyncio.to_thread(_questions, line, device, profile)
     outcomes: list[LineError | None] = []
     for question in questions[:ASKED_IN_VAIN]:
@@ -121,7 +121,8 @@ async def _outcome(question: Asks) -> LineError | None:
 
 
 def _questions(line: ModbusLine, device: int, profile: Profile | None) -> list[Asks]:
-    """What a drive is asked: its state by its profile, else who it is, then states of families."""
+    """Return the requests for a drive: its state by its profile, else its identity, then states
+    of families."""
 
     def read(address: int, function: int = 3) -> Asks:
         return lambda: line.read(
@@ -142,7 +143,8 @@ def _questions(line: ModbusLine, device: int, profile: Profile | None) -> list[A
 async def _heard(
     line: ModbusLine, device: int, last: float, outcomes: Sequence[LineError | None]
 ) -> Heard:
-    """What came back, by the frames; by the ends of the requests where no frames are told."""
+    """Return the replies from the frames; from the results of the requests if frames are not
+    recorded."""
     tcp = isinstance(line.link, TcpLink)
     if all(isinstance(outcome, NoAnswer) for outcome in outcomes):
         await REAL_CLOCK.sleep(LATE_WITHIN)

@@ -31,7 +31,7 @@ class Diagnosis:
 
     @property
     def well(self) -> bool:
-        """Whether the drive answers and nothing is wrong."""
+        """True if the drive answers and nothing is wrong."""
         return self.rung == ANSWERS
 
 

@@ -1,4 +1,4 @@
-"""What the manuals of a family say to look at where a drive does not answer; from its profile."""
+"""Advice from the manuals of a family if a drive does not answer; from its profile."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .sight import Sight
 
 WIRED = ("polarisation", "termination")
 NAMED = "names of"
-"""How the rule of a line begins that tells its wires' names."""
+"""Beginning of the line rule that names its wires."""
 SPEED_ROLES = ("baud", "format", "parity")
 USED_PINS = ("d0", "d1", "common", "rx", "tx", "0 v")
 """Signals that a cable of the line joins; the two of the pair first."""
@@ -34,7 +34,7 @@ def speed_hint(sight: Sight) -> str:
 
 
 def address_hint(sight: Sight) -> str:
-    """What an address may be about: off, that of a group, out of what the family takes."""
+    """Return the likely cause of an address: off, a group's, or out of the family's range."""
     if sight.profile is None:
         return ""
     known, device = sight.profile.data.addresses, sight.device
@@ -50,7 +50,7 @@ def address_hint(sight: Sight) -> str:
 
 
 def as_factory(sight: Sight) -> bool:
-    """Whether the line has the settings with which the drive leaves the factory."""
+    """Return True if the line has the settings with which the drive leaves the factory."""
     profile, link = sight.profile, sight.link
     if profile is None or not isinstance(link, SerialLink):
         return True
@@ -111,7 +111,7 @@ def _wire_hints(profile: Profile) -> Iterator[str]:
 
 
 def _polarity(profile: Profile) -> str:
-    """What the wires are called elsewhere, and which are the inverted ones."""
+    """Return other names of the wires, and which are the inverted ones."""
     data = profile.data
     for rule in data.line_rules:
         if rule.subject.casefold().startswith(NAMED):

@@ -1,4 +1,4 @@
-"""What bytes that form no frame say about the speed at which they were sent; pure."""
+"""Conclusions on the sender's speed from bytes that form no frame; pure functions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SAME_SPEED = 1.3
 
 
 def speed_text(sight: Sight) -> str:
-    """What so many bytes in place of those due say: a receiver at half the speed gets half."""
+    """Return the conclusion from the number of bytes: a receiver at half the speed gets half."""
     came, due = sight.heard.compared
     if not came or not due:
         return ""
@@ -28,7 +28,7 @@ def speed_text(sight: Sight) -> str:
 
 
 def same_speed(sight: Sight) -> bool:
-    """Whether about as many bytes came as were due."""
+    """Return True if about as many bytes came as were due."""
     came, due = sight.heard.compared
     return bool(came and due) and 1 / SAME_SPEED < came / due < SAME_SPEED
 

@@ -1,4 +1,4 @@
-"""What came back for the requests to one drive, taken from the frames of its line; pure."""
+"""Replies to the requests to one drive, taken from the frames of its line; pure functions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TCP_HEAD = 6
 """Bytes of Modbus TCP before the address."""
 ECHO_NOTE = "echo"
 LATE_NOTE = "late"
-"""How the note of a frame begins that came when none was due."""
+"""Beginning of the note on a frame that came while none was due."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Heard:
 
     @property
     def nothing(self) -> bool:
-        """Whether not one byte came back, an echo aside."""
+        """True if not one byte came back, an echo aside."""
         return not (
             self.answered
             or self.late
@@ -59,7 +59,7 @@ class Heard:
 
 
 def heard_of(frames: Iterable[Frame], device: int, *, tcp: bool = False) -> Heard:
-    """What the frames tell of a device; those of other requests are passed over."""
+    """Return the frames about a device; those of other requests are skipped."""
     found, request = Heard(), b""
     exchange: list[Frame] = []
     for frame in frames:
@@ -78,7 +78,7 @@ def _device(data: bytes, tcp: bool) -> int:
 
 
 def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> Heard:
-    """What is heard with one more exchange."""
+    """Add one more exchange."""
     if not request:
         return found
     found = replace(found, requested=found.requested + 1)

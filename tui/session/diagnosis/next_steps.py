@@ -1,4 +1,4 @@
-"""What to look at next, a sentence each, for every rung of the ladder; pure."""
+"""Next steps, a sentence each, for every check of the diagnosis; pure functions."""
 
 from __future__ import annotations
 

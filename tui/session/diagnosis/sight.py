@@ -21,7 +21,7 @@ NOT_ASKED = Heard()
 
 @dataclass(frozen=True, slots=True)
 class AdapterSeen:
-    """Where the adapter is that a port's name led to when the line was used last."""
+    """Present place of the adapter that was last used under a port's name."""
 
     was: str = ""
     """Its lasting name; empty where the name still leads to it, or nothing is remembered."""
@@ -34,7 +34,7 @@ SAME_ADAPTER = AdapterSeen()
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What was seen; times in seconds."""
+    """Evidence for a diagnosis; times in seconds."""
 
     link: Link
     device: int
@@ -46,12 +46,12 @@ class Sight:
     port: PortSeen | None = None
     adapter: AdapterSeen = SAME_ADAPTER
     changed: str = ""
-    """What of the line is not as it was, for which writes are held."""
+    """Differences from the stored line for which writes are held."""
     heard: Heard = NOT_ASKED
     withheld: str = ""
     """Why this program sent nothing to the drive."""
     errors: PortErrors = NO_ERRORS
-    """What the port counted while the drive was asked."""
+    """Errors counted by the port while the drive was polled."""
     turnaround: float | None = None
     """The usual time from the end of a request to the start of its answer."""
     overheard: str = ""
@@ -71,7 +71,7 @@ class Sight:
 
     @property
     def owner_frozen(self) -> bool:
-        """Whether a program of Drive Panel owns the line, and does not answer."""
+        """True if a program of Drive Panel owns the line, and does not answer."""
         return isinstance(self.trouble, LineLost) and OWNER_SILENT in str(self.trouble)
 
     @property

@@ -1,4 +1,5 @@
-"""Who commands a drive through a gateway, and what a stop from elsewhere means for its clients."""
+"""Commander of a drive through a gateway, and the effect of other programs' stops on its
+clients."""
 
 from __future__ import annotations
 

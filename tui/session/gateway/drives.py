@@ -56,7 +56,7 @@ class GatewayDrives:
         self._note = note
         self._found: dict[int, DriveSession | None] = {}
         self._losses = 0
-        """How often the line was lost; the only thing that is changed in the line's thread."""
+        """Number of losses of the line; the only field that is changed in the line's thread."""
         self._sure: dict[int, int] = {}
         """Those losses when a device began to say who it is; none where it was silent since."""
         self._candidates: dict[int, tuple[str, ...]] = {}
@@ -223,7 +223,8 @@ class GatewayDrives:
         return session
 
     def _patience(self, device: int) -> Priority:
-        """What never answered is not waited for as long: no client does either."""
+        """Return the priority: a device that never answered gets a shorter wait, as clients do
+        not wait either."""
         heard = self.line.device_state(device).heard
         return Priority.OPERATOR_READ if heard is not None else Priority.BACKGROUND
 

@@ -17,7 +17,7 @@ class PendingWrite:
     client: TcpClient
     device: int
     words: Mapping[int, int]
-    """What it writes, by register."""
+    """Written words, by register."""
     stops: int
     """The device's count of stops when it came: one that comes later voids it."""
 
@@ -47,11 +47,12 @@ class PendingWrites:
                 one.stops = next_count(one.stops)
 
     def void(self, write: PendingWrite) -> bool:
-        """Whether its drive was stopped since it came."""
+        """Return True if its drive was stopped since it came."""
         return write.stops != self._line.facts.stops.stamp(write.device)
 
     def changes_before(self, write: PendingWrite, registers: Collection[int]) -> bool:
-        """Whether its client has sent a write before it, to one of these registers of its drive."""
+        """Return True if its client has sent a write before it, to one of these registers of its
+        drive."""
         before = self._pending[: self._pending.index(write)]
         return any(
             one.client is write.client and one.device == write.device

@@ -82,7 +82,8 @@ class GatewayLine:
         return self.commanding.last_sign(device) if self.started.holds(device) else None
 
     async def _stands(self, device: int) -> bool:
-        """Whether a motor surely stands now, asked for another program that wants the drive."""
+        """Return True if a motor surely stands now, asked for another program that wants the
+        drive."""
         session = self.drives.known(device)
         if session is None:
             return False

@@ -106,7 +106,7 @@ class RestingDrives:
     def _silence(self, session: DriveSession) -> float:
         """Seconds since any program has heard the drive."""
         heard = self._line.device_state(session.device).heard
-        return session.clock.monotonic() - session.clock.of_line(heard) if heard else 0.0
+        return session.clock.monotonic() - session.clock.line_time(heard) if heard else 0.0
 
 
 def _ended(task: asyncio.Task[None]) -> None:

@@ -1,4 +1,4 @@
-"""What a gateway lets its clients do, and which drive a unit id means."""
+"""Permissions of a gateway's clients, and the drive of each unit id."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _MAPPED = re.compile(r"(\d+)(?:-(\d+))?=(\d+)(?:@(\d+))?")
 
 
 class RulesError(DriveError):
-    """What was typed about ids or codes makes no sense."""
+    """Typed ids or codes make no sense."""
 
 
 @dataclass(frozen=True, slots=True)
 class GatewayRules:
-    """What clients may do; reading is always allowed, and so are words that only stop."""
+    """Permissions of clients; reading is always allowed, and so are words that only stop."""
 
     fresh: float = 0.0
     """Seconds up to which what was read before is an answer."""
     writes: frozenset[str] = frozenset()
     """Codes of settings that may be written, or `ALL`."""
     commands: bool = False
-    """Whether command words and references may be written."""
+    """True if command words and references may be written."""
 
 
 def allowed_codes(text: str) -> frozenset[str]:

@@ -45,7 +45,8 @@ class StartedMotors:
         self._leave = line.facts.on_stop(lambda devices, *_: self.stopped(*devices))
 
     def holds(self, device: int) -> bool:
-        """Whether a motor that a client has started is not yet known to stand. For any thread."""
+        """Return True if a motor that a client has started is not yet known to stand. For any
+        thread."""
         return self._keeper.holds(device)
 
     async def begin(self, session: DriveSession, order: StartDirection) -> bool:

@@ -74,7 +74,7 @@ class GatewayWrite:
         self._rules = rules
         self._write = write
         self._commands = False
-        """Whether it commands the drive, and does not only stop it."""
+        """True if it commands the drive, and does not only stop it."""
 
     async def carry_out(self) -> bytes:
         """Write what is allowed; the answer. Raises Unanswerable and the line's errors.
@@ -96,7 +96,8 @@ class GatewayWrite:
         return await (self._start(order) if order else self._send(Priority.OPERATOR_WRITE))
 
     def _may_go_first(self) -> bool:
-        """Whether a stop may be in it, which no write before it turns into something else."""
+        """Return True if a stop may be in it, which no write before it turns into something
+        else."""
         profile = self._session.profile
         kinds = {one.kind for one in foreign_words(profile, self._requested.words, {})}
         if WordKind.COMMAND not in kinds:

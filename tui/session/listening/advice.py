@@ -1,4 +1,4 @@
-"""What a master could do better: fewer reads for the same values, a timeout with room to spare."""
+"""Improvements for a master: fewer reads for the same values, a timeout with a margin."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ class Feeding:
 
     @property
     def fed(self) -> bool | None:
-        """Whether it never ran out; None where it is off."""
+        """True if it never ran out; None where it is off."""
         return None if self.margin is None else self.margin > 0
 
 
 def feeding(profile: Profile, drive: DriveTally, now: float) -> Feeding | None:
-    """How a drive's timeout is fed; None where it has none, or its value is not known at all.
+    """Return how a drive's timeout is kept from running out; None if it has none, or is unknown.
 
     What the drive has told to whoever asked goes before its factory setting; of several timeouts
     the shortest counts.

@@ -77,7 +77,7 @@ class HeardLine:
         return self._trace.frames()
 
     def summary(self) -> ListeningSummary:
-        """What it came to; at most a second old."""
+        """Return the result; at most a second old."""
         with self._lock:
             now = self._hearing.clock.monotonic()
             if self._summed is None or now - self._summed[0] > SUMMED_UP_EVERY:

@@ -36,7 +36,7 @@ class TakenFamily:
 
 @dataclass(slots=True)
 class _Evidence:
-    """What a drive has answered so far."""
+    """Answers of a drive so far."""
 
     answered: set[tuple[int, int]] = field(default_factory=set)
     """Function and address of each word."""
@@ -84,7 +84,7 @@ class Families:
         """Drives that have said who they are, to whoever asked."""
 
     def family(self, device: int) -> TakenFamily | None:
-        """What a drive is taken for now; None where nothing tells."""
+        """Return the present guess of a drive's family; None if nothing indicates one."""
         named = self._named.get(device) or self._named.get(None)
         if named is not None:
             return TakenFamily(named, "named")
@@ -138,7 +138,7 @@ def _likeliest(evidence: _Evidence, known: Sequence[Profile]) -> TakenFamily | N
 
 
 def _score(evidence: _Evidence, profile: Profile) -> float:
-    """How well a family fits what a drive has answered; 0 and less where it does not."""
+    """Return how well a family fits the answers of a drive; 0 and less if it does not."""
     functions = {one.code for one in profile.data.functions}
     if evidence.functions - functions:
         return 0.0

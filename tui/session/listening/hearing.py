@@ -13,7 +13,7 @@ from .families import Families
 from .listener import FrameHeard, LineListener, ToldExchange
 from .summary import ListeningSummary, summary_of
 
-ExchangeTold = Callable[[ToldExchange], None]
+OnExchange = Callable[[ToldExchange], None]
 
 
 class Hearing:
@@ -23,7 +23,7 @@ class Hearing:
         self,
         line: ListeningLine,
         families: Families,
-        reported: ExchangeTold,
+        reported: OnExchange,
         frame_heard: FrameHeard = lambda _frame, _request: None,
         clock: Clock = REAL_CLOCK,
     ) -> None:
@@ -39,7 +39,7 @@ class Hearing:
         )
 
     def read(self, wait: float) -> tuple[bytes, float]:
-        """What comes within `wait` seconds, and when that was. Raises LineLost."""
+        """Return the bytes of the next `wait` seconds, and their time. Raises LineLost."""
         data = self._line.read(min(self.listener.pause, wait))
         return data, self.clock.monotonic()
 
@@ -55,5 +55,5 @@ class Hearing:
             self._report(one)
 
     def summary(self, now: float) -> ListeningSummary:
-        """What it came to by now."""
+        """Return the present result."""
         return summary_of(self.listener, now, self._timing)

@@ -1,4 +1,4 @@
-"""What listening came to: who commands which drive, how well each is asked, what goes wrong."""
+"""Result of listening: commander of each drive, quality of polling, errors."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class DriveSummary:
 
     @property
     def silent(self) -> bool:
-        """Whether it has answered nothing at all."""
+        """True if it has answered nothing at all."""
         return not self.tally.answered
 
 
@@ -51,11 +51,11 @@ class ListeningSummary:
     """Part of the time in which there were bytes on the line; None where that is not known."""
     drives: tuple[DriveSummary, ...]
     reports_silences: bool
-    """Whether pauses between bytes could be told."""
+    """True if pauses between bytes could be told."""
 
 
 def summary_of(listener: LineListener, now: float, timing: WireTiming) -> ListeningSummary:
-    """What listening came to by now; `timing` is that of the line."""
+    """Return the present result of listening; `timing` is that of the line."""
     tally = listener.tally
     seconds = max(0.0, now - tally.begun)
     busy = tally.bytes * listener.character
@@ -167,7 +167,7 @@ def _writes_text(writes: dict[str, WriteTally]) -> str:
 
 
 def feeding_text(feeding: Feeding) -> str:
-    """Whether a drive's timeout is fed, and by what margin."""
+    """Return whether polling keeps a drive's timeout from running out, and by what margin."""
     heard = feeding.known == "heard"
     known = "as heard" if heard else "factory setting; its own was not heard"
     if feeding.seconds is None or feeding.margin is None:
@@ -200,7 +200,7 @@ def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str
 
 
 def exception_meaning(code: int, profile: Profile | None) -> str:
-    """What a code means on this family, else by the standard."""
+    """Return the meaning of a code in this family, else by the standard."""
     for one in profile.data.exceptions if profile is not None else ():
         if one.code == code:
             return one.meaning
@@ -208,7 +208,7 @@ def exception_meaning(code: int, profile: Profile | None) -> str:
 
 
 def shorter_text(shorter: ShorterPlan) -> str:
-    """What a master could read instead."""
+    """Return a shorter read for a master."""
     requests = shorter.plan.requests
     reads = "; ".join(_request_text(one) for one in requests[:CODES_SHOWN])
     more = len(requests) - CODES_SHOWN

@@ -1,4 +1,4 @@
-"""What was heard so far, counted: of the line, and of each drive on it."""
+"""Counts of the traffic so far: of the line, and of each drive on it."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ReadTally:
 
 @dataclass(slots=True)
 class DriveTally:
-    """What was heard of one drive; times are those of the listener's clock."""
+    """Traffic of one drive; times are those of the listener's clock."""
 
     device: int
     first: float
@@ -92,7 +92,7 @@ class DriveTally:
 
     @property
     def commanded(self) -> bool:
-        """Whether commands or references were written to it."""
+        """True if commands or references were written to it."""
         return any(one.commands for one in self.writes.values())
 
     @property
@@ -153,7 +153,7 @@ class DriveTally:
 
 
 def decides(profile: Profile | None, parameter: Parameter | None) -> bool:
-    """Whether a parameter decides what the motor does."""
+    """Return True if a parameter decides what the motor does."""
     if profile is None or parameter is None:
         return False
     commands = {chart.command for chart in profile.data.charts if chart.command}
@@ -166,7 +166,7 @@ def decides(profile: Profile | None, parameter: Parameter | None) -> bool:
 
 @dataclass(slots=True)
 class LineTally:
-    """What was heard of the whole line."""
+    """Traffic of the whole line."""
 
     begun: float
     frames: int = 0
@@ -209,5 +209,5 @@ class LineTally:
             self.crossed += 1
 
     def drive(self, device: int, time: float) -> DriveTally:
-        """What was heard of a drive, from this time on where it is new."""
+        """Return the traffic of a drive, from this time on if it is new."""
         return self.drives.setdefault(device, DriveTally(device, time))

@@ -31,7 +31,7 @@ FUNCTION_NAMES: Mapping[int, str] = {
     WHO: "identify",
 }
 _OBJECTS_FROM = 7
-"""Where the objects of a reply to function 43 begin, function included."""
+"""Offset of the objects in a reply to function 43, function included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class HeardValue:
 
 
 def spans_of(request: bytes) -> tuple[WordSpan, ...]:
-    """What a request reads and writes; nothing of one without words, or cut short."""
+    """Return the words that a request reads and writes; empty if it has none or is cut short."""
     try:
         return tuple(_spans(request))
     except (struct.error, IndexError):
@@ -95,7 +95,7 @@ def words_read(exchange: HeardExchange) -> tuple[int, ...]:
 def values_of(
     exchange: HeardExchange, profile: Profile | None, raws: Mapping[str, int]
 ) -> list[HeardValue]:
-    """What a request wrote and its reply has brought; `raws` are raw values by code.
+    """Return the values that a request wrote and its reply contains; `raws` are raw values by code.
 
     What was refused is no value, nor is what a drive did not confirm but a broadcast.
     """
@@ -143,7 +143,7 @@ def _parts(
 
 
 def identity_objects(exchange: HeardExchange) -> IdentificationObjects | None:
-    """What a drive said of itself in an exchange of function 43; None where it said nothing."""
+    """Return the identity in an exchange of function 43; None if there is none."""
     if exchange.answer != "ok" or exchange.function != WHO or len(exchange.reply) < _OBJECTS_FROM:
         return None
     objects: dict[int, bytes] = {}

@@ -61,7 +61,7 @@ class PresentFault:
     tripped: bool = False
     """True if the trip itself was seen; else the drive was in this fault when first seen."""
     seen: bool = False
-    """Whether a person has looked at it."""
+    """True if a person has looked at it."""
 
     @property
     def when(self) -> str:
@@ -95,7 +95,7 @@ class LineAlarms:
 
     @property
     def unseen(self) -> bool:
-        """Whether there is a fault that nobody has looked at."""
+        """True if there is a fault that nobody has looked at."""
         return any(not fault.seen for fault in self._active.values())
 
     def take(self, states: Mapping[int, DriveState], onsets: Mapping[int, FaultOnset]) -> bool:

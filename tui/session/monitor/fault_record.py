@@ -44,11 +44,11 @@ class FaultRecord:
     wall: float
     fault: FaultCode | None
     codes: tuple[str, ...]
-    """What `moments` tell, in their order."""
+    """Codes of the values in `moments`, in their order."""
     headings: tuple[str, ...]
     moments: tuple[Moment, ...]
     writes: tuple[Entry, ...]
-    """What was written to the drive in these seconds, oldest first."""
+    """Writes to the drive in these seconds, oldest first."""
 
 
 @dataclass(slots=True)
@@ -60,7 +60,7 @@ class Recorder:
     latest: FaultRecord | None = None
     """The last trip that was seen happen."""
     seen: bool = True
-    """Whether a person has looked at it."""
+    """True if a person has looked at it."""
     _moments: deque[tuple[Snapshot, float]] = field(default_factory=deque)
     _kind: str = "unknown"
 
@@ -103,7 +103,7 @@ class Recorder:
 
 
 def record_codes(session: DriveSession) -> tuple[str, ...]:
-    """What a record tells: every value of the monitoring set that is read in each cycle."""
+    """Return the codes of a record: values of the monitoring set that are read in each cycle."""
     values = session.profile.data.monitoring.values
     return tuple(value.parameter for value in values if value.rate == "fast")
 
@@ -163,7 +163,7 @@ def record_text(
 def _pointed_at(
     session: DriveSession, fault: FaultCode | None, values: Mapping[str, str]
 ) -> list[str]:
-    """What the fault points at, where anything is known."""
+    """Return the causes of the fault, if any are known."""
     help_ = session.profile.guide.fault(fault.raw if fault else None)
     if help_ is None:
         return []

@@ -25,7 +25,7 @@ class LineTrouble(NamedTuple):
     signs: tuple[str, ...]
     """A few words for it: the longest first."""
     text: str
-    """What it is, what it means, and what to do first."""
+    """Event, meaning, and first step."""
 
 
 class LineHealth:

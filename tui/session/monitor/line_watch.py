@@ -26,7 +26,7 @@ from ..drive_state import DriveState, drive_state
 from ..read.order_check import check_byte_order
 from ..read.presence import UNKNOWN_TIMEOUT, alive_read
 from ..read.reader import Reader
-from ..timeout_told import TimeoutWatch
+from ..timeout_report import TimeoutWatch
 from .alarms import FaultOnsets
 from .load import unread_limit
 from .look import Look, last_that_brought
@@ -90,7 +90,7 @@ class LineWatch:
         return replace(watch, active=watch.acts and begun)
 
     def _runs_by_the_line(self, kept: _Kept) -> bool:
-        """Whether the motor runs by somebody's command over the line, whoever gave it."""
+        """Return True if the motor runs by somebody's command over the line, whoever gave it."""
         state, _ = self._last_seen(kept)
         return state is not None and state.motion == "running" and not state.local
 
@@ -120,7 +120,7 @@ class LineWatch:
         ]
 
     def runs(self, device: int) -> bool:
-        """Whether a motor runs, as far as anybody saw it last."""
+        """Return True if a motor runs, as far as anybody saw it last."""
         state, _ = self._last_seen(self._kept[device])
         return state is not None and state.motion == "running"
 
@@ -132,7 +132,7 @@ class LineWatch:
         return None if kind == "unknown" else kind in ENABLED_KINDS
 
     def _may_turn(self, kept: _Kept) -> bool:
-        """Whether a motor runs, or may: not seen since the last order, or not understood."""
+        """Return True if a motor runs, or may: not seen since the last order, or not understood."""
         state, seen = self._last_seen(kept)
         ordered = kept.session.commanded_at
         if state is None or (ordered is not None and seen <= ordered):
@@ -171,7 +171,7 @@ class LineWatch:
 
     def _heard(self, kept: _Kept) -> float:
         heard = self._line.device_state(kept.session.device).heard
-        return kept.session.clock.of_line(heard) if heard else kept.since
+        return kept.session.clock.line_time(heard) if heard else kept.since
 
     def keep(self, session: DriveSession, monitor: Monitor) -> None:
         """Look after a drive from now on; its monitor, while it runs, spares the looks."""
@@ -278,7 +278,7 @@ class LineWatch:
 
 
 def _glance_codes(profile: Profile) -> list[str]:
-    """What a list of drives tells of a motor beside its state."""
+    """Return the codes that a list of drives shows beside a motor's state."""
     found = (profile.quantity(quantity) for quantity in GLANCE_QUANTITIES)
     return [parameter.code for parameter in found if parameter is not None]
 

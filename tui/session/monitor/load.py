@@ -1,4 +1,4 @@
-"""How much of its rated current a motor draws, from what was read of its drive."""
+"""Share of its rated current that a motor draws, from values of its drive."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from ..reading import Reading
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the last look at a drive brought."""
+    """Result of the last check of a drive."""
 
     state: DriveState | None
     error: str
@@ -21,7 +21,7 @@ class Look:
     timeout: float | None
     """The drive's communication timeout in seconds, if it is one that runs already."""
     readings: Mapping[str, Reading] = field(default_factory=dict)
-    """What was read with the state: output frequency, its reference, motor current."""
+    """Values read with the state: output frequency, its reference, motor current."""
     before: Look | None = None
     """The last look that brought something, where this one brought nothing."""
     contact: Contact = "answers"

@@ -63,11 +63,11 @@ class Monitor:
         self.held_back: Callable[[], str] = lambda: ""
         """Asked before each cycle, in the line's thread: why the drive must not be asked now."""
         self.freely: Callable[[], bool] = lambda: True
-        """Whether a cycle may be read before `held_back` is asked about it."""
+        """True if a cycle may be read before `held_back` is asked about it."""
         self.reader = Reader(session)
         self._steady = SteadyCycles(session, self.reader)
         self.restarts = 0
-        """How often watching failed by an error of its own, and was begun anew."""
+        """Number of times that watching failed by an internal error and was restarted."""
         self._latest: Snapshot | None = None
         self._using = ""
         self._kind = "unknown"
@@ -92,7 +92,7 @@ class Monitor:
 
     @property
     def running(self) -> bool:
-        """Whether the worker is at work."""
+        """True if the worker is at work."""
         return self._worker is not None and not self._worker.done()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
@@ -234,7 +234,7 @@ class Monitor:
         return self.line.pace.claim(self, self.device, cost, max(self.period, SHORTEST_PERIOD))
 
     def _may_be_another(self, fault: Exception, failures: int) -> bool:
-        """Whether after a failed cycle what was learned of the drive may be wrong."""
+        """Return True if after a failed cycle what was learned of the drive may be wrong."""
         if failures >= FORGOTTEN_AFTER or isinstance(fault, LineLost | LineClosed):
             return True
         return self._kind in RESET_NEAR

@@ -1,4 +1,4 @@
-"""How often each value of a profile's monitoring set is read."""
+"""Read rate of each value of a profile's monitoring set."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Rates:
 
     @property
     def seldom(self) -> tuple[str, ...]:
-        """What is not read in every cycle."""
+        """Values that are not read in every cycle."""
         return (*self.changing, *self.slow)
 
 
@@ -37,7 +37,7 @@ def bad_readings(profile: Profile, rates: Rates, now: float, why: str) -> dict[s
 
 
 def rates_of(profile: Profile) -> Rates:
-    """How often each value of a profile's monitoring set is read."""
+    """Return the read rate of each value of a profile's monitoring set."""
     rates = {value.parameter: value.rate for value in profile.data.monitoring.values}
     when = {chart.when.parameter for chart in profile.data.charts if chart.when}
     changing = {profile.data.faults.parameter, *when} - {""}

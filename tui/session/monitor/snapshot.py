@@ -1,4 +1,4 @@
-"""What one cycle of a monitor has brought."""
+"""Result of one cycle of a monitor."""
 
 from __future__ import annotations
 
@@ -58,5 +58,6 @@ class Snapshot:
         return self.period > TOO_SLOW * self.wished
 
     def is_stale(self, now: float) -> bool:
-        """Whether no cycle has ended for so long that nothing here is the present any more."""
+        """Return True if no cycle has ended for so long that nothing here is the present any
+        more."""
         return now - self.time > max(stale_after(self.period), STALE_LEAST)

@@ -28,7 +28,7 @@ Turns = tuple[tuple[str, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class SteadyPlan:
-    """What is read in steady cycles."""
+    """Reads of steady cycles."""
 
     fast: tuple[str, ...]
     seldom: tuple[str, ...]
@@ -78,14 +78,14 @@ class SteadyCycles:
     def begun(self) -> float:
         """When the present cycle begins, or was begun (monotonic)."""
         came = self.came
-        return self._clock.monotonic() if came is None else self._clock.of_line(came.begun)
+        return self._clock.monotonic() if came is None else self._clock.line_time(came.begun)
 
     def ended(self, readings: Iterable[Reading]) -> float:
         """When the present cycle ended: with its last reply, if that was read there (monotonic)."""
         if self.came is None:
             return self._clock.monotonic()
         times = (one.time for one in readings)
-        return max((self._clock.of_line(self.came.ended), *times))
+        return max((self._clock.line_time(self.came.ended), *times))
 
     async def next(self, plan: SteadyPlan, due: Rotation, at: float) -> bool:
         """Wait for a cycle from there; False if the next one is to be read from here then."""

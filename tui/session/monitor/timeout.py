@@ -14,7 +14,7 @@ from ..drive import DriveSession
 from ..read.presence import look_for_drive, meets_silence
 from ..read.reader import Reader
 from ..reading import Reading
-from ..timeout_told import Timeout, TimeoutWatch
+from ..timeout_report import Timeout, TimeoutWatch
 
 TOLD_SHARE = 0.5
 """Share of its timeout after which a drive that was not heard is told of."""
@@ -36,7 +36,7 @@ class TimeoutWarning:
 
 
 def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
-    """What drives of one family do when nobody asks them any more, in a sentence."""
+    """Return the reaction of one family's drives when polling stops, in a sentence."""
     it = "it" if len(sessions) == 1 else "each"
     if watch is None:
         return f"{names_of(sessions)}: without communication {it} goes on: it has no timeout."
@@ -58,7 +58,7 @@ def names_of(sessions: Sequence[DriveSession]) -> str:
 
 
 async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str] = ()) -> Timeout:
-    """What a drive tells of its watch over the line now; raises the line's errors.
+    """Read a drive's communication watch; raises the line's errors.
 
     Codes named `besides` are read with it.
     """
@@ -118,7 +118,7 @@ def _related_words(session: DriveSession, rules: CommunicationFault) -> list[str
 
 
 def timeout_now(session: DriveSession) -> Timeout:
-    """What a drive has told of its timeout, and whether that has begun by now."""
+    """Return a drive's known timeout, and whether it runs by now."""
     found = session.timeout or Timeout(known=False)
     if found.watch is not None and found.watch.acts and has_begun(session):
         return replace(found, watch=replace(found.watch, active=True))
@@ -126,7 +126,7 @@ def timeout_now(session: DriveSession) -> Timeout:
 
 
 def has_begun(session: DriveSession) -> bool:
-    """Whether a drive watches the line now, as far as is known.
+    """Return True if a drive watches the line now, as far as is known.
 
     Some do so once a command or reference was written to them by anybody: the command word that
     the drive holds tells it, and what was written from here.

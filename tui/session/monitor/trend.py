@@ -47,7 +47,7 @@ class Trend:
 
     @property
     def kind(self) -> str:
-        """What its values are: those of trends with the same kind belong together."""
+        """Kind of its values: trends of the same kind belong together."""
         parts = [f"trend {self._profile.id}"]
         for code in self._codes:
             one = self._profile[code] if code else None

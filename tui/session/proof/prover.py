@@ -164,7 +164,7 @@ class Prover:
             raise OrderRefused(why)
 
     async def _begin_watch(self, rules: CommunicationFault) -> None:
-        """Where the watch begins with the first command, give one that moves nothing."""
+        """Give a command that moves nothing, if the watch begins with the first command."""
         word = rules.begins_with
         chart = self.session.profile.chart(self.session.image.raws)
         if word is None or chart is None or self.turning:
@@ -266,7 +266,7 @@ class Prover:
         return None if number is None else abs(number)
 
     def _seen(self, state: DriveState, before: float | None, now: float | None) -> str:
-        """What the drive has done since it was asked before; empty for nothing."""
+        """Return the drive's reaction since the last request; empty for none."""
         if state.kind == "fault":
             return "trips"
         if not self.turning:

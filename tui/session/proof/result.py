@@ -1,4 +1,4 @@
-"""What a proof of communication loss has come to, in words and figures. Pure."""
+"""Result of a communication loss test, in words and figures. Pure."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ class ProofResult:
     """The reaction that is set; None where the family has none to set, or it is not known."""
     bracket: Bracket
     turning: bool
-    """Whether the motor turned."""
+    """True if the motor turned."""
     seen: str = ""
-    """What the drive was seen to do; empty where it did nothing."""
+    """Observed reaction of the drive; empty if it did nothing."""
     fault: str = ""
     """The fault that it is in now, as `SLF1, Modbus communication`."""
     expected_fault: str = ""
     """The fault that it should be in."""
     changed: str = ""
-    """What was set otherwise when it was read before, as a sentence."""
+    """Settings that differ from the earlier reading, as a sentence."""
 
     @property
     def as_set(self) -> bool:
-        """Whether it did what it is set to, when it is set to."""
+        """True if it did what it is set to, when it is set to."""
         right = not self.expected_fault or self.fault == self.expected_fault
         return bool(self.seen) and right and self.bracket.holds(self.configured)
 

@@ -1,4 +1,4 @@
-"""How long the silences of a proof are, and what those that were kept tell. Pure."""
+"""Lengths of the silences of a test, and conclusions from those that were kept. Pure."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Bracket:
         return None if self.not_after is None else (self.not_before + self.not_after) / 2
 
     def holds(self, timeout: float) -> bool:
-        """Whether a timeout that is set agrees with what was seen."""
+        """Return True if a timeout that is set agrees with what was seen."""
         if self.not_after is None:
             return False
         slack = max(TIMEOUT_TOLERANCE * timeout, LEAST_TIMEOUT_TOLERANCE)

@@ -1,4 +1,4 @@
-"""What raw values come to for a person: value, unit, and what a percentage is of its rating."""
+"""Raw values as a person reads them: value, unit, and the base of a percentage."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Decoding:
 
     session: DriveSession
     _raws: Mapping[str, int] = field(init=False)
-    """What scales and units follow."""
+    """Raw values that scales and units depend on."""
     _lacking: frozenset[str] = field(init=False)
 
     def __post_init__(self) -> None:

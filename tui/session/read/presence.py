@@ -22,7 +22,7 @@ UNKNOWN_TIMEOUT = 2.0
 
 @dataclass(frozen=True, slots=True)
 class PresenceRead:
-    """What is asked for to see whether a drive is there."""
+    """Read that shows whether a drive is present."""
 
     address: int
     count: int
@@ -70,7 +70,7 @@ async def look_for_drive(session: DriveSession, met: NoAnswer) -> None:
 
 
 def meets_silence(profile: Profile) -> bool:
-    """Whether a read of a word that a drive does not have is not answered at all."""
+    """Return True if a read of a word that a drive does not have is not answered at all."""
     function = profile.function(3)
     return function is not None and function.past_limit == "silence"
 

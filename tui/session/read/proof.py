@@ -1,4 +1,4 @@
-"""What the words of a block or scanner have told of what each of its places brings.
+"""Evidence from a block's or scanner's words on the parameter of each place.
 
 What an indirect block brings since its drive's last reset cannot be read. It is told by its words:
 a place brings a parameter when nothing else that the block can bring has fitted, and this one has.
@@ -59,7 +59,8 @@ class SlotEvidence:
                 self._off[slot, code].append(_off(parameter, raw, first, second))
 
     def verdict(self, slot: str, code: str) -> SlotMatch:
-        """How a slot's words compare with a parameter: one that differs did so each time."""
+        """Return the match of a slot's words with a parameter: one that differs did so each
+        time."""
         offs, seen = self._off[slot, code], self._seen[code]
         if not offs:
             return SlotMatch.UNREAD
@@ -68,7 +69,7 @@ class SlotEvidence:
         return SlotMatch.MOVING if any(offs) or seen[::2] != seen[1::2] else SlotMatch.SAME
 
     def fitted(self, slot: str, code: str) -> bool:
-        """Whether a slot's last word could be that of a parameter."""
+        """Return True if a slot's last word could be that of a parameter."""
         return self._off[slot, code][-1:] == [0]
 
     def conclude(self, chosen: Mapping[str, int]) -> None:
@@ -85,12 +86,13 @@ class SlotEvidence:
         return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""
 
     def holds(self, slot: str, raw: int) -> bool:
-        """Whether a place surely brings what its slot's raw value stands for."""
+        """Return True if a place surely brings what its slot's raw value stands for."""
         code = self._code(raw)
         return bool(code) and self.brings(slot) == code
 
     def excludes(self, slot: str, raw: int) -> bool:
-        """Whether a place surely brings something else than its slot's raw value stands for."""
+        """Return True if a place surely brings something else than its slot's raw value stands
+        for."""
         return not self.holds(slot, raw) and self._excluded(slot, self._code(raw))
 
     def open_codes(self, chosen: Mapping[str, int]) -> list[str]:
@@ -117,7 +119,7 @@ class SlotEvidence:
         return self._against(slot, code) >= SURE
 
     def _against(self, slot: str, code: str) -> int:
-        """How many words were further off than the parameter was seen to tremble."""
+        """Return the number of words that were further off than the parameter varies."""
         may_be = LEAST + BEYOND * _tremble(self._seen[code])
         return sum(off > may_be for off in self._off[slot, code])
 
@@ -126,7 +128,8 @@ class SlotEvidence:
 
 
 def _off(parameter: Parameter, raw: int, first: int, second: int) -> int:
-    """How far a raw value is from what the parameter held before and after it, in raw units."""
+    """Return the distance between a raw value and the parameter before and after it, in raw
+    units."""
     if parameter.bits:
         return FAR if (raw ^ first) & (raw ^ second) & 0xFFFF else 0
     low, high = sorted((first, second))

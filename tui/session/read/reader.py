@@ -65,7 +65,7 @@ class Reader:
 
     @property
     def profile(self) -> Profile:
-        """What is known of the drive's family."""
+        """Facts about the drive's family."""
         return self.session.profile
 
     async def read(
@@ -88,7 +88,7 @@ class Reader:
                 self.session.note_state(read_chart(self.profile, image.raws).motion, held.time)
 
     def seconds(self, codes: Iterable[str]) -> float:
-        """What reading these costs on the wire by plan, without retries."""
+        """Return the seconds that reading these takes on the wire by plan, without retries."""
         sure, unsure = self._by_trust(frozenset(codes).difference(self.session.image.refused))
         return self._plans.plan(sure, self.in_force).seconds + self._plans.plan(unsure).seconds
 
@@ -153,7 +153,8 @@ class Reader:
             await self._take(due, priority)
 
     def _is_known(self, code: str, oldest: float) -> bool:
-        """Whether a word that others' values depend on was read, or refused, since a time."""
+        """Return True if a word that others' values depend on was read, or refused, since a
+        time."""
         image = self.session.image
         held = image.get(code) if code in image.trusted else image.refused.get(code)
         return held is not None and held.time >= oldest
@@ -263,7 +264,7 @@ class Reader:
         return max(0.0, min(self.max_age, self.session.clock.monotonic() - known))
 
     def _polled_reply(self, request: ReadRequest, priority: Priority, since: float) -> Reply | None:
-        """What was read for this poll already: nothing known before. Raises the line's errors."""
+        """Return the reply already read for this poll: nothing older. Raises the line's errors."""
         if self.polled is None or priority < Priority.POLL:
             return None
         return self.polled.take(planned_read(request), self._known_since(request, since))
@@ -299,7 +300,7 @@ class Reader:
         self, parameter: Parameter, words: Sequence[int], reported: float, priority: Priority
     ) -> Reading:
         origin = Origin.POLL if priority >= Priority.POLL else Origin.READ
-        time = self.session.clock.of_line(reported)
+        time = self.session.clock.line_time(reported)
         return Reading.undecoded(parameter, from_words(parameter, words), time, origin)
 
     def _refusal(self, parameter: Parameter, refusal: DeviceException) -> Reading:

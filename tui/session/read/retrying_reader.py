@@ -18,13 +18,13 @@ from .order_check import check_byte_order
 from .reader import Reader
 
 READ_TRIES = 3
-"""How often a read is tried when its reply is lost or damaged."""
+"""Number of attempts of a read if its reply is lost or damaged."""
 LONGEST_REST = 3.0
 """Seconds that are waited at most for a drive that the line leaves alone for a while."""
 
 
 PLANNED_AT_ONCE = 60
-"""How many parameters are planned at once: planning more would hold up the line's loop."""
+"""Number of parameters planned together: planning more would hold up the line's loop."""
 
 
 def neighbors(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
@@ -65,7 +65,7 @@ class RetryingReader:
         return self.session.image.lacking
 
     def why_absent(self, code: str) -> str:
-        """What the drive or the line said instead of a value; empty where there is one."""
+        """Return the refusal or error instead of a value; empty if there is a value."""
         refused = self.session.image.refused.get(code)
         return refused.error if refused is not None else ""
 

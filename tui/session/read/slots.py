@@ -1,4 +1,4 @@
-"""What stands in the places of a drive's indirect block or scanner, as far as it is sure.
+"""Contents of a drive's indirect block or scanner, as far as they are certain.
 
 A scanner's slots count as soon as they are written: they are read, and read again after each
 use (the read plan sees to that). An indirect block's slots count from the drive's next reset
@@ -91,7 +91,7 @@ class Slots:
     _comparisons: dict[str, _Comparison] = field(default_factory=dict)
     """By the id of the block; forgotten whenever the drive may have been reset."""
     _in_force: dict[str, int] = field(default_factory=dict)
-    """What the comparisons have proved."""
+    """Slots that comparisons have confirmed."""
     _heard: float = 0.0
     _doubted: float = 0.0
 
@@ -118,7 +118,7 @@ class Slots:
         self._drop_proofs()
 
     def compare_soon(self) -> None:
-        """What the block can bring differs from before: what was alike may be told apart now."""
+        """Compare again: parameters that looked alike may differ now."""
         for one in self._comparisons.values():
             one.next_time = 0.0
 

@@ -42,13 +42,13 @@ class Upload:
 
     session: DriveSession
     codes: list[str] = field(default_factory=list)
-    """What is to be read; every readable parameter where empty."""
+    """Codes to read; every readable parameter if empty."""
     progress: ReadProgress | None = None
     priority: Priority = Priority.BACKGROUND
     raws: dict[str, int] = field(default_factory=dict)
-    """What was read so far."""
+    """Values read so far."""
     absent: dict[str, str] = field(default_factory=dict)
-    """What has no value, and what the drive or the line said instead."""
+    """Codes without a value, and the refusal or error instead."""
     retrying: RetryingReader = field(init=False)
 
     def __post_init__(self) -> None:
@@ -62,7 +62,7 @@ class Upload:
 
     @property
     def done(self) -> bool:
-        """Whether every parameter was asked for."""
+        """True if every parameter was asked for."""
         return not self.left
 
     async def run(self) -> None:
@@ -95,7 +95,7 @@ class Upload:
             self.progress(len(self.codes) - len(self.left), len(self.codes))
 
     def parameter_set(self) -> ParameterSet:
-        """What was read so far, with where it comes from."""
+        """Return the values read so far, with their origin."""
         wanted = set(self.codes)
         return ParameterSet(
             head=head_of(self.session),
@@ -105,7 +105,7 @@ class Upload:
 
 
 def head_of(session: DriveSession) -> SetHead:
-    """Where a parameter set of this drive, read now, comes from."""
+    """Return the origin of a parameter set of this drive, read now."""
     profile, identity = session.profile, session.identity
     message = {}
     if identity is not None:

@@ -1,4 +1,4 @@
-"""How a word that came through a block compares with the parameter read directly."""
+"""Match of a word that came through a block with the parameter read directly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class SlotMatch(StrEnum):
-    """How what a slot brings compares with the parameter read directly."""
+    """Match of a slot's value with the parameter read directly."""
 
     SAME = "same"
     MOVING = "moving"

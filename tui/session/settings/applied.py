@@ -1,4 +1,4 @@
-"""What became of staged edits that were written, and what is left of them."""
+"""Result of writing staged edits, and the edits that remain."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .link_change import LinkChange
 
 
 class EditOutcome(StrEnum):
-    """What became of one edit."""
+    """Result of one edit."""
 
     DONE = "done"
     SENT = "sent, line changed"
@@ -35,23 +35,23 @@ class Result:
     text: str
     held: int | None = None
     voided: bool = False
-    """Whether a stop, or the end of arming, kept it from being sent."""
+    """True if a stop, or the end of arming, kept it from being sent."""
 
     @property
     def done(self) -> bool:
-        """Whether the drive has the new value, as far as that can be seen."""
+        """True if the drive has the new value, as far as that can be seen."""
         return self.outcome in (EditOutcome.DONE, EditOutcome.SENT)
 
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """What became of all edits."""
+    """Result of all edits."""
 
     results: tuple[Result, ...]
     left: Edits
-    """What is still staged, against the values that the drive holds now."""
+    """Edits still staged, against the present values of the drive."""
     links: tuple[LinkChange, ...] = ()
-    """What changes on the line itself, now or after a reset."""
+    """Changes of the line itself, now or after a reset."""
     after_reset: tuple[str, ...] = ()
     """Codes whose new value is in force only once the drive was reset."""
     unsaved: tuple[str, ...] = ()

@@ -96,7 +96,7 @@ class _Work:
     why: str
     stopped: str = ""
     voided: bool = False
-    """Whether a stop, or the end of arming, ended it."""
+    """True if a stop, or the end of arming, ended it."""
     results: list[Result] = field(default_factory=list)
     links: list[LinkChange] = field(default_factory=list)
 
@@ -124,7 +124,7 @@ class _Work:
         return builds_on(self.session.profile, edit, self.missed, self.edits, raws)
 
     def not_sent(self, edit: Edit, held: int | None = None) -> Result:
-        """What becomes of an edit once nothing more is sent."""
+        """Return the result of an edit once nothing more is sent."""
         why = self.stopped.removeprefix("Not sent: ")
         text = f"{edit.code} was not sent: {why}"
         return Result(edit, EditOutcome.NOT_SENT, text, held, self.voided)
@@ -186,7 +186,8 @@ class _Work:
         return None
 
     def _means(self, edit: Edit) -> bool:
-        """Whether the raw value still stands for what was staged: its scale may have changed."""
+        """Return True if the raw value still stands for what was staged: its scale may have
+        changed."""
         parameter = self.session.profile[edit.code]
         if parameter.scale_by is None:
             return True
@@ -277,7 +278,7 @@ class _Work:
         )
 
     def _left(self, done: set[str]) -> Edits:
-        """What is staged yet, against what the drive holds now."""
+        """Return the edits still staged, against the present values of the drive."""
         left = Edits(tuple(edit for edit in self.edits.requested if edit.code not in done))
         held = {r.edit.code: r.held for r in self.results if r.held is not None}
         raws = {**self.retrying.raws, **held}

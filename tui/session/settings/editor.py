@@ -49,9 +49,9 @@ class Editor:
     staging: Staging = field(init=False)
     waits_for_reset: set[str] = field(default_factory=set)
     applied: Applied | None = None
-    """What the last writing came to, until a screen has shown it."""
+    """Result of the last write, until a screen has shown it."""
     moved: LinkChange | None = None
-    """Where the drive answers now, after a setting of the line itself was written."""
+    """Present address of the drive, after a setting of the line itself was written."""
     marks: Marks = field(init=False)
     other: Mapping[str, int] = field(default_factory=dict)
     other_label: str = "factory"
@@ -65,17 +65,17 @@ class Editor:
 
     @property
     def unsaved(self) -> frozenset[str]:
-        """What was written to the drive, here or as slots of a block, and is not saved."""
+        """Values written to the drive, here or as slots of a block, that are not saved."""
         return self.session.unsaved
 
     @property
     def message(self) -> Outcome | None:
-        """What the last work on the drive has come to."""
+        """Result of the last work on the drive."""
         return self.session.work.outcome
 
     @property
     def facts(self) -> FilterContext:
-        """What filters decide by."""
+        """Facts by which filters decide."""
         return FilterContext(
             self.session.profile,
             self.session.image.raws,
@@ -95,7 +95,7 @@ class Editor:
 
     @property
     def busy(self) -> bool:
-        """Whether something is being written."""
+        """True if something is being written."""
         return self.session.work.busy_for(self)
 
     def refusal(self, code: str) -> Refusal | None:
@@ -104,7 +104,7 @@ class Editor:
         return write_refusal(profile, profile[code], self.state, self.marks.confirmed)
 
     async def plan(self) -> RestorePlan:
-        """What it takes to make the drive hold the set; reads it. Raises the line's errors."""
+        """Plan the writes that make the drive hold the set; reads it. Raises the line's errors."""
         from tui.drive.profile import library
         from tui.drive.settings.restore_plan import Options
         from tui.drive.settings.restore_planner import plan_restore
@@ -182,7 +182,7 @@ class Editor:
             self.staging.drop_held()
 
     def _was_reset(self) -> None:
-        """What waited for a reset is over, and what was not saved is lost."""
+        """Clear the values that waited for a reset, and those that were not saved."""
         if self.waits_for_reset or self.unsaved:
             lost = ", ".join(sorted(self.unsaved))
             gone = f" Not saved before, so look at: {lost}." if lost else ""
@@ -233,7 +233,7 @@ class Editor:
 
 
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
-    """What became of all edits and what is staged now, in a sentence or two."""
+    """Return the result of all edits and the staged ones, in a sentence or two."""
     done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
     parts = [f"{done} written and read back" if done else "nothing written"]
     if left := list(dict.fromkeys((*failed, *staged))):

@@ -24,7 +24,7 @@ SAVING_LONGEST = 10.0
 """Seconds that a drive may take to save or to recall."""
 SAVE_POLL_INTERVAL = 0.1
 SETTINGS_NAMED = 8
-"""How many settings are named in a text."""
+"""Most settings named in a text."""
 
 
 async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit) -> str:
@@ -140,7 +140,7 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
 
 
 def _is_pending(order: MemoryOrder, raws: Mapping[str, int]) -> bool:
-    """Whether the drive has not yet said that it is done."""
+    """Return True if the drive has not yet said that it is done."""
     if order.done is not None:
         return raws.get(order.done.parameter) not in order.done.values
     if order.keeps_value:

@@ -39,7 +39,7 @@ class Marks:
 
 
 def load_marks(profile_id: str) -> Marks:
-    """What was kept; nothing where the file is missing or damaged."""
+    """Return the stored marks; empty if the file is missing or damaged."""
     reported = stored_json(_file(profile_id))
     listed = (
         {key: reported.get(key) for key in asdict(Marks())} if isinstance(reported, dict) else {}

@@ -1,4 +1,4 @@
-"""What a written line setting means for the line: the settings under which the drive answers."""
+"""Effect of a written line setting: the settings under which the drive answers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LinkChange:
 
     @property
     def text(self) -> str:
-        """What happens and what to do next."""
+        """Effect, and the next step."""
         when = "From now on" if self.at_once else "After its next reset"
         if not self.device:
             return f"{when} the drive's server is off ({self.code} = {self.value})."
@@ -40,7 +40,7 @@ class LinkChange:
 
 
 def link_change(profile: Profile, link: Link, device: int, edit: Edit) -> LinkChange | None:
-    """What an edit does to the line; None for what is no setting of the line itself."""
+    """Return the effect of an edit on the line; None if it is not a setting of the line itself."""
     setting = line_setting(profile, edit.code)
     if setting is None or setting.role not in CUTTING:
         return None

@@ -10,7 +10,7 @@ from tui.drive.profile.schema import Parameter
 def device_refusal(
     profile: Profile, parameter: Parameter, error: DeviceException, headline: str
 ) -> str:
-    """What the exception means on this family, the drive's state, and the next step."""
+    """Return the exception's meaning in this family, the drive's state, and the next step."""
     known = next((e for e in profile.data.exceptions if e.code == error.code), None)
     if known is None:
         message = f"exception {error.code}, which no document of this family explains"

@@ -30,19 +30,19 @@ from .apply import apply_edits
 from .link_change import LinkChange
 
 PASSES = 5
-"""How often is planned again at most: writing some settings changes others."""
+"""Most planning passes: writing some settings changes others."""
 
 
 @dataclass(frozen=True, slots=True)
 class Restored:
-    """What became of a restoring."""
+    """Result of a restore."""
 
     plan: RestorePlan
     """The plan at the beginning."""
     results: tuple[Result, ...]
     """The last result of each parameter, in the order of writing."""
     left: Edits
-    """What the drive does not hold yet."""
+    """Settings that the drive does not hold yet."""
     links: tuple[LinkChange, ...]
     after_reset: tuple[str, ...]
     unsaved: tuple[str, ...]
@@ -53,7 +53,7 @@ class Restored:
 
     @property
     def complete(self) -> bool:
-        """Whether the drive holds all that was planned."""
+        """True if the drive holds all that was planned."""
         return not self.stopped and not len(self.left)
 
 
@@ -129,7 +129,7 @@ async def plan_for(
     options: Options = NO_OPTIONS,
     reading: ReadProgress | None = None,
 ) -> RestorePlan:
-    """What restoring would do to this drive now; reads it, writes nothing."""
+    """Plan a restore to this drive now; reads it, writes nothing."""
     held = await held_by(session, reading)
     return plan_restore(session.profile, held, source, source_profile, options)
 
@@ -168,7 +168,7 @@ class Mark:
 
     @property
     def interrupted(self) -> str:
-        """What is known of a restoring that did not come to its end; else empty."""
+        """Known state of a restore that did not finish; else empty."""
         reported = stored_json(self.path)
         if not isinstance(reported, dict) or not {"begun", "parameters", "set"} <= set(reported):
             return ""

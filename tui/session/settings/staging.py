@@ -16,14 +16,14 @@ from .applied import Result
 
 @dataclass(slots=True)
 class Staging:
-    """What is staged, and what became of the last writing of it."""
+    """Staged edits, and the results of their last write."""
 
     session: DriveSession
     busy: Callable[[], bool]
-    """Whether something is being written: nothing is staged meanwhile."""
+    """True if something is being written: nothing is staged meanwhile."""
     edits: Edits = field(default_factory=Edits)
     results: dict[str, Result] = field(default_factory=dict)
-    """What became of the last writing of each parameter."""
+    """Result of the last write of each parameter."""
 
     @property
     def _raws(self) -> Mapping[str, int]:
@@ -101,7 +101,7 @@ class Staging:
         return chosen, tuple(edit for edit in self.edits.requested if edit.code not in wanted)
 
     def take_left(self, left: Sequence[Edit]) -> None:
-        """What a writing has left; what was no change is staged only while its scale waits yet.
+        """Keep the edits that a write has left; an unchanged value only while its scale waits.
 
         Kept, it would become one by itself once somebody sets that parameter otherwise.
         """
@@ -120,12 +120,12 @@ class Staging:
         self.results = {**self.results, result.edit.code: result}
 
     def drop_written(self) -> list[str]:
-        """What the drive has is no longer staged; returns its codes."""
+        """Unstage the values that the drive has; return their codes."""
         done = [result.edit.code for result in self.results.values() if result.done]
         self.edits = Edits(tuple(edit for edit in self.edits.requested if edit.code not in done))
         return done
 
     def drop_held(self) -> None:
-        """What the drive holds already, by what was read last, is no longer staged."""
+        """Unstage the values that the drive already held at the last read."""
         raws = self._raws
         self.edits = Edits(tuple(e for e in self.edits.requested if raws.get(e.code) != e.new))

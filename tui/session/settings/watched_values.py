@@ -31,7 +31,7 @@ WAS_OFF = 3.0
 
 @dataclass(slots=True)
 class WatchedValues:
-    """What a drive holds, read as long as somebody looks."""
+    """Values of a drive, read as long as they are shown."""
 
     session: DriveSession
     state: Callable[[], StateKind | None]
@@ -39,14 +39,14 @@ class WatchedValues:
     was_reset: Callable[[], None]
     """Called in the line's thread when the drive was reset or switched off."""
     visible: tuple[str, ...] = ()
-    """What is looked at now."""
+    """Codes that are shown now."""
     trouble: str = ""
     """Why nothing can be read now; empty while that works."""
     _reader: LineWorker | None = None
     _silent: float | None = None
     """Since when the drive does not answer."""
     _starting: bool = False
-    """Whether the drive was starting up when it was last looked at."""
+    """True if the drive was starting up when it was last looked at."""
     _requested: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -66,7 +66,7 @@ class WatchedValues:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """How many readable parameters were read, and how many there are."""
+        """Readable parameters read so far, and their number."""
         codes = readable_codes(self.session.profile)
         return sum(code in self.raws or code in self.absent for code in codes), len(codes)
 
@@ -133,7 +133,7 @@ class WatchedValues:
         self.session.image.forget()
 
     def _due(self) -> list[str]:
-        """What is looked at and was not read lately."""
+        """Return the shown codes that were not read lately."""
         oldest = self.session.clock.monotonic() - REREAD_AFTER
         due = [code for code in self.visible if self._requested.get(code, 0.0) < oldest]
         if not due:

@@ -159,7 +159,7 @@ class Writer:
         return reply.words[0]
 
     async def _read_back(self, parameter: Parameter) -> int | None:
-        """What the drive holds now; None where it does not tell."""
+        """Return the present value; None if the drive does not report it."""
         if parameter.access == "w":
             return None
         count = word_count(parameter)
@@ -174,6 +174,6 @@ class Writer:
         except DeviceException:
             return None
         back = from_words(parameter, reply.words)
-        when = self.session.clock.of_line(reply.time)
+        when = self.session.clock.line_time(reply.time)
         self.session.image.confirm(parameter.code, back, when)
         return back

@@ -1,1 +1,1 @@
-"""What a shared line means for its drives: who looks after a motor whose program is gone."""
+"""Drives of a shared line: the program responsible for a motor whose own program has ended."""

@@ -44,9 +44,9 @@ class Bystander:
         now: Callable[[], float] = REAL_CLOCK.monotonic,
     ) -> None:
         self.orphan = False
-        """Whether a program that has ended started the motor, and nobody has seen it stand."""
+        """True if a program that has ended started the motor, and nobody has seen it stand."""
         self.waits = False
-        """Whether the drive was left alone when it was to be asked last."""
+        """True if the drive was left alone when it was to be asked last."""
         self._session = session
         self._sign = sign
         self._latest = latest
@@ -54,7 +54,7 @@ class Bystander:
         self._requested = now()
 
     def freely(self) -> bool:
-        """Whether it may be asked at any time: nobody is known to have started its motor."""
+        """Return True if it may be asked at any time: nobody is known to have started its motor."""
         return self._sign() is None and not self.orphan
 
     def held_back(self) -> str:
@@ -80,7 +80,7 @@ class Bystander:
         return self._silence() > timeout + ACTED_AFTER
 
     def _stands(self, since: float) -> bool:
-        """Whether it stood when it was last looked at, and was told nothing since."""
+        """Return True if it stood when it was last looked at, and was told nothing since."""
         seen = self._latest()
         if seen is None or seen.error or seen.time < since:
             return False

@@ -43,7 +43,7 @@ TAKEN_OVER_WITHIN = 2.0
 """Seconds in which a person may take a motor over, where the drive's own timeout is not known."""
 LONGEST_GRACE = 10.0
 GONE, ABSENT = "is gone", "is not on the line any more"
-"""What is told of a program that has ended, and of one that lives: frozen, or gone by itself."""
+"""Texts on a program that has ended, and on one that lives: frozen, or detached."""
 BY_KEYS = "a and T take it over here"
 LINE_BACK_WITHIN = 600.0
 """Seconds for which a motor on a lost line is still to be stopped once that is back."""
@@ -207,7 +207,7 @@ class Guardian:
         return any(one.process == program.process for one in self._line.facts.programs)
 
     async def _is_left(self, device: int, program: Program) -> bool:
-        """Whether no living program but that one has the motor's start on record."""
+        """Return True if no living program but that one has the motor's start on record."""
         found = await asyncio.to_thread(self._found, program)
         return any(one.device == device for one in found)
 

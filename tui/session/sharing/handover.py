@@ -1,4 +1,4 @@
-"""Who commands a drive when two want to: a question to the one that does, and its answer."""
+"""Handover of a drive between two programs: a request to its commander, and the answer."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ class Handover:
         clock: Clock = REAL_CLOCK,
     ) -> None:
         self.person = False
-        """Whether somebody is here who can answer; a command without one decides at once."""
+        """True if somebody is here who can answer; a command without one decides at once."""
         self.requests: Mapping[int, DriveRequest] = MappingProxyType({})
-        """What other programs want, by device."""
+        """Requests of other programs, by device."""
         self._line = line
         self._events = events
         self._session_of = session_of

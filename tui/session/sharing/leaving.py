@@ -1,4 +1,4 @@
-"""What becomes of a motor that this program leaves on a line which others share, in a sentence."""
+"""Fate of a motor that this program leaves on a shared line, in a sentence."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OTHERS_ASK = "Other programs on the line ask"
 
 
 def left_to_others(session: DriveSession, *, on_purpose: bool) -> str:
-    """What other programs on the line do with a motor that is left; empty where it is nothing.
+    """Return the reaction of other programs to a motor that is left; empty if none.
 
     `on_purpose`: it is put on record as left running. Otherwise a motor that was started here is
     stopped by whoever owns the line then, as Guardian does it.

@@ -1,4 +1,4 @@
-"""What keeps a start from being put on record, and so the motor from being started."""
+"""Errors that prevent the record of a start, and so the start of the motor."""
 
 from __future__ import annotations
 

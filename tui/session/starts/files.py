@@ -25,7 +25,7 @@ LONGEST_RECORD = 100_000
 SHARED_RECORD, SHARED_RECORDS = 0o660, 0o770
 """Modes of a file and a folder that users of a group share; whose it is comes from above."""
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
-"""What file systems say that cannot flush a folder; the file itself was flushed."""
+"""Errors of file systems that cannot flush a folder; the file itself was flushed."""
 
 
 class StartFiles:
@@ -37,7 +37,7 @@ class StartFiles:
     def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self.folder = folder
         self._shared = shared
-        """Whether the group of the folder above may read, write and take away what lies here."""
+        """True if the group of the folder above may read, write and take away what lies here."""
 
     def write_record(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
         """Put a record on the disk, flushed; not if it is no longer `wanted` at the last moment.

@@ -1,4 +1,4 @@
-"""Where starts are on record: in the user's own state folder, and where users of a group meet.
+"""Places of start records: the user's own state folder, and the folder for users of a group.
 
 The own one outlives the machine. By that of the group another user's program, which owns the line,
 knows whose motor it is to stop when the program that started it is gone.
@@ -34,7 +34,7 @@ class StartFolders:
 
     @property
     def folder(self) -> Path:
-        """Where this user's own lie."""
+        """Folder of this user's own records."""
         return self._own.folder
 
     def write_record(self, record: StartRecord, wanted: Callable[[], bool]) -> None:

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
 
     from ..connect.identify import DriveIdentity
-    from ..timeout_told import Timeout
+    from ..timeout_report import Timeout
     from ..work import Permit
 
 log = logging.getLogger(__name__)
 
 
 class Startable(Protocol):
-    """What has to be known of a drive to put its start on record."""
+    """Facts about a drive that the record of its start needs."""
 
     device: int
     profile: Profile
@@ -46,12 +46,12 @@ class Startable(Protocol):
 
     @property
     def known_identity(self) -> DriveIdentity:
-        """Who the drive is, as far as it is known."""
+        """Identity of the drive, as far as it is known."""
         ...
 
     @property
     def commanded(self) -> bool:
-        """Whether this program has commanded it."""
+        """True if this program has commanded it."""
         ...
 
     def note_command(self) -> None:
@@ -70,9 +70,9 @@ class StartKeeper:
     ) -> None:
         self._clock = clock
         self.unrecorded = False
-        """Whether a start that cannot be put on record is let through; a person's word."""
+        """True if a start that cannot be put on record is let through; a person's word."""
         self.left_running = False
-        """Whether what is started or taken over now is to go on when the program is gone."""
+        """True if what is started or taken over now is to go on when the program is gone."""
         self._program = program
         self._starts = starts or Starts(clock=clock)
         self._begun: dict[int, StartRecord] = {}
@@ -146,16 +146,16 @@ class StartKeeper:
             self._starts.note_stop(session.line_text, session.device)
 
     def holds(self, device: int) -> bool:
-        """Whether a motor that was started here is not yet known to stand."""
+        """Return True if a motor that was started here is not yet known to stand."""
         return device in self._begun
 
     def stopped_by_others(self, device: int) -> bool:
-        """Whether a motor started here is not meant to go on where this program is gone."""
+        """Return True if a motor started here is not meant to go on where this program is gone."""
         record = self._begun.get(device)
         return record is not None and not record.left_running
 
     def started_by(self, session: Startable, process: ProcessKey) -> bool:
-        """Whether a program has the motor on record as its own; reads files."""
+        """Return True if a program has the motor on record as its own; reads files."""
         return self._starts.is_on_record(session.line_text, session.device, process)
 
     def give_away(self, session: Startable) -> None:

@@ -1,4 +1,4 @@
-"""Whether a program of this machine still lives, also where its number was given to another."""
+"""True if a program of this machine still lives, also where its number was given to another."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Processes:
         self._proc = proc
 
     def boot_id(self) -> str:
-        """What tells this run of the machine from the one before; empty where that is unknown.
+        """Return an id of this run of the computer; empty if it is not known.
 
         Without it a program's start still tells them apart.
         """
@@ -56,7 +56,7 @@ class Processes:
         return not (boot_id and here) or boot_id == here
 
     def lives(self, boot_id: str, pid: int, started: str) -> bool:
-        """Whether the program still lives that was noted so; in doubt it does."""
+        """Return True if the program still lives that was noted so; in doubt it does."""
         if not self.is_same_boot(boot_id):
             return False
         now = self.started(pid)
@@ -64,7 +64,8 @@ class Processes:
 
 
 def _is_hidden(pid: int) -> bool:
-    """Whether a program of another user runs that /proc does not show to this one (hidepid)."""
+    """Return True if a program of another user runs that /proc does not show to this one
+    (hidepid)."""
     try:
         os.kill(pid, 0)  # no signal: it asks whether there is such a program
     except PermissionError:

@@ -27,7 +27,7 @@ class StartRecord:
     reference: str
     version: str
     name: str
-    """What the drive said of itself; empty where it said nothing."""
+    """Identity reported by the drive; empty if none."""
     order: Literal["forward", "reverse"]
     boot_id: str
     pid: int
@@ -36,7 +36,7 @@ class StartRecord:
     program: str
     """`panel`, `run` and the like."""
     left_running: bool
-    """Whether the motor is meant to go on when the program ends."""
+    """True if the motor is meant to go on when the program ends."""
     wall: str
     """When the start was ordered: ISO with zone, to the millisecond."""
     guessed: bool = False

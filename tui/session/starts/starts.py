@@ -65,7 +65,7 @@ class Starts:
 
     @property
     def folder(self) -> Path:
-        """Where the records lie."""
+        """Folder of the records."""
         return self._files.folder
 
     def record(
@@ -195,7 +195,7 @@ class Starts:
         return [newest[device] for device in sorted(newest) if newest[device] not in living]
 
     def is_on_record(self, line: str, device: int, process: ProcessKey) -> bool:
-        """Whether a program has a start of a drive on record. Reads files."""
+        """Return True if a program has a start of a drive on record. Reads files."""
         return any(one.device == device and one.process == process for one in self._of(line))
 
     def own(self, line: str, device: int) -> StartRecord | None:
@@ -303,7 +303,8 @@ class Starts:
         return record.process == (pid_namespace(), os.getpid()) and self.is_alive(record)
 
     def is_alive(self, record: StartRecord) -> bool:
-        """Whether the program of a start lives; in doubt it does, as in another container."""
+        """Return True if the program of a start lives; in doubt it does, as in another
+        container."""
         if record.is_foreign:
             return self.processes.is_same_boot(record.boot_id)
         return self.processes.lives(record.boot_id, record.pid, record.started)

@@ -1,1 +1,1 @@
-"""What a person has taught of one drive: kept with it, and used from then on."""
+"""Taught facts about one drive: kept with it, and used from then on."""

@@ -32,11 +32,11 @@ _CODE = re.compile(r"[\x21-\x7e]{1,24}")
 
 
 class TaughtUnreadable(DriveError):
-    """What was taught of a drive cannot be read, and why."""
+    """The taught scales of a drive cannot be read."""
 
 
 class TaughtNotKept(DriveError):
-    """What was taught cannot be put on the disk, and why."""
+    """The taught scales of a drive cannot be written to the disk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class TaughtDrive:
     device: int
     profile: str
     stated: str
-    """What it says of itself; empty where it says nothing."""
+    """Its reported identity; empty if none."""
 
     @classmethod
     def of(
@@ -67,7 +67,7 @@ class TaughtDrive:
 
     @property
     def file(self) -> Path:
-        """Where what was taught of it stands."""
+        """File of its taught scales."""
         readable = re.sub(r"[^A-Za-z0-9]+", "-", self.line).strip("-")[:40]
         own = _digest(self.stated) if self.stated else "unsaid"
         return _folder() / f"{readable}-{self.device}-{self.profile}-{self._place}-{own}.json"
@@ -87,7 +87,7 @@ class TaughtDrive:
 
 
 def load_taught(drive: TaughtDrive) -> TaughtLooks:
-    """What was kept of a drive; nothing where there is no file. Raises TaughtUnreadable."""
+    """Return the stored readings of a drive; empty if there is no file. Raises TaughtUnreadable."""
     path = drive.found()
     if path is None:
         return TaughtLooks()
@@ -153,7 +153,7 @@ def _as_json(drive: TaughtDrive, kept: TaughtLooks) -> dict[str, object]:
 
 
 def _looks_in(reported: object) -> TaughtLooks:
-    """What a file says; raises ValueRefused where it says something else."""
+    """Parse a file; raises ValueRefused if it holds anything else."""
     if not isinstance(reported, dict):
         raise ValueRefused("it is no table")
     looks, reference = reported.get("looks"), reported.get("reference", "")
@@ -184,7 +184,7 @@ def _look(code: str, reported: object) -> DisplayLook:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong, in a line."""
+    """Return the error in a line."""
     if isinstance(error, OSError):
         return error.strerror or str(error)
     return str(error).splitlines()[0].rstrip(".")[:120] if str(error) else type(error).__name__

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class Teacher:
-    """What was taught of one drive; only `look` asks the drive, the others wait for the disk."""
+    """Taught scales of one drive; only `look` polls the drive, the others wait for the disk."""
 
     def __init__(self, session: DriveSession) -> None:
         self.session = session
@@ -36,7 +36,7 @@ class Teacher:
         """Why what was taught before is not used, or is not kept; empty while all is well."""
         self._known = TaughtLooks()
         self._unkept = False
-        """Whether the disk has less than what is known here."""
+        """True if the disk has less than what is known here."""
         self._lock = threading.Lock()
 
     @property
@@ -46,7 +46,7 @@ class Teacher:
 
     @property
     def scales(self) -> Mapping[str, TaughtScale]:
-        """What is taught now, by code."""
+        """Present scales, by code."""
         return self.session.profile.taught
 
     @property
@@ -126,7 +126,7 @@ class Teacher:
         return next(fit, "")
 
     def _latest(self) -> TaughtLooks:
-        """What is kept now: another program may have taught meanwhile."""
+        """Return the stored readings: another program may have added some."""
         try:
             on_disk = load_taught(self._drive())
         except TaughtUnreadable:
@@ -164,7 +164,7 @@ class Teacher:
 
 
 def reference_asks(family: Profile, code: str) -> str:
-    """What a person confirms before a parameter takes the reference."""
+    """Return the question before a parameter takes the reference."""
     way = reference_of(family, code)
     chooses = ""
     if way is not None and way.bits:

@@ -50,7 +50,7 @@ BEFORE_FAULT = {"FE00": "FD00", "FE01": "FD01", "FE42": "FD42", "FE49": "FD49"} 
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """Where command and reference come from now."""
+    """Present sources of command and reference."""
 
     command: bool
     reference: bool
@@ -65,7 +65,7 @@ class Altivar21Chart:
         self._stop = Stop.RAMP
         self._last = 0
         self._latched = False
-        """Whether the emergency stop is in force; a fault reset ends it."""
+        """True if the emergency stop is in force; a fault reset ends it."""
         self._target_hz = 0.0
         self._inputs = Altivar21Inputs(body)
 
@@ -144,7 +144,7 @@ class Altivar21Chart:
 
     @property
     def running(self) -> bool:
-        """Whether words that cannot be changed while running are locked."""
+        """True if words that cannot be changed while running are locked."""
         return self._body.turning
 
     # What the motor is told
@@ -191,7 +191,7 @@ class Altivar21Chart:
         return -size if hz < 0 else size
 
     def order(self) -> MotorDemand:
-        """What the motor has to do now."""
+        """Return the present demand on the motor."""
         body = self._body
         remote = self._sources().command
         second = remote and bool(self._word & RAMP_2)
@@ -282,5 +282,5 @@ class Altivar21Chart:
 
     @property
     def energy_reset(self) -> bool:
-        """Whether the line holds the energy counters at 0."""
+        """True if the line holds the energy counters at 0."""
         return bool(self._body.raw("command_word_2") & ENERGY_RESET)

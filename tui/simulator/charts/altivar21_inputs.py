@@ -1,4 +1,4 @@
-"""What the terminals of an Altivar 21 order: F, R and RES, VIA and VIB.
+"""Commands from the terminals of an Altivar 21: F, R and RES, VIA and VIB.
 
 Source: ATV21 Modbus manual 6.2 (functions 38 and 48 of an input) and 8.8. Without another function
 F runs forward, R runs the other way, RES resets a fault; that is the wiring most drives have.
@@ -37,14 +37,14 @@ class Altivar21Inputs:
             self._body.terminals.close(name, closed=False)
 
     def resets(self) -> bool:
-        """Whether RES was closed just now."""
+        """Return True if RES was closed just now."""
         closed = self._closed("RES")
         pressed = closed and not self._reset_before
         self._reset_before = closed
         return pressed
 
     def _closed(self, name: str) -> bool:
-        """Whether an input is closed that has no other function than its own."""
+        """Return True if an input is closed that has no other function than its own."""
         return self._body.terminals.closed(name) and not self._function(name)
 
     def _function(self, name: str) -> int:
@@ -52,18 +52,18 @@ class Altivar21Inputs:
         return raw if raw in (FORCED_LOCAL, SECOND_REFERENCE, PRESET_INPUT) else 0
 
     def switched(self, function: int) -> bool:
-        """Whether an input with this function is closed."""
+        """Return True if an input with this function is closed."""
         closed = self._body.terminals.closed
         return any(closed(n) and self._function(n) == function for n in INPUT_FUNCTIONS)
 
     @property
     def run_ordered(self) -> bool:
-        """Whether F or R orders a run."""
+        """True if F or R orders a run."""
         return self._closed("F") or self._closed("R")
 
     @property
     def reverse(self) -> bool:
-        """Whether they order it the other way."""
+        """True if they order it the other way."""
         return self._closed("R") and not self._closed("F")
 
     @property

@@ -32,7 +32,7 @@ VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
 
 
 def keypad_state(body: Body, stop: Stop | None, *, disabled: bool) -> int:
-    """What the keypad of an Altivar 71 shows (HMIS)."""
+    """Return the state shown on the keypad of an Altivar 71 (HMIS)."""
     motor = body.motor
     change = motor.acceleration * (1 if motor.frequency >= 0 else -1)
     shown = (

@@ -20,7 +20,7 @@ COPIES_REFERENCE, COPIES_COMMAND = (1, 3), (2, 3)
 
 
 class ChannelPlace(Enum):
-    """Where a command or a reference comes from; the value is its bit in CCC and CRC."""
+    """Source of a command or a reference; the value is its bit in CCC and CRC."""
 
     TERMINALS = 0
     KEYPAD = 1
@@ -33,7 +33,7 @@ class ChannelPlace(Enum):
 
     @property
     def network(self) -> bool:
-        """Whether it is a network, Modbus or another."""
+        """True if it is a network, Modbus or another."""
         return self in (
             ChannelPlace.LINE,
             ChannelPlace.CANOPEN,
@@ -77,11 +77,12 @@ class ChannelsInForce:
     reference_2: bool = False
     reference_1b: bool = False
     local: bool = False
-    """Whether local control is forced by an input."""
+    """True if local control is forced by an input."""
 
 
 def switch_is_on(raw: int, closed: Callable[[str], bool], word: int) -> bool:
-    """Whether an assignment holds: an input, or a bit of the command word that the line wrote."""
+    """Return True if an assignment holds: an input, or a bit of the command word that the line
+    wrote."""
     if raw in (CHANNEL_2, CHANNEL_2_TOO, CHANNEL_1B, ALWAYS):
         return True
     if FIRST_INPUT <= raw < FIRST_INPUT + INPUTS:

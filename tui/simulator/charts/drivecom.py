@@ -41,7 +41,7 @@ class DrivecomChart:
         self._wiring = TerminalWiring(body)
         self._target_hz = 0.0
         self._resets = False
-        """Whether the assigned fault reset was given at the last look."""
+        """True if the assigned fault reset was given at the last look."""
 
     # Orders from outside
 
@@ -130,7 +130,7 @@ class DrivecomChart:
             self._obey(command_of(self._command.word))
 
     def _ordered(self, channels: ChannelsInForce) -> bool:
-        """Whether the motor was ordered to run under these channels."""
+        """Return True if the motor was ordered to run under these channels."""
         if channels.command is ChannelPlace.TERMINALS:
             return self._wiring.order.run
         return self._machine.state is DrivecomState.ENABLED and not self._stopping()
@@ -162,7 +162,7 @@ class DrivecomChart:
 
     @property
     def _by_line(self) -> bool:
-        """Whether the command channel is the line."""
+        """True if the command channel is the line."""
         return self._channels.now.command is ChannelPlace.LINE
 
     def raises(self) -> OwnFault | None:
@@ -186,13 +186,13 @@ class DrivecomChart:
 
     @property
     def running(self) -> bool:
-        """Whether stopped-only words are locked."""
+        """True if stopped-only words are locked."""
         return self._body.turning
 
     # What the motor is told
 
     def order(self) -> MotorDemand:
-        """What the motor has to do now."""
+        """Return the present demand on the motor."""
         body = self._body
         self.follow()
         if self._stands:
@@ -208,7 +208,7 @@ class DrivecomChart:
         return replace(base, energised=True, target=self._target_hz)
 
     def _holds(self) -> bool:
-        """Whether the drive stays enabled at standstill."""
+        """Return True if the drive stays enabled at standstill."""
         return self._by_line or self._channels.low_access or self._wired_run()
 
     def _wired_run(self) -> bool:
@@ -231,7 +231,7 @@ class DrivecomChart:
         return self._by_line or self._wired_run() or turning
 
     def _stopping(self) -> Stop | None:
-        """How the motor is being stopped; None while it follows its reference."""
+        """Return the present stop of the motor; None while it follows its reference."""
         if by_state := self._machine.stopping():
             return by_state
         if self._body.fallback is Fallback.STOP:

@@ -17,7 +17,7 @@ class DrivecomChannels:
     def __init__(self, body: Body) -> None:
         self._body = body
         self.line_spoke = False
-        """Whether the line gave a command; below access level L3 it commands from then on."""
+        """True if the line gave a command; below access level L3 it commands from then on."""
         self.now = ChannelsInForce(ChannelPlace.LINE, ChannelPlace.LINE)
 
     def power_up(self) -> None:
@@ -31,7 +31,7 @@ class DrivecomChannels:
         return before, self.now
 
     def is_on(self, raw: int) -> bool:
-        """Whether an assignment to an input or a command bit holds."""
+        """Return True if an assignment to an input or a command bit holds."""
         word = self._body.raw("command_word") & 0xFFFF
         return switch_is_on(raw, self._body.terminals.closed, word)
 
@@ -47,6 +47,6 @@ class DrivecomChannels:
 
     @property
     def low_access(self) -> bool:
-        """Whether LAC is below L3: the drive is enabled by itself (ATV31/312)."""
+        """True if LAC is below L3: the drive is enabled by itself (ATV31/312)."""
         levels = self._body.traits.access_levels
         return levels and self._body.setting("LAC", FULL_ACCESS) < FULL_ACCESS

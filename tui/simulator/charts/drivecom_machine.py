@@ -21,9 +21,9 @@ class DrivecomMachine:
         self._body = body
         self.state = DrivecomState.DISABLED
         self.leaving = False
-        """Whether a Disable operation waits for the motor to stop."""
+        """True if a Disable operation waits for the motor to stop."""
         self.stop = Stop.RAMP
-        """How it stops, in the fault reaction or while it is leaving."""
+        """Kind of stop in the fault reaction, or on leaving operation."""
 
     def start(self, *, enabled: bool) -> None:
         """Begin anew: disabled, or enabled by itself."""
@@ -43,7 +43,7 @@ class DrivecomMachine:
 
     @property
     def faulty(self) -> bool:
-        """Whether a fault is there or being reacted to."""
+        """True if a fault is there or being reacted to."""
         return self.state in (DrivecomState.FAULT, DrivecomState.REACTION)
 
     def obey(self, command: DrivecomCommand | None, *, low_access: bool) -> None:
@@ -87,7 +87,7 @@ class DrivecomMachine:
         self.leaving = False
 
     def stands(self, *, holds: bool) -> None:
-        """What the drive does by itself at standstill; `holds` keeps it enabled."""
+        """Change the state at standstill; `holds` keeps it enabled."""
         if self.state is DrivecomState.REACTION:
             self.state = DrivecomState.FAULT
         elif self.leaving:
@@ -100,7 +100,7 @@ class DrivecomMachine:
             self.state = DrivecomState.DISABLED
 
     def stopping(self) -> Stop | None:
-        """How it stops because of its state; None where the state lets it run."""
+        """Return the stop that its state demands; None if the state lets it run."""
         if self.state is DrivecomState.QUICK_STOP:
             return Stop.FAST
         if self.state is DrivecomState.REACTION or self.leaving:

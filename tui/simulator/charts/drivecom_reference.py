@@ -23,7 +23,7 @@ class DrivecomReference:
         self._body = body
 
     def target(self, wanted: float) -> float:
-        """What the ramp goes to, in Hz: the wanted reference in its limits, or a fallback."""
+        """Return the target of the ramp in Hz: the reference within its limits, or a fallback."""
         body = self._body
         if body.fallback is Fallback.SPEED:
             speed = body.registers.named("LFF")
@@ -53,7 +53,7 @@ class DrivecomReference:
 
     @property
     def is_earlier(self) -> bool:
-        """Whether the line's reference is still what another master left there."""
+        """True if the line's reference is still what another master left there."""
         return self._body.earlier_hz is not None and self._written() is None
 
     def leave(self, hz: float) -> None:
@@ -65,7 +65,8 @@ class DrivecomReference:
             self._body.line_orders.take_back(frequency, self._body.parameter("command_speed"))
 
     def turned_over(self, is_io: bool) -> bool:
-        """Whether CMI bit 12 turns the direction of the command word over (ATV71, Drivecom)."""
+        """Return True if CMI bit 12 turns the direction of the command word over (ATV71,
+        Drivecom)."""
         if is_io or self._body.traits.access_levels:
             return False
         return bool(self._cmi & CMI_REVERSE)
@@ -91,7 +92,7 @@ class DrivecomReference:
         return self._body.raw("extended_command_word") & 0xFFFF
 
     def hz_per_count(self, parameter: Parameter) -> float:
-        """What one count of a frequency word is worth, with CMI bit 9 in mind."""
+        """Return the value of one count of a frequency word, depending on CMI bit 9."""
         if not self._cmi & CMI_HIGH_RESOLUTION:
             return self._body.scale(parameter)
         fixed = self._body.traits.max_hz_high_resolution
@@ -110,6 +111,6 @@ class DrivecomReference:
         return min(body.value("low_speed", 0.0), high), high
 
     def outside(self, wanted: float) -> bool:
-        """Whether a reference is outside its limits."""
+        """Return True if a reference is outside its limits."""
         low, high = self.limits()
         return not low - 0.05 <= abs(wanted) <= high + 0.05

@@ -18,7 +18,7 @@ WARM_MOTOR = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """What a chart tells about itself."""
+    """State of a chart as it is shown."""
 
     state_bits: int
     channels: ChannelsInForce

@@ -24,7 +24,7 @@ EXTERNAL_REACTIONS: Mapping[int, Stop | None] = {
     7: Stop.FAST,
     8: Stop.INJECTION,
 }
-"""What an external fault does, by the raw value of EPL; None: it is ignored."""
+"""Reactions to an external fault, by the raw value of EPL; None: it is ignored."""
 
 
 def stop_type(body: Body) -> Stop:
@@ -33,7 +33,7 @@ def stop_type(body: Body) -> Stop:
 
 
 def commanded_stop(body: Body, word: int, *, low_access: bool) -> Stop | None:
-    """How a command word and CMI stop a motor that stays enabled; None: they do not."""
+    """Return the stop of an enabled motor by a command word and CMI; None: no stop."""
     cmi = extended_command(body)
     compact = body.traits.access_levels
     orders = (
@@ -53,7 +53,7 @@ def extended_command(body: Body) -> int:
 
 
 def locked(body: Body, *, stands: bool) -> bool:
-    """Whether the drive must not supply the motor.
+    """Return True if the drive must not supply the motor.
 
     CMI bit 15 locks at once; bit 13 keeps a motor that stands at rest (ATV31/312: reserved on
     the ATV71).

@@ -18,7 +18,7 @@ from .own import OwnChart
 
 
 class PlayedChart(Protocol):
-    """What a family's state chart does for its drive."""
+    """Simulation of a family's state chart for its drive."""
 
     def power_up(self) -> None: ...
     def run(self, hz: float, /) -> None: ...

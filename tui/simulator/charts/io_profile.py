@@ -12,7 +12,7 @@ THREE_WIRE = 1
 
 @dataclass(frozen=True, slots=True)
 class IoCommand:
-    """What the bits of the command word order."""
+    """Commands in the bits of the command word."""
 
     run: bool = False
     reverse: bool = False

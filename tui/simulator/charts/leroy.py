@@ -51,7 +51,7 @@ class LeroySomerChart:
         self._last = 0
         self._target_hz = 0.0
         self._pressed = False
-        """Whether RESET was closed at the last look."""
+        """True if RESET was closed at the last look."""
         body.terminals.apply("AI1", DEFAULT_HZ / LEROY_FULL_HZ)
 
     def power_up(self) -> None:
@@ -108,7 +108,7 @@ class LeroySomerChart:
 
     @property
     def running(self) -> bool:
-        """Whether the drive is unlocked or turning: 6.43 cannot be changed then."""
+        """True if the drive is unlocked or turning: 6.43 cannot be changed then."""
         return self._body.turning or bool(self._bits() & UNLOCKED)
 
     def trip(self, stop: Stop) -> None:
@@ -126,7 +126,7 @@ class LeroySomerChart:
         return None
 
     def order(self) -> MotorDemand:
-        """What the motor has to do now."""
+        """Return the present demand on the motor."""
         body = self._body
         up, down = body.rates(Stop.RAMP)
         base = MotorDemand(acceleration=up, deceleration=down)

@@ -20,12 +20,12 @@ class LineCommand:
 
     @property
     def is_io(self) -> bool:
-        """Whether the I/O profile is chosen."""
+        """True if the I/O profile is chosen."""
         return self._body.setting("CHCF", 1) == IO_PROFILE
 
     @property
     def reverse(self) -> bool:
-        """Whether the word asks for the other direction."""
+        """True if the word asks for the other direction."""
         return self.io.reverse if self.is_io else bool(self.word & CMD_REVERSE)
 
     def clear(self) -> None:

@@ -36,7 +36,7 @@ class OwnChart:
         self._reference = OwnReference(body)
         self._stop = Stop.RAMP
         self._runs = False
-        """Whether the line has ordered a run."""
+        """True if the line has ordered a run."""
         self._reverse = False
         self._idle: State | None = None
         """The state at rest that the line has led it to; None: the one it starts in."""
@@ -147,7 +147,7 @@ class OwnChart:
 
     @property
     def running(self) -> bool:
-        """Whether stopped-only words are locked."""
+        """True if stopped-only words are locked."""
         return self._body.turning
 
     # What the motor is told
@@ -164,7 +164,7 @@ class OwnChart:
         return self._runs or self._wired
 
     def order(self) -> MotorDemand:
-        """What the motor has to do now."""
+        """Return the present demand on the motor."""
         body = self._body
         way = Stop.RAMP if self._ordered else self._stop
         up, down = body.rates(way)

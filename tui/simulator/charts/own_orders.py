@@ -1,4 +1,4 @@
-"""What a word written to a drive of any make orders, after its profile's own chart."""
+"""Commands of a word written to a drive of any make, by its profile's own chart."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class OwnOrders:
         self._profile = profile
         self._raws = raws
         self._places: dict[int, int] = {}
-        """How many words of an order have come, by its place in the chart."""
+        """Number of received words of a command, by its place in the chart."""
         self._last: dict[str, int] = {}
 
     def forget(self) -> None:

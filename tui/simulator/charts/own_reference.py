@@ -56,7 +56,8 @@ class OwnReference:
         return self._body.engineering(word) * self._hertz_of_one(word)
 
     def _hertz_of_one(self, word: Parameter) -> float:
-        """What 1 in the unit of a word is in Hz: a percentage and volts are parts of the whole."""
+        """Return the Hz of 1 in the unit of a word: a percentage and volts are parts of the
+        whole."""
         if word.unit in FULL_REFERENCES:
             return self._whole(word) / FULL_REFERENCES[word.unit]
         if not self._is_speed(word) and word.unit != "rpm":
@@ -65,7 +66,7 @@ class OwnReference:
         return poles / 120
 
     def _whole(self, word: Parameter) -> float:
-        """What the full reference of a word is in Hz."""
+        """Return the Hz of the full reference of a word."""
         rating = self._body.registers.named(word.rating) if word.rating else None
         if rating is None:
             return self._full
@@ -78,7 +79,7 @@ class OwnReference:
 
     @property
     def is_earlier(self) -> bool:
-        """Whether the reference is still what another master left."""
+        """True if the reference is still what another master left."""
         return self._body.earlier_hz is not None and self._latest() is None
 
     def leave(self, hz: float) -> None:

@@ -1,4 +1,4 @@
-"""What the inputs of an Altivar 31, 312 or 71 order: two wires or three, levels or edges.
+"""Commands from the inputs of an Altivar 31, 312 or 71: two wires or three, levels or edges.
 
 Sources: ATV71 communication parameters list and ATV312 communication variables (TCC, TCT, RRS).
 """
@@ -17,7 +17,7 @@ FREEWHEEL_INPUT, FAST_INPUT = "NST", "FST"
 
 @dataclass(frozen=True, slots=True)
 class WiredOrder:
-    """What the inputs order now."""
+    """Present command of the inputs."""
 
     run: bool = False
     reverse: bool = False
@@ -37,7 +37,7 @@ class TerminalWiring:
         self.order = WiredOrder()
         self._before: frozenset[str] = frozenset()
         self._spent = False
-        """Whether what is closed has to open first."""
+        """True if what is closed has to open first."""
 
     def renew(self) -> None:
         """Something ended what the inputs ordered: a fault, a loss of supply, another channel."""

@@ -1,1 +1,1 @@
-"""What a simulated drive moves and keeps: motor, load, faults, memory, watch of the line."""
+"""Plant of a simulated drive: motor, load, faults, memory, watch of the line."""

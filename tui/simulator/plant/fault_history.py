@@ -20,7 +20,7 @@ class OwnFault:
     stop: Stop | None
     """None: as the reaction to a silent line says."""
     persists: bool = False
-    """Whether no reset helps for as long as it is raised."""
+    """True if no reset helps for as long as it is raised."""
 
 
 def fault_raw(profile: Profile, fault: str | int) -> int:

@@ -1,4 +1,4 @@
-"""What an Altivar 31, 312 or 71 stores of its words when a fault comes.
+"""Words that an Altivar 31, 312 or 71 stores when a fault occurs.
 
 Source: ATV71 communication parameters list (DP0 and its record); ATV312 communication
 variables (EP1 to EP4).
@@ -25,7 +25,7 @@ RECORDS = 9
 
 
 class FaultRecords:
-    """What the drive did when its last faults came, the last first."""
+    """States of the drive at its last faults, the last first."""
 
     def __init__(self, body: Body) -> None:
         self._body = body

@@ -1,5 +1,5 @@
-"""What the machine asks of the motor: a slowly changing load, a mains that breathes, a person
-who changes the reference now and then. Seeded, so that a run can be repeated."""
+"""Load of the machine: slowly changing, with a varying mains, and a person who changes the
+reference now and then. Seeded, so that a run can be repeated."""
 
 from __future__ import annotations
 

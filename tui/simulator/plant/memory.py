@@ -42,7 +42,7 @@ class SettingsMemory:
         self._follow(parameter)
 
     def _follow(self, source: Parameter) -> None:
-        """What has a factory setting for each value of this one takes it (HSP after bFr)."""
+        """Set the values whose factory settings depend on this one (HSP after bFr)."""
         registers = self._body.registers
         for parameter in registers.profile.parameters:
             by = parameter.factory_by

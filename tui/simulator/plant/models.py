@@ -39,5 +39,5 @@ def _model(models: list[Model], reference: str) -> Model | None:
 
 
 def _has_power(model: Model, power: float) -> bool:
-    """Whether it is one of a model's powers: 0.37/0.4 by 50 Hz and 60 Hz motors."""
+    """Return True if it is one of a model's powers: 0.37/0.4 by 50 Hz and 60 Hz motors."""
     return any(math.isclose(float(one), power) for one in model.power_kw.split("/"))

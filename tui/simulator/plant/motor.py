@@ -26,7 +26,7 @@ _EFFICIENCY = 0.95
 
 
 class Stop(Enum):
-    """How a motor is brought to a stop."""
+    """Kind of stop of a motor."""
 
     RAMP = "ramp"
     FAST = "fast"
@@ -55,7 +55,7 @@ class RatingPlate:
 
 @dataclass(frozen=True, slots=True)
 class MotorState:
-    """What the motor and the drive's power part do now, in physical units.
+    """State of the motor and the drive's power part, in physical units.
 
     Frequencies in Hz, signed by direction; torque and thermal states in %; power in kW,
     positive when motoring; energy in kWh; hours in h.
@@ -82,7 +82,7 @@ class MotorState:
 
 @dataclass(frozen=True, slots=True)
 class MotorDemand:
-    """What the drive makes of commands and reference: target in Hz, ramps in Hz/s."""
+    """Demand on the motor by commands and reference: target in Hz, ramps in Hz/s."""
 
     energised: bool = False
     target: float = 0.0

@@ -22,7 +22,7 @@ _OPEN, _CLOSED = frozenset({"0", "off", "open"}), frozenset({"1", "on", "closed"
 
 @dataclass(frozen=True, slots=True)
 class TerminalNames:
-    """What the terminals of a family are called; the first analogue input gives the reference."""
+    """Names of a family's terminals; the first analog input gives the reference."""
 
     logic: tuple[str, ...]
     analogue: tuple[str, ...]
@@ -61,7 +61,7 @@ class Terminals:
     _levels: dict[str, float] = field(default_factory=dict)
 
     def closed(self, name: str) -> bool:
-        """Whether a logic input has its signal."""
+        """Return True if a logic input has its signal."""
         return name in self._closed
 
     def level(self, name: str) -> float:

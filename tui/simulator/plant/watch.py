@@ -20,7 +20,7 @@ NO_MONITORING = 1 << 14
 
 @dataclass(frozen=True, slots=True)
 class Consequence:
-    """What a silent line leads to: a fault with a way to stop, or a fallback without one."""
+    """Reaction to a silent line: a fault with a kind of stop, or a fallback without one."""
 
     trip: Stop | None = None
     fallback: Fallback | None = None
@@ -83,7 +83,7 @@ class SilenceWatch:
 
     @property
     def watching(self) -> bool:
-        """Whether the watch has started and is not switched off."""
+        """True if the watch has started and is not switched off."""
         if self._data is None or self.timeout is None:
             return False
         if self._body.traits.access_levels:
@@ -114,7 +114,7 @@ class SilenceWatch:
         return self._body.engineering(parameter) if parameter else 0.0
 
     def consequence(self) -> Consequence:
-        """What the reaction in force leads to; a reaction nobody knows is a freewheel stop."""
+        """Return the reaction in force; an unknown reaction is a freewheel stop."""
         if self._data is None or not self._data.reaction:
             return FREEWHEEL
         raw = self._body.setting(self._data.reaction, -1)

@@ -216,6 +216,7 @@ class DriveWords:
 
 
 def past_limit(function: Function, refusal: int | None) -> int | None:
-    """How a request past a function's limit is refused: an exception, or None for silence."""
+    """Return the refusal of a request beyond a function's limit: an exception, or None for
+    silence."""
     silent = function.past_limit == "silence" or refusal is None
     return None if silent else function.past_limit_exception

@@ -1,4 +1,4 @@
-"""Who answers for a drive: its own server and those of its cards, each at an address of its own.
+"""Addresses of a drive: its own server and those of its cards.
 
 May be asked from several threads; what changes a word holds the drive's lock.
 """
@@ -18,7 +18,7 @@ CARD_FUNCTIONS = (3, 6, 16, 23)
 
 
 class Answering:
-    """What the line hears of a drive; silent while its supply is off."""
+    """Answers of a drive on the line; silent while its supply is off."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Answering:
         return True
 
     def answers_at(self, address: int) -> bool:
-        """Whether one of the drive's servers has this address and replies there."""
+        """Return True if one of the drive's servers has this address and replies there."""
         return self._body.powered and self._server_at(address) is not None
 
     def _server_at(self, address: int) -> Server | None:
@@ -65,11 +65,11 @@ class Answering:
         return None
 
     def is_own(self, address: int) -> bool:
-        """Whether the drive's own server, not that of a card, has this address."""
+        """Return True if the drive's own server, not that of a card, has this address."""
         return self._body.powered and self._server_at(address) is self._own
 
     def is_called(self, address: int) -> bool:
-        """Whether a broadcast or group address means this drive too."""
+        """Return True if a broadcast or group address means this drive too."""
         return self._body.powered and self._station.is_called(address)
 
     def answer(self, address: int, pdu: bytes) -> bytes | None:

@@ -1,4 +1,4 @@
-"""What the other side of a simulated line is set to, as far as the simulator can see it."""
+"""Settings of the other side of a simulated line, as far as the simulator can see them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ class ClientSettings:
     stop_bits: int | None = None
 
     def fits(self, baud: int, form: str) -> bool:
-        """Whether a drive with this baud and format understands what comes and is understood."""
+        """Return True if a drive with this baud and format understands what comes and is
+        understood."""
         return (
             self.baud in (None, baud)
             and self.parity in (None, form[1])

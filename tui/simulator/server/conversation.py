@@ -48,7 +48,7 @@ class _Sending:
 
 
 class _Outbox:
-    """What waits to be written, paced character by character where it has to be."""
+    """Pending output, paced character by character if necessary."""
 
     def __init__(self) -> None:
         self._heap: list[_Sending] = []
@@ -99,7 +99,7 @@ class RtuConversation:
         self._timing = line.timing
         self._look = client
         self._client: ClientSettings | None = None
-        """What the client was set to when its last bytes came, where that can be seen."""
+        """Settings of the client with its last bytes, if they can be seen."""
         self._faults = faults
         self._paced = paced
         self._buffer = b""

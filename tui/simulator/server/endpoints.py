@@ -68,7 +68,7 @@ class Endpoint(ABC):
 
 
 def wait_time(conversation: Conversation, longest: float | None) -> float | None:
-    """How long an endpoint may wait for bytes, in s."""
+    """Return how long an endpoint may wait for bytes, in s."""
     due = conversation.due
     if due is None:
         return longest
@@ -100,7 +100,7 @@ class PtyEndpoint(Endpoint):
         self._master = self._slave = -1
         self._pipe = (-1, -1)
         self._seen = False
-        """Whether what is set on the terminal can be told."""
+        """True if what is set on the terminal can be told."""
         self.path = ""
         """Path of the link to the slave side; it stays the same however often it is plugged in."""
 

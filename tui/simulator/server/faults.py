@@ -10,7 +10,7 @@ from ..troubles import FaultRates, Habits
 from .frames import seal
 
 Sendings = list[tuple[float, bytes]]
-"""What is put on the wire instead of a reply: delays in s, and bytes."""
+"""Output instead of a reply: delays in s, and bytes."""
 
 DUPLICATE_AFTER = 0.02
 TWIN_AFTER = 0.004
@@ -65,7 +65,7 @@ class FaultPlan:
         return ""
 
     def carry(self, frame: bytes) -> Sendings:
-        """What becomes of an RTU reply frame."""
+        """Return the changed RTU reply frame."""
         if (turned := self._turn(frame)) is None:
             return []
         kind = self.choose()
@@ -75,7 +75,7 @@ class FaultPlan:
         return _CARRIERS[kind](self, turned)
 
     def carry_message(self, unit: int, pdu: bytes) -> list[tuple[float, int, bytes]]:
-        """What becomes of a Modbus TCP reply: delays, units and messages."""
+        """Return the changed Modbus TCP reply: delays, units and messages."""
         if (turned := self._turn(pdu)) is None:
             return []
         pdu = turned

@@ -38,12 +38,12 @@ def seal(body: bytes) -> bytes:
 
 
 def is_sealed(frame: bytes) -> bool:
-    """Whether the bytes are one frame with a right checksum."""
+    """Return True if the bytes are one frame with a right checksum."""
     return len(frame) >= _MIN_FRAME and checksum(frame[:-2]) == int.from_bytes(frame[-2:], "little")
 
 
 def request_length(head: bytes) -> int | None:
-    """How long a request will be, as far as its first bytes tell; None where they do not."""
+    """Return the length of a request from its first bytes; None if they do not show it."""
     if len(head) < 2:
         return None
     if counted := _COUNTED.get(head[1]):

@@ -29,7 +29,7 @@ class Words(Protocol):
 
 @dataclass
 class DiagnosticCounters:
-    """What function 8 counts, of frames to the drive's own address, right and damaged ones.
+    """Counters of function 8: frames to the drive's own address, good and damaged.
 
     Source: ATV71 Modbus manual, Modbus counters.
     """

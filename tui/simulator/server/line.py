@@ -42,7 +42,7 @@ class SimulatedLine:
         self._lock = threading.Lock()
         self._last = clock()
         self.running = False
-        """Whether the drives' time passes with the clock."""
+        """True if the drives' time passes with the clock."""
 
     def start(self) -> None:
         """Let the drives' time pass from now on."""
@@ -70,7 +70,7 @@ class SimulatedLine:
         raise SimulatorError(f"No simulated drive has address {address}. Addresses: {known}.")
 
     def receive(self, frame: bytes, client: ClientSettings | None = None) -> PendingReply | None:
-        """What comes back for what was received between two silences; None for silence.
+        """Return the reply to the bytes between two silences; None for silence.
 
         A drive whose baud, parity or stop bits are not those of the `client` makes nothing of it.
         """
@@ -87,7 +87,7 @@ class SimulatedLine:
         return PendingReply(seal(bytes([address]) + reply.data), reply.turnaround)
 
     def ask(self, unit: int, pdu: bytes) -> PendingReply | None:
-        """What comes back for a message of Modbus TCP; the reply's data is a PDU."""
+        """Return the reply to a message of Modbus TCP; its data is a PDU."""
         if unit == ANY_UNIT and len(self.drives) == 1:
             unit = self.drives[0].address
         return self._ask(self.drives, unit, pdu)

@@ -15,7 +15,7 @@ FORMAT_ROLES = ("baud", "format", "parity")
 
 
 class Station:
-    """What the link settings in force make of one drive."""
+    """Effect of the link settings in force on one drive."""
 
     def __init__(self, profile: Profile, registers: Registers, address: int) -> None:
         self._profile = profile
@@ -53,11 +53,11 @@ class Station:
 
     @property
     def is_group(self) -> bool:
-        """Whether the drive's own address calls a group, so that it never answers there."""
+        """True if the drive's own address calls a group, so that it never answers there."""
         return self._profile.data.addresses.zero_digit_is_group and "0" in str(self.address)
 
     def is_called(self, address: int) -> bool:
-        """Whether a broadcast or group address means this drive too."""
+        """Return True if a broadcast or group address means this drive too."""
         addresses = self._profile.data.addresses
         if not self.address:
             return False
@@ -75,7 +75,7 @@ class Station:
         return float(self._profile.data.link.turnaround_ms) / 1000
 
     def hears(self, timing: LineTiming, client: ClientSettings | None = None) -> bool:
-        """Whether the drive's protocol, baud and format in force are those of the line.
+        """Return True if the drive's protocol, baud and format in force are those of the line.
 
         `client` is what the other side is set to, where that can be seen; then it counts.
         """
@@ -95,7 +95,7 @@ class Station:
         return LineTiming(baud, form, timing.real_time)
 
     def _chosen(self) -> list[LinkChoice]:
-        """What the drive's words for baud and format say, as far as it has any."""
+        """Return the settings in the drive's words for baud and format, as far as it has any."""
         chosen = []
         for setting, parameter in self._settings:
             raw = self._registers.in_force(parameter)
@@ -104,7 +104,8 @@ class Station:
 
 
 def in_group(own: int, called: int) -> bool:
-    """Whether a group address calls an address: each zero digit stands for any digit but 0."""
+    """Return True if a group address calls an address: each zero digit stands for any digit but
+    0."""
     mine, theirs = str(own), str(called)
     if called == 0 or "0" not in theirs or "0" in mine or len(mine) != len(theirs):
         return False
@@ -121,7 +122,7 @@ def _own(choices: list[LinkChoice], timing: LineTiming) -> tuple[int, str]:
 
 
 def _fits(choice: LinkChoice, timing: LineTiming) -> bool:
-    """Whether a choice agrees with the line, as far as it says anything."""
+    """Return True if a choice agrees with the line, as far as it says anything."""
     return (
         choice.baud in (None, timing.baud)
         and choice.format in (None, timing.format)

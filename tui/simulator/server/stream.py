@@ -33,7 +33,7 @@ class StreamEndpoint(Endpoint):
         super().__init__("simulated line, port", converse)
         self._stream = stream
         self.error: OSError | None = None
-        """What ended the port, if something did."""
+        """Error that ended the port, if any."""
 
     def _open(self) -> None:
         return

@@ -20,7 +20,7 @@ READ_RAW = (
     'tshark -o \'uat:user_dlts:"User 0 (DLT=147)","mbrtu","0","","0",""\''
     " -o mbrtu.crc_verification:TRUE -r FILE"
 )
-"""What decodes a file of raw frames; Wireshark has the same under DLT_USER."""
+"""Decoder of a file of raw frames; Wireshark has the same under DLT_USER."""
 _TCP, _PUSH_AND_ACK, _WINDOW, _TIME_TO_LIVE = 6, 0x18, 0xFFFF, 64
 _NO_FRAGMENTS = 0x4000
 
@@ -38,11 +38,11 @@ class PacketForm(Protocol):
 
     link_type: int
 
-    def of_frame(self, device: int, pdu: bytes, *, request: bool) -> Packet:
+    def frame_packet(self, device: int, pdu: bytes, *, request: bool) -> Packet:
         """The packet of a whole frame: function and data, without the checksum."""
         ...
 
-    def of_noise(self, data: bytes) -> Packet | None:
+    def noise_packet(self, data: bytes) -> Packet | None:
         """The packet of bytes that form no frame; None where there is none for them."""
         ...
 
@@ -52,11 +52,11 @@ class RtuForm:
 
     link_type = LINK_USER_0
 
-    def of_frame(self, device: int, pdu: bytes, *, request: bool) -> Packet:
+    def frame_packet(self, device: int, pdu: bytes, *, request: bool) -> Packet:
         """The frame as it was on the line."""
         return Packet(sealed(bytes([device]) + pdu))
 
-    def of_noise(self, data: bytes) -> Packet | None:
+    def noise_packet(self, data: bytes) -> Packet | None:
         """The bytes as they were."""
         return Packet(data, "forms no frame")
 
@@ -80,7 +80,7 @@ class ModbusTcpForm:
         self._connections: dict[int, _Connection] = {}
         self._noise = b""
 
-    def of_frame(self, device: int, pdu: bytes, *, request: bool) -> Packet:
+    def frame_packet(self, device: int, pdu: bytes, *, request: bool) -> Packet:
         """The packet, with what lay before it and forms no frame in its comment."""
         connection = self._connections.setdefault(device, _Connection(device))
         if request:
@@ -90,7 +90,7 @@ class ModbusTcpForm:
         comment = f"before it, no frame: {hex_text(noise)}" if noise else ""
         return Packet(_ip(connection, head + pdu, request=request), comment)
 
-    def of_noise(self, data: bytes) -> Packet | None:
+    def noise_packet(self, data: bytes) -> Packet | None:
         """None: the next packet tells of it."""
         self._noise += data
         return None

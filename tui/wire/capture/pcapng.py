@@ -25,13 +25,13 @@ _Option = tuple[int, bytes]
 
 
 def section_block(program: str) -> bytes:
-    """What a file begins with; `program` has made it."""
+    """Return the beginning of a file, made by `program`."""
     head = struct.pack("<IHHQ", BYTE_ORDER, 1, 0, _UNKNOWN_LENGTH)
     return _block(SECTION, head, [(PROGRAM, _text(program))])
 
 
 def interface_block(link_type: int, name: str) -> bytes:
-    """What the packets behind it are, and where they came from; times are in nanoseconds."""
+    """Return the type and source of the packets that follow; times are in nanoseconds."""
     options = [(INTERFACE_NAME, _text(name)), (RESOLUTION, NANOSECONDS)]
     return _block(INTERFACE, struct.pack("<HHI", link_type, 0, 0), options)
 

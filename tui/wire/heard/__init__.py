@@ -1,1 +1,1 @@
-"""What others say on a serial line: bytes apart into frames, frames into exchanges."""
+"""Traffic of others on a serial line: bytes into frames, frames into exchanges."""

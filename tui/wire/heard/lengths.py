@@ -1,4 +1,4 @@
-"""How long a frame is by its first bytes, once as a request and once as a reply. Pure functions.
+"""Length of a frame from its first bytes, once as a request and once as a reply. Pure functions.
 
 Whoever listens does not know which of both it is, and a pause between frames is no measure: an
 adapter hands over what it has collected.
@@ -18,12 +18,12 @@ _COUNTED_REQUESTS = {15: 6, 16: 6, 23: 10}
 _REPLIES = {5: 8, 6: 8, 7: 5, 8: 8, 11: 8, 15: 8, 16: 8, 22: 10}
 _COUNTED_REPLIES = {1: 2, 2: 2, 3: 2, 4: 2, 12: 2, 17: 2, 23: 2}
 _OBJECTS_FROM = 8
-"""Where the objects of an identification begin; the byte before counts them."""
+"""Offset of the objects of an identification; the byte before counts them."""
 SAME_BOTH_WAYS = frozenset({5, 6, 8, 22})
 """Functions whose reply is, or may be, the request once more."""
 
 Lengths = tuple[int, ...] | None
-"""What a frame may be long, or None where more of it has to come."""
+"""Possible lengths of a frame, or None if more of it must come."""
 
 
 def request_lengths(head: bytes | bytearray) -> Lengths:
@@ -96,7 +96,7 @@ def _whole(data: bytes | bytearray, lengths: Lengths) -> int:
 
 
 def may_grow(data: bytes | bytearray) -> bool:
-    """Whether a frame that begins so may still be whole once more of it has come."""
+    """Return True if a frame that begins so may still be whole once more of it has come."""
     if len(data) >= MAX_FRAME:
         return False
     both = request_lengths(data), reply_lengths(data)
@@ -106,12 +106,12 @@ def may_grow(data: bytes | bytearray) -> bool:
 
 
 def fits_request(frame: bytes) -> bool:
-    """Whether a whole frame is as long as a request of its function."""
+    """Return True if a whole frame is as long as a request of its function."""
     return _fits(request_lengths(frame), frame)
 
 
 def fits_reply(frame: bytes) -> bool:
-    """Whether a whole frame is as long as a reply of its function."""
+    """Return True if a whole frame is as long as a reply of its function."""
     return _fits(reply_lengths(frame), frame)
 
 

@@ -13,7 +13,7 @@ from .lengths import REFUSAL, SAME_BOTH_WAYS, fits_reply, fits_request
 from .splitting import HeardFrame
 
 HeardAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
-"""What became of a request: `again` is a second reply, `unasked` one to no request."""
+"""Result of a request: `again` is a second reply, `unasked` one to no request."""
 BROADCAST_DEVICE = 0
 GIVEN_UP_AFTER = 3.0
 """Seconds after which a request counts as not answered, though no other follows it."""
@@ -67,7 +67,7 @@ class Pairing:
         """The last reply as it was on the line."""
 
     def is_due(self, device: int, function: int) -> bool:
-        """Whether a reply of a device to a function is due."""
+        """Return True if a reply of a device to a function is due."""
         requested = self._requested.frame if self._requested is not None else None
         return requested is not None and (requested.device, requested.function) == (
             device,
@@ -158,7 +158,7 @@ def _exchange(
 
 
 def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
-    """Whether a frame is the reply to a request, refusals too."""
+    """Return True if a frame is the reply to a request, refusals too."""
     if frame.device != requested.device or frame.function & ~REFUSAL != requested.function:
         return False
     if frame.function & REFUSAL:
@@ -176,5 +176,5 @@ def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
 
 
 def _repeated(requested: HeardFrame, frame: HeardFrame) -> bool:
-    """Whether a master that got no answer has sent the same once more."""
+    """Return True if a master that got no answer has sent the same once more."""
     return frame.data == requested.data and frame.begun - requested.ended > REPLY_WITHIN

@@ -55,9 +55,9 @@ class _Chunk:
     begun: float
     ended: float
     apart: bool = False
-    """Whether it was silent before it."""
+    """True if it was silent before it."""
     fresh: bool = True
-    """Whether none of it was given yet."""
+    """True if none of it was given yet."""
 
     def give(self, count: int) -> float:
         """Take bytes from its beginning; when the last of them ended."""
@@ -85,7 +85,7 @@ class FrameSplitter:
         self._dead = 0
         """Bytes at the beginning with none of which a frame can begin."""
         self._complete = False
-        """Whether the last byte that was read is known to end a frame."""
+        """True if the last byte that was read is known to end a frame."""
         self._ended = float("-inf")
         """When the last byte that was read had ended."""
         self._given: float | None = None
@@ -93,7 +93,7 @@ class FrameSplitter:
 
     @property
     def waiting(self) -> bool:
-        """Whether there are bytes that form no frame yet."""
+        """True if there are bytes that form no frame yet."""
         return bool(self._data)
 
     def take(self, data: bytes, time: float) -> Iterator[HeardFrame]:
@@ -119,7 +119,7 @@ class FrameSplitter:
             yield self._cut(length, whole=whole)
 
     def _next(self) -> tuple[bool, int]:
-        """Whether a frame or noise is at the beginning, and how much; 0 where it is not known."""
+        """Return whether a frame or noise is at the beginning, and its length; 0 if unknown."""
         while self._dead < len(self._data):
             rest = self._data[self._dead : self._dead + MAX_FRAME]
             if length := self._length(rest):
@@ -154,12 +154,13 @@ class FrameSplitter:
         return whole and self._chunks[0].fresh, len(self._data)
 
     def _frame_behind(self) -> int:
-        """Where the next whole frame begins; 0 where there is none."""
+        """Return the place of the next whole frame; 0 if there is none."""
         starts = range(max(1, self._dead), len(self._data) - MIN_FRAME + 1)
         return next((at for at in starts if whole_length(self._data[at:])), 0)
 
     def _frame_of_its_own(self) -> bool:
-        """Whether a frame lies between a silence and the last byte: it is no part of another."""
+        """Return True if a frame lies between a silence and the last byte: it is no part of
+        another."""
         at = 0
         for chunk in self._chunks:
             if chunk.apart and at and whole_length(self._data[at:]) == len(self._data) - at:

@@ -1,4 +1,4 @@
-"""What a profile's form cannot express: each module a subject, each rule told with its place."""
+"""Rules that a profile's form cannot express: a subject per module, each with its place."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..toml_lines import TomlPath
 from . import charts, limits, names, parameters, registers
 
 Finding = tuple[TomlPath, str]
-"""Where something is wrong, and what."""
+"""Place of an error, and the error."""
 
 RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     *parameters.PARAMETER_RULES,

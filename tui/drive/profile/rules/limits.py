@@ -68,7 +68,7 @@ def _proposed(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
     for index, source in enumerate(data.control_sources):
         for place, one in enumerate(source.settings):
             yield ("control_sources", index, "settings", place), one.parameter, one.value
-    yield from _of_the_line(data)
+    yield from _line_numbers(data)
     for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
         if order is not None and not order.bit:
             yield ("memory", key, "raw"), order.parameter, order.raw
@@ -77,7 +77,7 @@ def _proposed(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
             yield ("parameters", index, "factory"), parameter.code, parameter.factory
 
 
-def _of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
+def _line_numbers(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
     for index, setting in enumerate(data.link.settings):
         at: TomlPath = ("link", "settings", index)
         if setting.factory is not None:

@@ -17,7 +17,7 @@ WORD_FORMS = {
     re.compile(r"W[0-9]"): re.compile(r"\bW[0-9]{3,5}\b"),
     re.compile(r"[0-9]+\.[0-9]"): re.compile(r"\b[0-9]{1,2}\.[0-9]{2}\b"),
 }
-"""How a text names a word, by how the numbers of a family are written."""
+"""Names of a word in texts, by how the numbers of a family are written."""
 
 
 def references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
@@ -34,7 +34,7 @@ def references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:
     """Every place that names a parameter, with the code it names."""
     for index, parameter in enumerate(data.parameters):
-        for key, code in _of_parameter(parameter):
+        for key, code in _parameter_names(parameter):
             yield ("parameters", index, key), code
     for index, block in enumerate(data.blocks):
         for key in ("slots", "values"):
@@ -43,19 +43,19 @@ def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:
         for place, choice in enumerate(block.choices):
             yield ("blocks", index, "choices", place, "parameter"), choice.parameter
     for index, chart in enumerate(data.charts):
-        for path, code in _of_chart(chart):
+        for path, code in _chart_names(chart):
             yield ("charts", index, *path), code
     yield from _reference_places(data)
     for index, group in enumerate(data.groups):
         yield ("groups", index, "needs_factory"), group.needs_factory
-    yield from _of_channels(data)
-    yield from _of_monitoring(data)
-    yield from _of_faults(data)
-    yield from _of_port_counters(data)
-    yield from _of_tables(data)
+    yield from _channel_names(data)
+    yield from _monitoring_names(data)
+    yield from _fault_names(data)
+    yield from _port_counter_names(data)
+    yield from _table_names(data)
 
 
-def _of_parameter(parameter: Parameter) -> Iterator[tuple[str, str]]:
+def _parameter_names(parameter: Parameter) -> Iterator[tuple[str, str]]:
     yield "min_from", parameter.min_from
     yield "max_from", parameter.max_from
     yield "rating", parameter.rating
@@ -68,7 +68,7 @@ def _of_parameter(parameter: Parameter) -> Iterator[tuple[str, str]]:
             yield key, of.parameter
 
 
-def _of_chart(chart: Chart) -> Iterator[NamedPlace]:
+def _chart_names(chart: Chart) -> Iterator[NamedPlace]:
     yield ("status",), chart.status
     yield ("command",), chart.command
     for key in ("direction", "reached", "alarm", "local", "channel", "when"):
@@ -94,7 +94,7 @@ def _reference_places(data: ProfileData) -> Iterator[NamedPlace]:
         yield ("teachable_references", index, "most"), one.most
 
 
-def _of_channels(data: ProfileData) -> Iterator[NamedPlace]:
+def _channel_names(data: ProfileData) -> Iterator[NamedPlace]:
     for key in ("command", "reference", "switches"):
         for index, row in enumerate(getattr(data.channels, key)):
             yield ("channels", key, index, "parameter"), row.parameter
@@ -102,7 +102,7 @@ def _of_channels(data: ProfileData) -> Iterator[NamedPlace]:
                 yield ("channels", key, index, "when"), when.parameter
 
 
-def _of_monitoring(data: ProfileData) -> Iterator[NamedPlace]:
+def _monitoring_names(data: ProfileData) -> Iterator[NamedPlace]:
     for place, value in enumerate(data.monitoring.values):
         at: TomlPath = ("monitoring", "values", place)
         yield (*at, "parameter"), value.parameter
@@ -114,7 +114,7 @@ def _of_monitoring(data: ProfileData) -> Iterator[NamedPlace]:
             yield ("monitoring", "speed_from", key), getattr(speed, key)
 
 
-def _of_faults(data: ProfileData) -> Iterator[NamedPlace]:
+def _fault_names(data: ProfileData) -> Iterator[NamedPlace]:
     yield ("faults", "parameter"), data.faults.parameter
     for place, code in enumerate(data.faults.history):
         yield ("faults", "history", place), code
@@ -130,13 +130,13 @@ def _of_faults(data: ProfileData) -> Iterator[NamedPlace]:
         yield ("faults", "inputs", "parameter"), inputs.parameter
 
 
-def _of_port_counters(data: ProfileData) -> Iterator[NamedPlace]:
+def _port_counter_names(data: ProfileData) -> Iterator[NamedPlace]:
     for index, port in enumerate(data.port_counters):
         yield ("port_counters", index, "frames"), port.frames
         yield ("port_counters", index, "checksum_errors"), port.checksum_errors
 
 
-def _of_tables(data: ProfileData) -> Iterator[NamedPlace]:
+def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
     for place, setting in enumerate(data.link.settings):
         yield ("link", "settings", place, "parameter"), setting.parameter
     if watch := data.communication_fault:

@@ -58,7 +58,7 @@ def _twice(rows: Iterable[tuple[TomlPath, object]], text: str) -> Iterator[tuple
 
 
 def fields(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """What each parameter says of itself."""
+    """Yield errors in the fields of each parameter."""
     sources = [source.id for source in data.sources]
     enumerations = {one.id: one.values for one in data.enumerations}
     for index, parameter in enumerate(data.parameters):
@@ -101,7 +101,7 @@ def _faults_of(
 
 
 def _sources_of(parameter: Parameter) -> Iterator[tuple[str, str]]:
-    """What the row, its limits and its factory setting rest on."""
+    """Yield the sources of the row, its limits and its factory setting."""
     yield "source", parameter.source
     if parameter.limit_grounds is not None:
         yield "limit_grounds", parameter.limit_grounds.source

@@ -42,7 +42,7 @@ def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
 
 
 def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """What is read and written needs its functions."""
+    """Yield parameters whose reading or writing lacks its function."""
     codes = {function.code for function in data.functions}
     read_by = {parameter.function for parameter in data.parameters}
     if 3 not in codes and (3 in read_by or 4 not in codes):

@@ -1,4 +1,4 @@
-"""What the tables of a profile have in common: the kinds of numbers and texts they hold."""
+"""Common parts of a profile's tables: kinds of numbers and texts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Identifier = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")]
 BitNumber = Annotated[int, Meta(ge=0, le=15)]
 
 Confidence = Literal["manual", "manual+public", "public-x2", "public", "analogy", "unverified"]
-"""How surely a fact is known, best first; below `public` it is shown as unverified."""
+"""Certainty of a fact, best first; below `public` it is shown as unverified."""
 
 Effective = Literal["at-once", "after-reset"]
 
@@ -37,7 +37,7 @@ class When(Table, frozen=True, kw_only=True):
     values: list[int]
 
     def holds(self, raws: Mapping[str, int]) -> bool | None:
-        """Whether it holds, given raw values by code; None where its word is not known."""
+        """Return True if it holds, given raw values by code; None where its word is not known."""
         raw = raws.get(self.parameter)
         if raw is None:
             return None

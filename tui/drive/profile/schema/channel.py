@@ -33,11 +33,12 @@ class ChannelSwitch(Table, frozen=True, kw_only=True):
     when: list[When] = []
     """Conditions under which it switches; all must hold."""
     does: str
-    """What it does otherwise, behind its name and value."""
+    """Further effect, after its name and value."""
 
 
 class Channels(Table, frozen=True, kw_only=True):
-    """Who commands and who gives the reference; of several rows the first that holds counts."""
+    """Channels that command and give the reference; of several rows the first that applies
+    counts."""
 
     command: list[ChannelRow] = []
     """Words that tell who commands."""
@@ -46,6 +47,6 @@ class Channels(Table, frozen=True, kw_only=True):
     switches: list[ChannelSwitch] = []
     """Parameters by which another channel can come into force."""
     remedy: str = ""
-    """What makes the line command the drive, as a sentence."""
+    """Setting that lets the line command the drive, as a sentence."""
     source: str = ""
     confidence: Confidence = "manual"

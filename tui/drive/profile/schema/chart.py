@@ -76,7 +76,7 @@ OrderId = Literal[
 
 
 class Order(Table, frozen=True, kw_only=True):
-    """What a person may order of a drive, as the words that are written one after another.
+    """Command to a drive, as words that are written one after another.
 
     Of several orders with one id the first counts whose states and conditions hold.
     """
@@ -85,7 +85,7 @@ class Order(Table, frozen=True, kw_only=True):
     name: str
     words: list[RawWord]
     parameter: str = ""
-    """Where the words go; the chart's command word where empty."""
+    """Register of the words; the chart's command word if empty."""
     states: list[Identifier] = []
     """States in which it may be given; any where empty."""
     when: list[When] = []
@@ -95,13 +95,13 @@ class Order(Table, frozen=True, kw_only=True):
     clears: list[str] = []
     """Words that go back to their initial values by it."""
     follows: str = ""
-    """What follows from it besides, told before it is given; sentences."""
+    """Further consequences, shown before it is given; sentences."""
     note: str = ""
     confidence: Confidence = "manual"
 
 
 class Interlock(Table, frozen=True, kw_only=True):
-    """What must hold before an order that can move the motor is sent."""
+    """Condition of a command that can move the motor."""
 
     parameter: str
     mask: WordAddress = 0xFFFF
@@ -112,7 +112,7 @@ class Interlock(Table, frozen=True, kw_only=True):
     when: list[When] = []
     """Raw values with which it counts at all."""
     text: str
-    """What is wrong otherwise, as a sentence."""
+    """Problem otherwise, as a sentence."""
     remedy: str = ""
 
 
@@ -142,12 +142,12 @@ class Chart(Table, frozen=True, kw_only=True):
     id: Identifier
     name: str
     kind: Identifier = "plain"
-    """How a simulated drive plays it, where that knows more than its states and orders."""
+    """Behavior of a simulated drive beyond its states and commands."""
     runs_in: Identifier | None = None
     """The running state to which a start leads through the transitions, a command at a time;
     without it the words of an order are written as they stand."""
     when: When | None = None
-    """Where it applies; absent: always, or where no other does."""
+    """Condition; absent: always, or if no other applies."""
     status: str
     command: str = ""
     states: list[State]
@@ -178,7 +178,7 @@ class ScaleWhen(When, frozen=True, kw_only=True):
     """A condition on another word, without which references count in another scale."""
 
     otherwise: str
-    """What is wrong if it does not hold, and what to do, as sentences."""
+    """Problem if the condition is not met, and the remedy, as sentences."""
 
 
 class ReferenceWay(Table, frozen=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""Who commands the drive and who gives its reference, and the settings that make it so."""
+"""Commander and reference source of the drive, and the settings that select them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Setting(Table, frozen=True, kw_only=True):
 
 
 class Way(Table, frozen=True, kw_only=True):
-    """Where the command or the reference comes from, and what chooses between two sources."""
+    """Source of the command or the reference, or the selection between two."""
 
     sources: Annotated[list[str], Meta(min_length=1, max_length=2)]
     """One source, or two: that without the switch and that with it."""
@@ -32,6 +32,6 @@ class ControlSource(Table, frozen=True, kw_only=True):
     command: Way
     reference: Way
     settings: list[Setting]
-    """What makes it, in the order in which it is written."""
+    """Settings that select it, in the order of writing."""
     note: str = ""
     source: str = ""

@@ -10,11 +10,11 @@ from msgspec import Meta
 from .base import BitNumber, RawWord, Table, When
 
 HelpConfidence = Literal["manual", "public", "practice"]
-"""How surely the first cause is known; `practice` is general practice, from no document."""
+"""Certainty of the first cause; `practice` is general practice, from no document."""
 
 ResetWay = Literal["by-reset", "automatic", "by-itself", "power-cycle"]
-"""How a fault ends once its cause is gone: by a reset, by the drive's automatic restart too where
-that is switched on, by itself, or only by switching the drive off and on."""
+"""End of a fault once its cause is gone: by a reset, by the drive's automatic restart too if
+that is on, without action, or only by switching the drive off and on."""
 
 
 class LookAt(Table, frozen=True, kw_only=True):
@@ -49,7 +49,7 @@ class RuledOut(Table, frozen=True, kw_only=True):
 
 
 class Hint(Table, frozen=True, kw_only=True):
-    """What something points at: causes, checks, parameters."""
+    """Help on a fault or alarm: causes, checks, parameters."""
 
     probable: Annotated[list[str], Meta(min_length=1)]
     """Probable causes, the likeliest first."""
@@ -62,22 +62,23 @@ class Hint(Table, frozen=True, kw_only=True):
 
 
 class FaultHelp(Hint, frozen=True, kw_only=True):
-    """What a fault points at."""
+    """Help on a fault."""
 
     raw: RawWord | None = None
     """The fault, as among the profile's codes; absent: any trip of a family without numbers."""
     code: str = ""
     """Its code, for who reads the file; it must be that of the profile."""
     name: str = ""
-    """What it is called, where `raw` is absent."""
+    """Name of the fault if `raw` is absent."""
     reset: ResetWay | None = None
-    """How it ends; absent where nobody says. Recalled, never sure: the drive knows better."""
+    """End of the fault; absent if no document states it. Recalled, never sure: the drive knows
+    better."""
     wait_s: Annotated[int, Meta(ge=1)] | None = None
     """Seconds to wait before a reset can work, about."""
 
 
 class AlarmHelp(Hint, frozen=True, kw_only=True):
-    """What an alarm bit points at."""
+    """Help on an alarm bit."""
 
     word: str
     """The parameter that carries the bit."""
@@ -89,6 +90,6 @@ class HelpData(Table, frozen=True, kw_only=True):
     """A whole help file."""
 
     faults: list[FaultHelp] = []
-    """What each fault points at."""
+    """Help on each fault."""
     alarms: list[AlarmHelp] = []
-    """What each alarm bit points at."""
+    """Help on each alarm bit."""

@@ -1,4 +1,4 @@
-"""What a profile says of itself, and how a drive of its family is recognized."""
+"""Identity in a profile, and recognition of a drive of its family."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class IdentificationObject(Table, frozen=True, kw_only=True):
     id: Annotated[int, Meta(ge=0, le=255)]
     meaning: Literal["vendor", "reference", "version", "name"]
     example: str = ""
-    """What a simulated drive answers."""
+    """Reply of a simulated drive."""
 
 
 class Model(Table, frozen=True, kw_only=True):
@@ -64,7 +64,7 @@ class Model(Table, frozen=True, kw_only=True):
 
 
 class Identification(Table, frozen=True, kw_only=True):
-    """How a drive of this family is recognized."""
+    """Recognition of a drive of this family."""
 
     reference_prefixes: list[str] = []
     """Beginnings of object 1 (reference) that belong to this family."""

@@ -96,7 +96,7 @@ class Function(Table, frozen=True, kw_only=True):
 
 
 class PortCounters(Table, frozen=True, kw_only=True):
-    """What the drive counts of the frames to it at one of its ports, in parameters of its own."""
+    """Frame counters of the drive at one of its ports, in its own parameters."""
 
     name: str
     frames: str
@@ -124,7 +124,7 @@ class ReadShapes(Table, frozen=True, kw_only=True):
 
 
 class ExceptionCode(Table, frozen=True, kw_only=True):
-    """What an exception code means on this family."""
+    """Meaning of an exception code in this family."""
 
     code: ExceptionByte
     name: str

@@ -1,4 +1,4 @@
-"""How a drive saves its settings and goes back to its factory settings."""
+"""Saving of a drive's settings, and its return to factory settings."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     bit: bool = False
     """True where `raw` are bits of a word whose others stay."""
     does: str
-    """What exactly happens, for the person who is asked."""
+    """Exact effect, for the person who confirms it."""
     at_rest_mask: RawWord = 0
     """Bits of the extended status word that must be 0 before."""
     keeps_value: bool = False
     """True where the word keeps the value that was written: it does not tell when it is done."""
     done: When | None = None
-    """What tells that it is done, where the word itself does not."""
+    """Sign that it is done, if the word itself does not show it."""
     groups: str = ""
     """A word that chooses the groups of settings; nothing happens while it is 0."""
     source: str = ""

@@ -1,4 +1,4 @@
-"""What is watched of a drive, its faults, and its own watch over the line."""
+"""Monitored values of a drive, its faults, and its own communication watch."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SpeedFormula(Table, frozen=True, kw_only=True):
 
 
 class Monitoring(Table, frozen=True, kw_only=True):
-    """What is watched: the values, in the order of a print-out."""
+    """Monitored values, in the order of a print-out."""
 
     values: list[MonitoringValue]
     speed_from: SpeedFormula | None = None
@@ -72,7 +72,7 @@ class InputBits(Table, frozen=True, kw_only=True):
 
 
 class Faults(Table, frozen=True, kw_only=True):
-    """Where faults are read and what their codes mean."""
+    """Registers of faults, and the meaning of their codes."""
 
     parameter: str = ""
     """The parameter that holds the present or last fault."""
@@ -80,10 +80,10 @@ class Faults(Table, frozen=True, kw_only=True):
     """True where it keeps the last fault after the fault is gone."""
     history: list[str] = []
     stored: list[list[str]] = []
-    """What the drive keeps of the moment of each fault of its history, in the same order."""
+    """Values that the drive stores for each fault of its history, in the same order."""
     codes: list[FaultCode] = []
     help: list[FaultHelp] = []
-    """What faults point at; a file of the folder `help` says it where a family has many."""
+    """Help on faults; a file of the folder `help` contains it if a family has many."""
     help_file: Identifier | None = None
     """Name of that file, without .toml, where it is not the profile's id."""
     reset_ready: StatusBit | None = None
@@ -99,7 +99,7 @@ class Faults(Table, frozen=True, kw_only=True):
 
 
 class Reaction(Table, frozen=True, kw_only=True):
-    """What the drive does when the line has gone silent."""
+    """Reaction of the drive to loss of communication."""
 
     raw: RawWord
     code: str = ""
@@ -124,7 +124,7 @@ class CommunicationFault(Table, frozen=True, kw_only=True):
     starts: str
     """When the watch begins, in words."""
     starts_confidence: Confidence = "manual"
-    """How sure that is; `unverified` where no document says it."""
+    """Certainty of that; `unverified` if no document states it."""
     needs_write: bool = False
     """True where it begins only after a command or reference was written."""
     begins_with: RawWord | None = None

@@ -47,7 +47,7 @@ class Bit(Table, frozen=True, kw_only=True):
     alarm: bool = False
     """True where a set bit is an alarm."""
     counts: WordState | None = None
-    """What other bits of the word must be for this one to mean anything."""
+    """Required values of other bits of the word for this one to be valid."""
     note: str = ""
 
 
@@ -80,7 +80,7 @@ class Multiple(Table, frozen=True, kw_only=True):
 
 
 class Grounds(Table, frozen=True, kw_only=True):
-    """What a fact rests on where that is something else than what its row rests on."""
+    """Source of a fact that differs from the source of its row."""
 
     source: str
     """The id of a source and the place in it."""
@@ -178,11 +178,11 @@ Quantity = Literal[
     "drive_reference",
     "software_version",
 ]
-"""What a parameter means across families: the same name, the same thing."""
+"""Meaning of a parameter across families: the same name, the same thing."""
 
 
 class ParameterGroup(Table, frozen=True, kw_only=True):
-    """What the parameters of a group are, where they are not settings."""
+    """Kind of a group's parameters if they are not settings."""
 
     name: str
     """As the parameters have it in `group`."""
@@ -209,7 +209,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     """Bits of the word that are this parameter, once shifted down; the others are not its own,
     and stay as they are when it is written."""
     shift: BitNumber = 0
-    """How many bits the word is shifted down first."""
+    """Bits by which the word is shifted down first."""
     sure_up_to: int | None = None
     """Highest raw value whose meaning is sure; one above it is marked `?`."""
     unit: str = ""
@@ -217,7 +217,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     scale_by: ScaleBy | None = None
     unit_by: UnitBy | None = None
     base: str = ""
-    """What a percentage is a percentage of, as far as it is known."""
+    """Base of a percentage, as far as it is known."""
     rating: str = ""
     """Parameter that carries 100 % in a physical unit, where the value is a percentage."""
     min: int | None = None
@@ -229,7 +229,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     max_of: Multiple | None = None
     """Limits that are so many times another parameter (0.2 times the drive's rated current)."""
     limit_grounds: Grounds | None = None
-    """What the limits rest on, where that is something else than what the row rests on."""
+    """Source of the limits if it differs from the row's."""
     factory: int | None = None
     factory_text: str = ""
     """Factory setting in words where it depends on the rating or the market."""
@@ -237,7 +237,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     """Factory setting after another parameter; `factory` is that of the factory state."""
     factory_of: Multiple | None = None
     factory_grounds: Grounds | None = None
-    """What the factory setting rests on, where that is something else than the row's."""
+    """Source of the factory setting if it differs from the row's."""
     set_by_drive: bool = False
     """True where the drive itself changes it (auto-tuning): never told as changed by a person."""
     enumeration: str = ""
@@ -257,7 +257,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     rated: bool = False
     """True where its value belongs to one rating of drive and motor, or to one model."""
     quantity: Quantity | None = None
-    """What the parameter means across families; at most one parameter a quantity."""
+    """Meaning of the parameter across families; at most one parameter per quantity."""
     forbidden: str = ""
     """Why the panel never writes it, where it must not."""
     note: str = ""

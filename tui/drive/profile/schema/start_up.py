@@ -14,15 +14,15 @@ class StartUpStep(Table, frozen=True, kw_only=True):
     """
 
     step: str
-    """What it is called, in a word or two."""
+    """Name in a word or two."""
     text: str
-    """What is to be decided or done, for the person at the machine."""
+    """Decision or task, for the person at the machine."""
     parameters: list[str] = []
     """Codes in the order in which they are set or looked at."""
     action: Literal["", "auto-tune", "save", "first-run", "take-control"] = ""
-    """What the step does beyond setting values."""
+    """Action of the step besides setting values."""
     stopped_only: bool = False
     note: str = ""
     source: str
     confidence: Confidence | Literal["practice"]
-    """How surely the step belongs here; `practice` is general practice, from no document."""
+    """Certainty that the step belongs here; `practice` is general practice, from no document."""

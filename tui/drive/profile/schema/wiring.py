@@ -1,4 +1,4 @@
-"""What the manuals say of a family around its line: warnings, lamps, names of signals, waiting."""
+"""Line of a family in the manuals: warnings, lamps, names of signals, waiting times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class FamilyWarning(Table, frozen=True, kw_only=True):
 
 
 class Opening(Table, frozen=True, kw_only=True):
-    """How long to wait, everything switched off, before the drive is opened or plugged."""
+    """Waiting time, everything switched off, before the drive is opened or plugged."""
 
     minutes: Annotated[int, Meta(ge=1)] | None = None
     """Absent where no document at hand tells it."""
@@ -47,15 +47,15 @@ class SignalName(Table, frozen=True, kw_only=True):
 
 
 class Wiring(Table, frozen=True, kw_only=True):
-    """What a person has to know before touching the line or the drive."""
+    """Facts that a person must know before touching the line or the drive."""
 
     warnings: list[FamilyWarning] = []
-    """What surprises, hurts or breaks."""
+    """Facts that surprise, injure or damage."""
     opening: Opening | None = None
-    """How long to wait before the drive is opened."""
+    """Waiting time before the drive is opened."""
     signals: list[SignalName] = []
-    """What other standards call the signals of the line."""
+    """Names of the line's signals in other standards."""
     signals_source: str = ""
-    """Where those names are told."""
+    """Source of those names."""
     lamps: list[Lamp] = []
     """Lamps and signs of the display."""

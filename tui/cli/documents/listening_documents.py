@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from .of_drives import Document
+from .drive_documents import Document
 from .parts import DocumentPart
 
 HowIdentified = Literal["named", "identified", "remembered", "likely"]
@@ -56,7 +56,7 @@ class NoiseField(DocumentPart):
 
 
 class SilencesField(DocumentPart):
-    """How the silences between frames are kept, where that can be judged."""
+    """Observance of the silences between frames, if that can be judged."""
 
     judged: bool
     broken_frames: int
@@ -70,7 +70,7 @@ class HeardWriteField(DocumentPart):
     """One parameter that the master writes; `every` is in seconds, null of a single time."""
 
     commands: bool
-    """Whether it decides what the motor does."""
+    """True if it decides what the motor does."""
     times: int
     every: float | None
     raw: int
@@ -118,7 +118,7 @@ class ShorterField(DocumentPart):
 
 
 class HeardDriveField(DocumentPart):
-    """What was heard of one drive."""
+    """Traffic of one drive."""
 
     device: int
     profile: str | None

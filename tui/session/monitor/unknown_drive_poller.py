@@ -19,7 +19,7 @@ from ..connect.strangers import known_profiles
 from ..read.presence import UNKNOWN_TIMEOUT
 
 
-class StrangersAsked:
+class UnknownDrivePoller:
     """Each is read by the question that finds drives; whatever it answers, it was asked."""
 
     def __init__(self, line: ModbusLine) -> None:

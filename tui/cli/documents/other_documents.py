@@ -7,7 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from .counter_parts import LastMinuteField
-from .of_drives import Document
+from .drive_documents import Document
 from .parts import LeftBehindDocument
 
 
@@ -45,7 +45,7 @@ class KnownDriveField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 
 class KnownLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
-    """What is remembered of a line."""
+    """Stored facts of a line."""
 
     line: str
     adapter: str | None

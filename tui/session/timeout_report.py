@@ -1,4 +1,4 @@
-"""What a drive has told of its communication timeout: how long it is, and what follows."""
+"""Communication timeout that a drive reported: its length and its reaction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class TimeoutWatch:
     fault: str = ""
     """The fault in which its reaction ends; empty where it ends in none, or it is not known."""
     sure: bool = True
-    """Whether a document says when it begins; it is taken to have begun where none does."""
+    """True if a document says when it begins; it is taken to have begun where none does."""
 
     @property
     def acts(self) -> bool:
@@ -29,15 +29,15 @@ class TimeoutWatch:
 
     @property
     def trips(self) -> bool:
-        """Whether the drive may end in a fault; a reaction that is not known may be one."""
+        """True if the drive may end in a fault; a reaction that is not known may be one."""
         return self.reaction is None or self.reaction.trips
 
 
 @dataclass(frozen=True, slots=True)
 class Timeout:
-    """What is known of a drive's communication timeout."""
+    """Known facts about a drive's communication timeout."""
 
     known: bool
-    """Whether the drive has told it."""
+    """True if the drive has told it."""
     watch: TimeoutWatch | None = None
     """None where there is none, where it is off, or where it is not known."""

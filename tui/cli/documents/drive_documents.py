@@ -33,7 +33,7 @@ from .parts import (
 
 
 class Document(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """What every document begins with."""
+    """Fields common to all JSON documents."""
 
     schema: Literal[1]
     command: str | None
@@ -156,7 +156,7 @@ class WatchingFamilyField(msgspec.Struct, forbid_unknown_fields=True):
     timeout: str
     """The parameter that sets its timeout."""
     sure: bool
-    """Whether a document says so."""
+    """True if a document says so."""
 
 
 class LineSettingField(msgspec.Struct, forbid_unknown_fields=True):
@@ -194,7 +194,7 @@ class ScanHitDocument(Document, kw_only=True):
     """Profiles that may fit, the likeliest first."""
     sure: Literal["identified", "likely", "unknown"]
     by: str | None
-    """What told who it is: a function, or a read; null where nothing did."""
+    """Source of the identity: a function, or a read; null if unknown."""
 
 
 class ScanUnclearDocument(Document, kw_only=True):

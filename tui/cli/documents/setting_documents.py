@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from msgspec import UNSET, UnsetType
 
-from .of_drives import Document, DriveDocument
+from .drive_documents import Document, DriveDocument
 from .parts import ComparedSettingField, EditField, PlanItemField
 
 
