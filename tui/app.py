@@ -88,7 +88,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         if drive_documents is not None:
             self.drive_documents = drive_documents
         self.leave_running = self.settled = leave_running
-        """True if it was decided what becomes of motors that run by an order from here."""
+        """True if it was decided what happens to motors that run by a command of this panel."""
 
     def get_theme(self, theme_name: str) -> Theme | None:
         """The panel's theme, or one of Textual's own."""
@@ -109,7 +109,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         self.connection.say(happened, next_step, kind)
 
     def follow(self, line: str, device: int) -> None:
-        """Open the line anew as a drive now wants it, and watch that drive."""
+        """Open the line again as a drive now wants it, and watch that drive."""
         while self.screen is not self.connection:
             self.pop_screen()
         self.connection.start(line, device)

@@ -266,7 +266,7 @@ def test_the_schema_describes_every_field() -> None:
         if not shape.get("description")
     ]
     assert bare == []
-    assert schema["$defs"]["Parameter"]["properties"]["shift"]["description"].startswith("How many")
+    assert schema["$defs"]["Parameter"]["properties"]["shift"]["description"].startswith("Bits")
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ class LineWorker(Protocol):
         """Ask the work to end; more than once does no harm."""
 
     def done(self) -> bool:
-        """True if the work has ended: by itself, by cancel() or by an error."""
+        """True if the work has ended: completed, by cancel() or by an error."""
 
 
 class ModbusLine(Protocol):
@@ -181,9 +181,9 @@ class ModbusLine(Protocol):
         within: float | None = None,
         function: int = IDENTIFY,
     ) -> IdentificationObjects:
-        """Ask a device who it is by function 43/14, or by 17; `within` as for a read.
+        """Request a device's identity by function 43/14, or by 17; `within` as for a read.
 
-        What function 17 brings stands as object 1, the reference, with conformity 0.
+        The text of function 17 is object 1, the reference, with conformity 0.
         """
 
     async def diagnose(

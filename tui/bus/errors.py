@@ -23,7 +23,7 @@ class LinkSyntaxError(LineError):
 
 
 class PortBusy(LineError):
-    """A serial port is held by another program; `holder` names it where the system tells."""
+    """A serial port is held by another program; `holder` names it if the system knows it."""
 
     def __init__(self, path: str, holder: str | None = None) -> None:
         self.path = path
@@ -63,7 +63,7 @@ class LineClosed(LineError):
 
 
 class LineLost(LineError):
-    """The line went away or cannot be reached; it is tried again by itself."""
+    """The line went away or cannot be reached; it is retried automatically."""
 
 
 class LineBehind(LineLost):
@@ -204,4 +204,4 @@ class DeviceException(ExchangeError):
 
 
 HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)
-"""Failures that waiting does not mend."""
+"""Failures that waiting does not end."""

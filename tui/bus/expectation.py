@@ -17,8 +17,8 @@ _MEI_HEADER = 7
 class Expectation:
     """A reply without device and checksum: its first bytes and its length.
 
-    `length` None means function 43 or 17, whose reply says its length itself. Two requests to
-    one device with equal expectations have replies that cannot be told apart.
+    `length` None means function 43 or 17, whose reply says its length itself. Two requests to one
+    device with equal expectations have replies that cannot be distinguished.
     """
 
     function: int

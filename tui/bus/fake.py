@@ -10,8 +10,8 @@
     assert line.requests == [Read(1, 3201, 1)]               # all that went out, in order
 
 Registers, failures and delays may be changed at any time. Requests are checked as on a real line:
-by the limits that describe() gave a device, and by read-only. All is done in the loop of whoever
-calls, so a fake line belongs to one thread; it queues nothing and repeats nothing.
+by the limits that describe() gave a device, and by read-only. All work runs in the caller's loop,
+so a fake line belongs to one thread; it queues nothing and repeats nothing.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class FakeLine:
         """Arguments of describe()."""
         self.state = LineState(LineStatus.CONNECTED, "", clock())
         self.counters = LineCounters()
-        """Nothing is counted here, `requests` tells; may be set."""
+        """Nothing is counted here, see `requests`; may be set."""
         self.trace: tuple[Frame, ...] = ()
         """No frames are made; may be set."""
         self._clock = clock
@@ -114,7 +114,7 @@ class FakeLine:
         times: float = math.inf,
         taken: bool = False,
     ) -> None:
-        """Let writes fail, see fail_read; where `taken` the device holds the words all the same.
+        """Let writes fail, see fail_read; if `taken` the device holds the words anyway.
 
         RequestRefused, Superseded, LineBusy and the like are raised without anything being sent.
         """
@@ -135,7 +135,7 @@ class FakeLine:
         self.devices[device].silent = silent
 
     def become(self, status: LineStatus, reason: str = "") -> None:
-        """Lose the line, regain it; tells those who listen."""
+        """Lose the line, regain it; notifies the listeners."""
         self.state = LineState(status, reason, self._clock())
         for listener in tuple(self._listeners):
             listener(self.state)
@@ -171,7 +171,7 @@ class FakeLine:
         max_age: float = 0.0,
         within: float | None = None,
     ) -> Reply:
-        """Read registers; nothing is shared here, so each is read anew."""
+        """Read registers; nothing is shared here, so each is read again."""
         held = self._device(device).held
         request = read_request(device, address, count, function)
         words = await self._exchange(request, "read", lambda: held(address, count))
@@ -270,7 +270,7 @@ class FakeLine:
         ended("")
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
-        """Run a coroutine in the loop of whoever calls."""
+        """Run a coroutine in the loop of the caller."""
         if self.state.status is LineStatus.CLOSED:
             raise LineClosed
         worker: LineWorker = asyncio.get_running_loop().create_task(work(), name=name)

@@ -87,7 +87,7 @@ class Limits:
 CAUTIOUS = Limits(
     functions=frozenset({3, 17, 43}), max_read=1, max_write=0, max_read_23=0, max_write_23=0
 )
-"""For a device that nobody described: one word by function 3, and who it is by 17 and 43."""
+"""For a device without a description: one word by function 3, and its identity by 17 and 43."""
 
 MAX_READ, MAX_WRITE, MAX_READ_23, MAX_WRITE_23 = 125, 123, 125, 121
 """The longest that Modbus itself allows, in words."""

@@ -102,7 +102,7 @@ class Line:
         """Shares the line's time out among regular polls."""
 
     def open(self, *, wait: float | None = None) -> None:
-        """Start the line; it connects, and reconnects, by itself.
+        """Start the line; it connects and reconnects automatically.
 
         With `wait` the call returns once connected. Else it closes the line and raises PortBusy,
         PortMissing, PortRefused at once, or LineLost after that many seconds.
@@ -221,7 +221,7 @@ class Line:
         within: float | None = None,
         function: int = IDENTIFY,
     ) -> IdentificationObjects:
-        """Ask a device who it is by function 43/14, until nothing more follows; or by 17."""
+        """Request a device's identity by function 43/14, until nothing more follows; or by 17."""
         if function == ReportId.function:
             reply = await self._ask(ReportId(device), priority, within=within)
             return IdentificationObjects(0, {REFERENCE: own_words_of(reply.pdu)})

@@ -26,7 +26,7 @@ class ListeningLine:
     def __init__(self, link: SerialLink, place: SharePlace | None, program: Program) -> None:
         self.link = link
         self.has_times = not is_pseudo_terminal(link.path)
-        """True if pauses can be told from what the port hands over."""
+        """True if pauses can be recognized in the bytes that the port delivers."""
         self._lock = OwnerLock(place) if place is not None else None
         self._place = place
         self._program = program

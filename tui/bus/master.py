@@ -68,6 +68,6 @@ class Master(Protocol):
 
 
 def settle(future: asyncio.Future[ExchangeResult] | None, result: ExchangeResult) -> None:
-    """Give a result to whoever waits for it."""
+    """Give a result to the caller that waits for it."""
     if future is not None and not future.done():
         future.set_result(result)

@@ -206,7 +206,8 @@ class LineCounters:
     requests: Number = 0
     replies: Number = 0
     timeouts: Number = 0
-    """Requests without an answer, to devices that have answered or that were asked on purpose."""
+    """Requests without an answer, to devices that have answered or that were requested on
+    purpose."""
     searched: Number = 0
     """Requests of a search without an answer: nobody was known to be there."""
     checksum: Number = 0
@@ -220,7 +221,7 @@ class LineCounters:
     bytes_in: Number = 0
     busy_seconds: Seconds = 0.0
     framing: Number = 0
-    """Characters that the port saw without their stop bit; 0 too where it does not tell."""
+    """Characters that the port saw without their stop bit; 0 too if it does not report them."""
     parity: Number = 0
     breaks: Number = 0
     overruns: Number = 0
@@ -264,7 +265,7 @@ class Timing:
     """The same for RTU over TCP."""
     wire_time: bool | None = None
     """True if bytes take the time of their baud, so that a reply which began before its request
-    was over is another's. None: on every serial port that is no pseudo-terminal."""
+    was over is another's. None: on every serial port except a pseudo-terminal."""
     probes: bool = True
     """True if a drive must prove that its replies belong to their requests before they count."""
     queue_length: int = 256

@@ -48,7 +48,7 @@ class Notes:
     def __init__(
         self, tell: Callable[[AnyMessage], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`tell` hands a message on to the other programs, if there are any."""
+        """The callback passes a message to the other programs, if there are any."""
         self._tell = tell
         self._clock = clock
         self._lock = threading.Lock()
@@ -65,7 +65,7 @@ class Notes:
         self._tell(note)
 
     def ask(self, device: int, kind: str) -> None:
-        """Have the notes of a device and kind given to whoever listens; they come one by one."""
+        """Pass the notes of a device and kind to a listener; they come one by one."""
         self._tell(LineNote(device, kind))
 
     def keep(self, note: LineNote) -> None:

@@ -38,7 +38,7 @@ class SharedFacts(FactsHeard):
         self.commanders: Mapping[int, str] = MappingProxyType({})
         """Ids of the programs that command, by device."""
         self.paused: Mapping[int, tuple[str, str]] = MappingProxyType({})
-        """Devices that nobody asks now: by whose id, and why."""
+        """Devices whose polling is paused: by which program, and why."""
         self.stops = StopCounts()
         """Stops given to each device, by all programs."""
         self.leases = WriteLeases(self.me.id, self.stops, self._tell)
@@ -80,9 +80,9 @@ class SharedFacts(FactsHeard):
         paused: Mapping[int, tuple[str, str]],
         departed: tuple[Program, ...] = (),
     ) -> tuple[int, ...]:
-        """Take over what the owner tells; what this program claims is its own until denied.
+        """Take over the owner's message; what this program claims is its own until denied.
 
-        Returns the devices of which stops are told that this program had not heard of.
+        Returns the devices with stops that this program did not know of.
         """
         with self._lock:
             others = {d: one for d, one in commanders.items() if one != self.me.id}
@@ -112,7 +112,7 @@ class SharedFacts(FactsHeard):
     # What all are to read
 
     def tell_all(self, device: int, text: str) -> None:
-        """Have every program on the line tell its person something about a device."""
+        """Have every program on the line show its person a message about a device."""
         self.hear_text(device, text)
         self._tell(Notified(device, text[:MOST_TEXT]))
 
@@ -140,7 +140,7 @@ class SharedFacts(FactsHeard):
             self.paused = MappingProxyType({**rest, device: (program, why)} if why else rest)
 
     def _leave_alone_no_more(self, devices: Iterable[int]) -> None:
-        """A stop ends what a device was left alone for: it is looked at until it stands."""
+        """A stop ends a pause of polling: the device is read until it is at standstill."""
         for device in devices:
             self.note_pause(device, "", "")
 

@@ -17,7 +17,7 @@ GivenStops = Mapping[int, Mapping[str, int]]
 """Counts of stops, by device and program."""
 
 STOPS_KEPT = 600.0
-"""Seconds for which the next owner of a line is told when a device was stopped."""
+"""Seconds for which the next owner of a line learns when a device was stopped."""
 GIVEN_BY_NOBODY = ""
 """Under which the stops of programs are counted that have left."""
 
@@ -87,7 +87,7 @@ class StopCounts:
     def learn_times(self, reported: Mapping[int, float]) -> None:
         """Take over when devices were stopped; a time to come is of an earlier run of the machine.
 
-        It decides about commands that were typed before a stop and came to the line after it.
+        It decides about commands that were typed before a stop and reached the line after it.
         """
         now = time.monotonic()
         with self._lock:
@@ -99,7 +99,7 @@ class StopCounts:
 
     @property
     def plain(self) -> dict[int, dict[str, int]]:
-        """The counts as they are told to others."""
+        """The counts as they are sent to others."""
         return {device: dict(counts) for device, counts in self.given.items()}
 
     @property
@@ -154,7 +154,7 @@ class StopCounts:
     def replace(self, reported: GivenStops, me: str) -> tuple[int, ...]:
         """Take over the counts of the line's owner, but for those of this program itself.
 
-        Returns the devices of which stops are told that were not known.
+        Returns the devices with stops that were not known.
         """
         with self._lock:
             own = {

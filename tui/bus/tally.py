@@ -125,7 +125,7 @@ class Tally:
         self.of(device).repeats += 1
 
     def count_silence(self, device: int, *, searched: bool) -> None:
-        """No answer came; an empty address that a search has asked is no failure of the line."""
+        """No answer came; an empty address in a search is not a failure of the line."""
         if searched:
             self.searched += 1
         else:

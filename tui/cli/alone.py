@@ -11,7 +11,7 @@ from .opening import open_panel, terminal_trouble
 
 
 def alone() -> None:
-    """Open the panel; whatever goes wrong is told as by every command."""
+    """Open the panel; every failure is reported as by other commands."""
     gc.disable()  # until the first picture
     try:
         start_logging(0)
@@ -25,7 +25,7 @@ def alone() -> None:
 
 
 def _tell(error: BaseException) -> None:
-    """Tell an error and end with its status."""
+    """Report an error and end with its status."""
     import click
 
     from .shared.errors import reported

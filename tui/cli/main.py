@@ -100,7 +100,7 @@ class Commands(click.Group):
         parent: click.Context | None = None,
         **extra: Any,
     ) -> click.Context:
-        """Take the arguments apart; `-v` may stand among them anywhere."""
+        """Take the arguments apart; `-v` is accepted anywhere among them."""
         end = args.index("--") if "--" in args else len(args)
         as_json = "--json" in args[:end]
         verbose = [one for one in args[:end] if one in VERBOSE]
@@ -114,7 +114,7 @@ class Commands(click.Group):
         return context
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; whatever ends it is told in a line or two."""
+        """Run the command; every end is reported in a line or two."""
         with plain_errors(as_json=ctx.meta[AS_JSON]):
             return super().invoke(ctx)
 

@@ -94,7 +94,7 @@ def _list(rows: list[tuple[str, str]] | tuple[tuple[str, str], ...]) -> Iterator
 
 
 def _statuses() -> Iterator[str]:
-    """The table of the epilog, a status each; as it stands where it is no table."""
+    """The table of the epilog, a status each; unchanged except in a table."""
     rows = re.findall(r"^\s*(\d+)\s+(.+)$", _STATUSES, re.MULTILINE)
     return _list(rows) if len(rows) > 1 else _paragraphs(_STATUSES)
 
@@ -104,7 +104,7 @@ def _section(title: str, *lines: str) -> list[str]:
 
 
 def _paragraphs(text: str) -> Iterator[str]:
-    r"""Texts of click: paragraphs apart by blank lines, one that begins with \b as it stands."""
+    r"""Texts of click: paragraphs separated by blank lines, one that begins with \b unchanged."""
     for number, part in enumerate(re.split(r"\n\s*\n", text.strip())):
         if number:
             yield ".PP"

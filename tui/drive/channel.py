@@ -19,7 +19,7 @@ class Channel:
     by_line: bool | None
     """True if it is this line; None where it is not known."""
     parameter: Parameter | None = None
-    """The word that tells it, or that was not read and decides."""
+    """The word that shows it, or that was not read and decides."""
     is_several: bool = False
     """True if another word counts under other conditions."""
 
@@ -41,7 +41,7 @@ def reference_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | No
 
 
 def channel_codes(profile: Profile) -> list[str]:
-    """Codes of all words that tell the channels in force, and what switches them."""
+    """Codes of all words that show the channels in force, and what switches them."""
     channels = profile.data.channels
     rows = [*channels.command, *channels.reference]
     reported = [(row.parameter, row.when) for row in rows]

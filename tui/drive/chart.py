@@ -23,7 +23,7 @@ class ChartState:
     """State from the status words; a part is None if its word was not read."""
 
     state: State
-    """The state in force: a fault where the fault word tells one, whatever the status word."""
+    """The state in force: a fault if the fault word shows one, whatever the status word."""
     own: State = UNKNOWN
     """The state by the status word alone."""
     direction: Direction | None = None
@@ -42,7 +42,7 @@ class ChartState:
 
     @property
     def motion(self) -> StateKind:
-        """The kind for whoever needs a motor at rest: a fault word stops no motor by itself."""
+        """The kind for callers that need a motor at rest: a fault word alone stops no motor."""
         return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind
 
 
@@ -72,7 +72,7 @@ def state_of(chart: Chart, word: int) -> State:
 def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
     """The state in force in a chart; a fault word goes before the status word.
 
-    UNKNOWN where the status word was not read and no fault is told.
+    UNKNOWN if the status word was not read and there is no fault.
     """
     word = raws.get(chart.status)
     own = state_of(chart, word) if word is not None else UNKNOWN
@@ -82,20 +82,20 @@ def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
 
 
 def fault_number(profile: Profile, raws: Mapping[str, int]) -> int | None:
-    """The fault of now by the fault word; None where it tells none, or keeps the last one."""
+    """The present fault by the fault word; None if it shows none, or keeps the last one."""
     faults = profile.data.faults
     raw = raws.get(faults.parameter)
     return None if faults.shows_last or raw == faults.none else raw
 
 
 def fault_code(profile: Profile) -> str:
-    """The code of the word that tells a present fault by itself; empty where none does."""
+    """The code of the word that alone shows a present fault; empty where none does."""
     faults = profile.data.faults
     return "" if faults.shows_last else faults.parameter
 
 
 def state_codes(profile: Profile, chart: Chart) -> list[str]:
-    """Codes of the words that tell the state in a chart."""
+    """Codes of the words that show the state in a chart."""
     return [code for code in (chart.status, fault_code(profile)) if code]
 
 

@@ -17,7 +17,7 @@ class ControlTaking:
     can_take: bool
     can_give_back: bool
     taken: bool | None
-    """True if the line has it; None where no word tells."""
+    """True if the line has it; None if no word shows it."""
 
 
 def control_taking(profile: Profile, raws: Mapping[str, int]) -> ControlTaking | None:

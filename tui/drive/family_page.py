@@ -26,9 +26,9 @@ SURENESS: dict[Confidence, str] = {
 }
 """Certainty of a fact that no manual of the family states."""
 HEAD_WIDTH = 18
-"""Columns of what stands before a text, an indent of two and a space behind it among them."""
+"""Columns before a text, including an indent of two and a space after it."""
 MARKS, MARK_WIDTH = ("!", "*"), 4
-"""Signs that stand before a text in place of a name, and their columns."""
+"""Signs before a text instead of a name, and their columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class PageLine:
 
     kind: Literal["title", "row", "warning", "gap"]
     head: str
-    """A title, or what stands before the text in so many columns as it takes."""
+    """A title, or the start of the text in so many columns as it takes."""
     text: str = ""
 
 

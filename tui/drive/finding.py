@@ -69,7 +69,7 @@ class PresenceProbe:
     register: int | None
     """The one register that is read by function 3; None for function 43."""
     families: tuple[str, ...] = ()
-    """Ids of the families without function 43 that tell their state there."""
+    """Ids of the families without function 43 that show their state there."""
 
 
 def wait_for_reply(setting: LineSetting, turnaround: float) -> float:

@@ -37,7 +37,8 @@ class StopPlace:
 
     @property
     def status(self) -> tuple[int, ...]:
-        """Addresses of the words that tell their states: who has none of them is of another."""
+        """Addresses of the words that show their states: a drive without any of them is of another
+        family."""
         return self._addresses(chart.status for one in self.families for chart in one.charts)
 
     @property

@@ -1,7 +1,7 @@
 """Effect of a write by a foreign program on a drive; pure functions of a profile.
 
-A SCADA knows registers, not what they mean: each word is told apart here into settings, commands,
-and words that can do nothing but stop the motor.
+A SCADA knows registers, not their meaning: each word is classified here as a setting, a command, or
+a word that can only stop the motor.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def held_back(
 
 
 def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
-    """Why the state of now lets no such start through; empty where it does."""
+    """Why the present state allows no such start; empty where it does."""
     state = state_now(profile, chart, raws)
     if state.kind == "fault":
         return IN_FAULT

@@ -75,7 +75,7 @@ def reset_text(
 
 
 def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
-    """Return True if the drive says that a reset can work now; None where it does not tell."""
+    """Return True if the drive says that a reset can work now; None if it does not show it."""
     reported = profile.data.faults.reset_ready
     raw = raws.get(reported.parameter) if reported else None
     if reported is None or raw is None:

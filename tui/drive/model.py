@@ -9,13 +9,13 @@ from .profile.schema import Model
 
 
 def model_codes(profile: Profile) -> list[str]:
-    """Words that tell the model: its code, and the word with the bit of its class."""
+    """Words that show the model: its code, and the word with the bit of its class."""
     known = profile.data.identification
     return [code for code in (known.model_parameter, known.class_parameter) if code]
 
 
 def model_of(profile: Profile, raws: Mapping[str, int]) -> Model | None:
-    """The model that raw values by code tell; None where they tell none that is known.
+    """The model in raw values by code; None if they show none that is known.
 
     Where two models share a code the bit of the class must be known.
     """
@@ -30,7 +30,7 @@ def model_of(profile: Profile, raws: Mapping[str, int]) -> Model | None:
 
 
 def model_read(profile: Profile, raws: Mapping[str, int]) -> str:
-    """The model that a drive tells, in words; empty where it tells none."""
+    """The model that a drive reports, in words; empty if it reports none."""
     model = model_of(profile, raws)
     if model is not None:
         return model_text(model)

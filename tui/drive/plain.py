@@ -1,8 +1,7 @@
 """Text that a person, a drive, a file or a profile brings, as it may be shown to a person.
 
-A drive's name with an escape sequence in it must neither command the terminal nor hide there:
-each character that is no sign of its own is replaced by one that is, one for one, so that what
-was laid out by its length stays so.
+A drive's name with an escape sequence in it must neither command the terminal nor hide there: each
+control character is replaced by a picture, one for one, so that the layout by length stays correct.
 """
 
 from __future__ import annotations

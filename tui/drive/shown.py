@@ -97,7 +97,7 @@ def typed_text(
 
 
 def depends_on(parameter: Parameter) -> tuple[str, ...]:
-    """Codes that must be read, or known to be lacking, before a value can be told in its unit."""
+    """Codes that must be read, or known to be lacking, before a value can be shown in its unit."""
     scale = parameter.scale_by.parameter if parameter.scale_by else ""
     unit = parameter.unit_by.parameter if parameter.unit_by else ""
     return tuple(code for code in (scale, unit) if code)

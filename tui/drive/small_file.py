@@ -15,7 +15,7 @@ LONGEST_TEXT = 2_000_000
 
 
 def open_regular(path: Path) -> int:
-    """A handle that reads a file; raises OSError, also for what is no regular file."""
+    """A handle that reads a file; raises OSError, also unless it is a regular file."""
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)
     flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0)
     handle = os.open(path, flags)

@@ -107,7 +107,8 @@ class Lesson:
 
 
 def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
-    """Number and unit of what a person read: `50.3`, `50,3 Hz`, `-12A`; unit may stand apart.
+    """Number and unit of what a person read: `50.3`, `50,3 Hz`, `-12A`; a space before the unit is
+    allowed.
 
     Raises ValueRefused for what is neither.
     """
@@ -149,7 +150,7 @@ def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
 
 
 def taught_by(looks: Sequence[DisplayLook]) -> TaughtScale | None:
-    """The one scale that looks at two or more words tell; None where they do not."""
+    """The one scale that fits readings of two or more words; None where they do not."""
     if len({look.word for look in looks}) < 2:
         return None
     found = scales_that_fit(looks)
@@ -179,7 +180,8 @@ def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson
 def _contradiction(
     code: str, before: tuple[DisplayLook, ...], look: DisplayLook, known: TaughtScale | None
 ) -> Lesson:
-    """A look with which no scale agrees: nothing is taught any more; this look begins anew."""
+    """A look with which no scale agrees: nothing is taught any more; this reading starts a new
+    series."""
     alone = scales_that_fit([look])
     kept = (look,) if alone else ()
     if not alone:

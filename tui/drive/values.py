@@ -232,7 +232,7 @@ def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
 
 
 def _doubt(parameter: Parameter) -> str:
-    """That no document of the family tells the limits, where only the row itself is sure."""
+    """No document of the family states the limits, and only the row itself is sure."""
     grounds = parameter.limit_grounds
     weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
     return " (limits that no document of this family tells)" if weak else ""

@@ -68,7 +68,7 @@ class Panel(LeanApp):
 
     @abstractmethod
     def follow(self, line: str, device: int) -> None:
-        """Open the line anew as a drive now wants it, and watch that drive."""
+        """Open the line again as a drive now wants it, and watch that drive."""
 
     @abstractmethod
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:

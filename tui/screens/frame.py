@@ -1,6 +1,6 @@
 """Frame around every screen and over every dialog: status bar, tabs, the newest message.
 
-It is live everywhere: whoever answers a question sees what the motor does meanwhile.
+It is live everywhere: a person who answers a question sees what the motor does.
 """
 
 from __future__ import annotations

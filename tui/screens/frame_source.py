@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LOAD_OVER = 2.0
 """Seconds over which the load of the line is measured."""
 STOP_SHOWN = 10.0
-"""Seconds for which a stop that failed stands in place of the state, though that is known."""
+"""Seconds for which a failed stop replaces the state, though that is known."""
 LOOK_IS_OLD = 10.0
 """Seconds after which a look at a drive that no monitor watches is not its present any more."""
 STOP_WORDS = {"sending": "STOP WAITS", "stopping": "STOPPING"}
@@ -47,7 +47,7 @@ class FrameSource:
         self._load: float | None = None
 
     def view(self) -> FrameView:
-        """All that the frame tells now."""
+        """All that the frame shows now."""
         app, fleet = self._app, self._app.fleet
         now = app.clock.monotonic()
         console = app.chosen if fleet is not None and app.chosen in fleet.consoles else None
@@ -242,7 +242,7 @@ def _is_at_zero(console: DriveConsole, readings: Mapping[str, Reading]) -> bool:
 
 
 def stands_by(console: DriveConsole, state: DriveState) -> bool:
-    """Return True if the motor stands and the next command from here runs it."""
+    """Return True if the motor is at standstill and the next command of this panel runs it."""
     if state.kind not in ("blocked", "ready", "stopped"):
         return False
     from tui.drive.orders import chart_in_force

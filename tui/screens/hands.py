@@ -125,7 +125,7 @@ class Hands(Panel):
         return self._typed.stroke
 
     def keys_not_taken(self, count: int, *, late: bool = False) -> None:
-        """Tell that keys came at once, or too late, and did nothing."""
+        """Report that keys came at once, or too late, and did nothing."""
         came = "came too late" if late else "came at once" if count > 1 else "did not come alone"
         keys = f"{count} keys {came} and were" if count > 1 else f"1 key {came} and was"
         self.notify(f"{keys} not taken.", severity="warning")

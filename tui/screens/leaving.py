@@ -27,7 +27,7 @@ class Leaving(Panel):
     """Steps of the app before it lets drives go."""
 
     settled: bool
-    """True if it was decided what becomes of motors that run by an order from here."""
+    """True if it was decided what happens to motors that run by a command of this panel."""
     _requested: Confirm | None = None
     """The question before leaving, while nothing runs by a command from here."""
 
@@ -52,7 +52,7 @@ class Leaving(Panel):
             self.push_screen(self._requested, self._leave)
 
     def _motors(self) -> list[DriveSession]:
-        """Drives of all lines commanded from here whose motors do not surely stand."""
+        """Drives of all lines commanded by this panel whose motors are not surely at standstill."""
         return [one for fleet in self.fleets for one in fleet.line_watch.under_command()]
 
     def _leaving_report(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
@@ -125,7 +125,7 @@ class Leaving(Panel):
             self.run_worker(self._stop_and_leave(), exclusive=True, group="leave")
 
     async def _leave_running(self) -> None:
-        """Leave motors running, on record for whoever comes next."""
+        """Leave motors running, recorded for the next program."""
         from tui.session.starts.errors import StartNotRecorded
 
         self.settled = True

@@ -21,7 +21,7 @@ AS_IT_WAS = "There is nothing to accept: the line is as it was."
 
 
 class LineCheck(Panel):
-    """Looks at the open line now and then; what differs is asked once, and on demand."""
+    """Looks at the open line now and then; differences are confirmed once, and on demand."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,7 +32,7 @@ class LineCheck(Panel):
         self._connected_since: float | None = None
 
     def mind_line(self) -> None:
-        """Ask about what differs, once nobody searches and no other question stands."""
+        """Ask about differences, once no search runs and no other question is open."""
         known = self._known()
         if known is None:
             self._waiting_for, self._connected_since = (), None

@@ -111,7 +111,7 @@ class LineOwner(Panel):
         return next((one for one in self.panel_lines if one.opened is self.opened), None)
 
     def _look_after(self, fleet: Fleet) -> None:
-        """Tell who shares the line, and stop the motors of programs on it that are gone."""
+        """Show who shares the line, and stop the motors of programs on it that have exited."""
         from tui.session.sharing.guardian import Guardian
 
         def session_of(device: int) -> DriveSession | None:

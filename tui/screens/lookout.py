@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
 FRAME_LOOK, HEALTH_LOOK = 0.25, 1.0
-"""Seconds between two looks at what stands around every screen, and at the last minute of lines."""
+"""Seconds between two checks of the frame around every screen, and of the last minute of lines."""
 
 WHAT_TO_DO = "Open it: Space stops it, T takes it over."
 

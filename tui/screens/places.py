@@ -78,7 +78,7 @@ class Places(Panel):
         return None
 
     def show_place(self, place: str, console: DriveConsole) -> AwaitMount | None:
-        """Show a screen of a drive, above its Monitor; whoever needs it there awaits it."""
+        """Show a screen of a drive, above its Monitor; callers that need it there await it."""
         from .monitor.screen import MonitorScreen
 
         if place == SOURCES and not console.session.profile.data.control_sources:

@@ -1,4 +1,4 @@
-"""The key that tells why a drive does not answer: which drive is meant, and looking at it."""
+"""The key that shows why a drive does not answer: choosing the drive, and the diagnosis."""
 
 from __future__ import annotations
 

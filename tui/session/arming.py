@@ -35,7 +35,8 @@ class Arming:
         device: int | None = None,
         care: Callable[[], bytes] = bytes,
     ) -> None:
-        """`care` is told the holder of the line: how the drive is stopped without this program."""
+        """`care` is passed to the holder of the line: how the drive is stopped without this
+        program."""
         self._line = line
         self._device = device
         self._care = care
@@ -53,7 +54,7 @@ class Arming:
     def arm(self, *, seconds: float = ARMED_FOR) -> None:
         """Let writes through from now on.
 
-        `seconds` is how long without a key; math.inf for a command that ends by itself. Raises
+        `seconds` is how long without a key; math.inf for a command that ends on its own. Raises
         OrderRefused on a line that is read-only, or held until a person says otherwise, and where
         it is barred; CommandedElsewhere where another program commands the drive.
         """
@@ -116,7 +117,7 @@ class Arming:
 
     @property
     def why_disarmed(self) -> str:
-        """Why arming ended by itself, or nothing."""
+        """Why arming ended without a command, or nothing."""
         return self._why
 
     def refusal(self) -> str:

@@ -7,7 +7,7 @@ import time
 from datetime import datetime
 
 SET_BY = 0.1
-"""Seconds by which the time of day has to move against the other one to count as set anew."""
+"""Seconds by which the time of day must move against the other one to count as set again."""
 
 
 class Clock:

@@ -159,7 +159,7 @@ class DriveSession:
         self.image.take(found)
 
     def request_full_read(self) -> None:
-        """Something was done to the drive: whoever watches it looks at all of it again."""
+        """Make every monitor re-read the whole drive."""
         self.stirs += 1
 
     def note_state(self, kind: str, time: float) -> None:
@@ -178,7 +178,7 @@ class DriveSession:
     def state(self, longest: float) -> ChartState:
         """The drive's state by its words; unknown where its status is older than so many s.
 
-        A fault word that old tells nothing: the fault may have been reset since.
+        An old fault word shows nothing: the fault may have been reset since.
         """
         raws = self.image.trusted
         chart = self.profile.chart(raws)

@@ -18,18 +18,18 @@ Signed = TypeVar("Signed", float, Decimal)
 """A number with the sign of a direction."""
 
 STATE_FRESH = 1.0
-"""Seconds for which a state counts as that of now; an older one is read anew."""
+"""Seconds for which a state counts as present; an older one is read again."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveState:
-    """The state of a drive; a part is None where the words that tell it were not read."""
+    """The state of a drive; a part is None if its words were not read."""
 
     id: str
     name: str
     kind: StateKind
     motion: StateKind
-    """The kind for whoever needs a motor at rest: a fault word stops no motor by itself."""
+    """The kind for callers that need a motor at rest: a fault word alone stops no motor."""
     direction: Direction | None
     reached: bool | None
     alarm: bool | None
@@ -48,7 +48,7 @@ class DriveState:
 
 
 def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState:
-    """The state that these readings tell; stale and bad ones tell nothing."""
+    """The state in these readings; stale and bad ones show nothing."""
     raws = {
         code: reading.raw
         for code, reading in readings.items()
@@ -76,7 +76,7 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
 
 
 def _requested(profile: Profile, readings: Mapping[str, Reading]) -> bool:
-    """Return True if the words that tell the state are among those read at all."""
+    """Return True if the words that show the state are among those read at all."""
     return any(chart.status in readings for chart in profile.data.charts)
 
 
@@ -118,7 +118,7 @@ def _headline(chart: ChartState, fault: FaultCode | None) -> str:
 def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> Signed:
     """A frequency with the sign of its direction.
 
-    A drive that gives it without one tells the direction of its motor beside it.
+    A drive that gives it without one reports the direction of its motor beside it.
     """
     signed = parameter.type.startswith("int")
     return -number if not signed and state.direction == "reverse" else number

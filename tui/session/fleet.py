@@ -41,7 +41,7 @@ from .work import Outcome, OutcomeKind
 log = logging.getLogger(__name__)
 
 PROGRAM_ENDS_WITHIN = 0.3
-"""Seconds after which a program that has left the line is no process any more."""
+"""Seconds after which a program that has left the line no longer exists as a process."""
 
 Stamp = Mapping[int, int]
 """The count of stops of each drive when something was typed."""
@@ -122,7 +122,7 @@ class Fleet:
         return found.console if found else None
 
     def note(self, identity: DriveIdentity) -> None:
-        """A drive answered; what it is taken for is not known yet. It is asked on.
+        """A drive answered; what it is taken for is not known yet. It is kept polled.
 
         One that is known already stays as it is: without its session no key would stop it.
         """
@@ -164,8 +164,8 @@ class Fleet:
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
-        """Return True if the same drive is taken for another family while its motor may run; tells
-        it."""
+        """Return True if the same drive is taken for another family while its motor may run;
+        reports it."""
         runs = any(one is before for one in self.line_watch.under_command())
         if not runs or before.known_identity != session.known_identity:
             return False

@@ -28,7 +28,7 @@ def parameter_entry(
     why: str,
     read_back: int | None = None,
 ) -> Entry:
-    """A write of now: raw values before and after, what was answered, and what it then held."""
+    """A write in progress: raw values before and after, the answer, and the value read back."""
     return Entry(
         time=now_text(),
         line=session.line_text,

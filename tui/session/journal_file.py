@@ -31,7 +31,7 @@ LARGEST_FILE = 1_000_000
 FILES_KEPT = 9
 """Older files beside the one that is written."""
 TURN_PATIENCE = 0.5
-"""Seconds that a line waits for those of other programs; then it is appended all the same."""
+"""Seconds that a line waits for those of other programs; then it is appended anyway."""
 TURN_POLL_INTERVAL = 0.01
 OWN_MODE = 0o600
 CUT_OFF = "the line before this one was cut off: by a crash, a power cut or a full disk"
@@ -51,7 +51,7 @@ class JournalFile:
         return [*(self._older(number) for number in range(FILES_KEPT, 0, -1)), self.path]
 
     def append(self, text: str) -> None:
-        """Put a line down, flushed to the disk. Raises OSError; the line may stand there even so.
+        """Put a line down, flushed to the disk. Raises OSError; the line may be there even so.
 
         Tried again, it is written over what the first try has left. What an earlier program has
         left of a line stays, and is marked as cut off.

@@ -17,19 +17,19 @@ from .journal import Entry, Journal
 LONGEST_LINE = 64_000
 """Bytes of a line that may be an entry."""
 READ_MOST = 20_000_000
-"""Bytes of a file that are read, the last ones; each is begun anew long before that."""
+"""Bytes of a file that are read, the last ones; each restarts long before that."""
 DAMAGE_SHOWN = 200
-"""Characters of a damaged line that are told."""
+"""Characters of a damaged line that are shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class DamagedLine:
-    """A line that is no entry: half of one, or something else altogether."""
+    """A damaged line: half of an entry, or something else altogether."""
 
     file: Path
     number: int
     text: str
-    """The beginning of it, as it stands there."""
+    """The beginning of it, unchanged."""
 
 
 def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
@@ -43,7 +43,7 @@ def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
 
 
 def read_journal(files: Iterable[Path]) -> Iterator[Entry | DamagedLine]:
-    """Every entry of these files in their order; what is no entry is told as damaged.
+    """Every entry of these files in their order; other lines are reported as damaged.
 
     Files that are not there are passed over. Raises OSError for one that cannot be read.
     """
@@ -84,7 +84,7 @@ def selected(
 ) -> list[Entry]:
     """Entries of a drive, of a line however it was typed, and since a time.
 
-    One whose time cannot be told is kept: it may be what is looked for.
+    One without a valid time is kept: it may be the one searched for.
     """
     key = line_key(line) if line else ""
     keys: dict[str, str] = {}
@@ -101,7 +101,7 @@ def selected(
 
 
 def time_of(entry: Entry) -> datetime | None:
-    """When an entry was made; None where its text is no time."""
+    """When an entry was made; None if its text is not a time."""
     try:
         return datetime.fromisoformat(entry.time).astimezone()
     except (ValueError, OverflowError, OSError):

@@ -64,7 +64,7 @@ class Later(QueueHandler):
 
 
 class LogFile(RotatingFileHandler):
-    """The file, for its owner alone; a disk that takes nothing is no error of the command."""
+    """The file, for its owner alone; a disk that takes nothing is not an error of the command."""
 
     def createLock(self) -> None:
         """Have none: one thread writes, and the end of the program must not wait for it."""

@@ -34,19 +34,19 @@ def recent_lines() -> list[str]:
 
 
 def remember_line(text: str) -> None:
-    """Put a line first among the recent ones; a folder that cannot be written is no error."""
+    """Put a line first among the recent ones; a folder that cannot be written is not an error."""
     lines = [text, *(line for line in recent_lines() if line != text)][:RECENT_LENGTH]
     _keep(_recent_file(), lines)
 
 
 def address_text(key: str) -> str:
-    """The addresses that were asked last on a line, as they were typed; empty where none were."""
+    """The addresses of the last search on a line, as they were typed; empty where none were."""
     requested = _all_addresses().get(key, "")
     return requested if isinstance(requested, str) else ""
 
 
 def remember_addresses(key: str, text: str) -> None:
-    """Keep the addresses to ask on a line; a folder that cannot be written is no error."""
+    """Keep the addresses to search on a line; a folder that cannot be written is not an error."""
     known = {line: requested for line, requested in _all_addresses().items() if line != key}
     latest = {key: text, **known}
     _keep(_addresses_file(), dict(list(latest.items())[:ADDRESSES_LENGTH]))

@@ -38,8 +38,8 @@ class Origin(StrEnum):
 class Reading:
     """One parameter as last read; `time` is when its reply was complete (monotonic).
 
-    `raw` is None where there is none, and `error` tells why. `value` follows words that may be
-    others a moment later, so it is worked out for whoever asked and not kept.
+    `raw` is None if there is none, and `error` says why. `value` follows words that may be others a
+    moment later, so it is computed for each caller and not kept.
     """
 
     parameter: Parameter
@@ -84,7 +84,7 @@ class Reading:
         return self
 
     def decoded(self, value: Value, physical: Value | None) -> Reading:
-        """The same reading with what its raw value comes to now."""
+        """The same reading with the present meaning of its raw value."""
         return Reading(
             self.parameter,
             self.raw,

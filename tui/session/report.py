@@ -244,7 +244,7 @@ class _Report:
 
 
 def _when(text: str, zone: tzinfo | None) -> str:
-    """A time in a zone, to the second; what is no time as it is."""
+    """A time in a zone, to the second; an invalid time unchanged."""
     try:
         return f"{datetime.fromisoformat(text).astimezone(zone):%Y-%m-%d %H:%M:%S}"
     except ValueError:
@@ -252,7 +252,7 @@ def _when(text: str, zone: tzinfo | None) -> str:
 
 
 def _zone_of(text: str) -> tzinfo:
-    """The zone in which a time is told; UTC where it names none."""
+    """The time zone of the report; UTC where it names none."""
     try:
         return datetime.fromisoformat(text).tzinfo or UTC
     except ValueError:

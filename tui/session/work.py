@@ -108,7 +108,7 @@ class WorkQueue:
         self.stopped_by = ""
         """Program of the last stop."""
         self.on_tell: Callable[[Outcome], None] = lambda _: None
-        """Called, in any thread, with each outcome that is told."""
+        """Called, in any thread, with each outcome that is reported."""
         self.on_change: Callable[[], None] = lambda: None
         """Called in the line's thread when a task has ended: the drive may hold other values."""
         self._line = line
@@ -124,7 +124,7 @@ class WorkQueue:
     # Telling
 
     def tell(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
-        """Say what work on the drive has come to."""
+        """Report the result of work on the drive."""
         self.outcome = outcome = Outcome(kind, text, self._clock.monotonic(), error)
         self.on_tell(outcome)
 
@@ -142,7 +142,7 @@ class WorkQueue:
         return any(task is not None and task.owner is owner for task in tasks)
 
     def permit(self, stamp: int | None = None) -> Permit:
-        """The right to write under a stamp, that of now where none is given.
+        """The right to write under a stamp, the present one by default.
 
         Raises Stopped where a stop came since, NotArmed where the drive is not armed.
         """

@@ -10,7 +10,7 @@ EXAMPLE = "2: LI1=1, AI1=5V"
 
 
 def set_inputs(simulation: Simulation, text: str) -> str:
-    """Set what a line says, and tell how the inputs are now.
+    """Set the inputs of a line, and return their present state.
 
     The address may be left out where there is one drive; without inputs they are only told.
     Nothing is set where a part of the line is wrong. Raises SimulatorError.

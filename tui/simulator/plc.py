@@ -20,7 +20,7 @@ from .troubles import FaultRates
 _PAUSE = 0.02
 """Seconds between an answer and the next request."""
 _ANSWER_WITHIN = 0.2
-"""Seconds after which the master asks on where nothing answers."""
+"""Seconds after which the master continues without an answer."""
 _STEP = 0.001
 _ASKED = ("status_word", "output_frequency", "motor_current")
 """Quantities that the master reads, one by one, as many a program of a PLC does."""

@@ -45,7 +45,7 @@ class Traits:
     limits_follow: bool = False
     """True where a value past another parameter's limit is cut to it instead of refused."""
     power_bit: bool = False
-    """Status bit 4 tells that the power section is supplied (ATV71)."""
+    """Status bit 4 shows that the power section is supplied (ATV71)."""
     enable_from_ready: bool = False
     """Enable operation is taken in Ready to switch on too (ATV71 on a single supply)."""
     access_levels: bool = False
@@ -53,9 +53,9 @@ class Traits:
     config_disables: bool = False
     """Writing a stopped-only word takes Ready and Switched on back to disabled (ATV31/312)."""
     running_bit: bool = False
-    """Extended status bit 4 tells that the motor runs (ATV31/312), not the speed mode."""
+    """Extended status bit 4 shows that the motor runs (ATV31/312), not the speed mode."""
     remote_always: bool = False
-    """Status bit 9 tells only that no forced local is on (ATV31/312)."""
+    """Status bit 9 shows only that no forced local is on (ATV31/312)."""
     max_hz_high_resolution: float | None = None
     """Frequency of 32767 with CMI bit 9 set; None: the maximum frequency TFR (ATV71)."""
     limits: Mapping[str, str] = field(default_factory=dict)
@@ -139,7 +139,7 @@ def traits_of(profile: Profile) -> Traits:
 
 
 def commissioned(profile: Profile) -> Mapping[str, int]:
-    """Settings by code with which the line commands a drive, as far as its profile tells them.
+    """Settings by code with which the line commands a drive, as far as its profile has them.
 
     The first configuration whose only source of commands is the line, and what the interlocks
     want of words that can be set.

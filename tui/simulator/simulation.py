@@ -22,7 +22,7 @@ from .spec import DriveSpec, LineTiming
 from .troubles import FaultRates, Habits
 
 TICK = 0.05
-"""Time in s between two steps of the drives while nobody asks them anything."""
+"""Time in s between two steps of the drives while no request arrives."""
 
 
 class Simulation:
@@ -147,7 +147,7 @@ class Simulation:
     ) -> None:
         """Serve the line on an opened port, which is closed at the end.
 
-        `client` tells what the other side of it is set to, where that can be seen.
+        `client` holds the settings of the other side, if they can be seen.
         """
 
         def paced() -> Conversation:

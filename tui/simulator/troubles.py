@@ -72,7 +72,7 @@ class FaultRates:
     late_by: tuple[float, float] = (0.3, 1.5)
 
     def __post_init__(self) -> None:
-        """Refuse rates that are no probabilities or add up to more than 1."""
+        """Refuse rates that are not probabilities or add up to more than 1."""
         rates = self.by_kind()
         wrong = [kind for kind, rate in rates.items() if not 0 <= rate <= 1]
         if wrong:

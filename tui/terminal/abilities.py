@@ -1,6 +1,6 @@
 """Abilities of the terminal: characters beyond ASCII, colors, erasing in color.
 
-The locale tells the signs, terminfo (or COLORTERM) the colors; nothing is asked of the terminal
+The locale shows the signs, terminfo (or COLORTERM) the colors; nothing is asked of the terminal
 itself, which a slow link would have to answer first.
 """
 
@@ -34,7 +34,7 @@ NAMED_COLORS: tuple[tuple[str, ColorSystem], ...] = (
 """Colors by a part of TERM if the system does not know that terminal."""
 
 LOCALE = ("LC_ALL", "LC_CTYPE", "LANG")
-"""Variables that tell the encoding, the first that is set first."""
+"""Variables with the encoding, the first that is set first."""
 
 BEGINNING = Path("/proc/self/environ")
 """The environment as the program was given it; Python changes LC_CTYPE where it is C or unset."""
@@ -79,7 +79,7 @@ def fewer_colors(abilities: Abilities) -> Abilities:
 def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:
     """The encoding of the locale, as Python names it.
 
-    ASCII where it tells none that is known, or where Python writes in another one.
+    ASCII if it shows none that is known, or if Python writes in another one.
     """
     if sys.platform == "win32":
         return UTF_8  # it has no locale of this kind, and consoles that know all signs

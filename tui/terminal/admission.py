@@ -19,7 +19,7 @@ CURSOR_KEYS = frozenset(
 EDITS = frozenset({"backspace", "delete"})
 
 TOLD_AFTER = 0.1
-"""Seconds after which no more keys of a piece are waited for before they are told of."""
+"""Seconds after which the keys of a piece are reported without waiting for more."""
 
 LATE: float = 3.0
 """Seconds after which a key does what a key of a piece may: where the terminal took nothing, the
@@ -35,7 +35,7 @@ class Stamps(Protocol):
         """Another object after every stop."""
 
     def keys_not_taken(self, count: int, *, late: bool = False) -> None:
-        """Tell that keys came at once, or too late, and did nothing."""
+        """Report that keys came at once, or too late, and did nothing."""
 
 
 class Admission:
@@ -84,7 +84,7 @@ class Admission:
             self._look(0)
 
     def _look(self, before: int) -> None:
-        """Tell once no more keys of the piece come."""
+        """Report once no more keys of the piece arrive."""
         if self._refused > before:
             now = self._refused
             self._app.set_timer(TOLD_AFTER, lambda: self._look(now))

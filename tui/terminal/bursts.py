@@ -55,7 +55,7 @@ class Bursts:
         self._given: list[Given] = []
 
     def key(self, key: KeyToken) -> None:
-        """Take a key; `given` tells what becomes of it."""
+        """Take a key; `given` decides about it."""
         self._join(key.began, key.at)
         if not self._reads or self._reads[-1][-1].at != key.at:
             self._reads = [*self._reads[1 - REPEATS :], []]
@@ -88,7 +88,7 @@ class Bursts:
         return found
 
     def deadline(self, pending: float | None = None) -> float | None:
-        """When it will be known whether what waits is alone; None where time tells nothing."""
+        """When it will be known whether what waits is alone; None if time shows nothing."""
         return self._last + APART if self._waiting and not self._hangs_on(pending) else None
 
     def _hangs_on(self, pending: float | None) -> bool:

@@ -11,20 +11,12 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from . import sequences
-from .names import (
-    SPACE,
-    SPACE_ALONE,
-    STOP_KEYS,
-    Named,
-    name_of_character,
-    name_of_sequence,
-    with_alt,
-)
+from .names import SPACE, SPACE_ALONE, STOP_KEYS, Named, character_name, sequence_name, with_alt
 from .sequences import ESC, PASTE_ENDS
 from .tokens import KeyToken, Paste, Report, Token
 
 ESCAPE_DELAY: Final = 0.1
-"""Seconds after which ESC alone is the key Escape, unless Textual is told another time."""
+"""Seconds after which ESC alone is the key Escape, unless Textual is given another time."""
 
 SEQUENCE_WITHIN: Final = 1.0
 """Seconds that a sequence which has begun may wait for its next character."""
@@ -57,7 +49,7 @@ class Tokenizer:
         self._found: list[Token] = []
 
     def feed(self, text: str, now: float, mark: object = None) -> list[Token]:
-        """Take what was read at this time; what it comes to."""
+        """Take what was read at this time; its result."""
         self._end_waiting(now)
         self._now, self._here = now, mark
         if not self._stops_inside(text):
@@ -126,7 +118,7 @@ class Tokenizer:
             self._introduce(second)
         else:
             self._begin()
-            self._key(name_of_character(character))
+            self._key(character_name(character))
 
     def _escape(self, character: str) -> None:
         """After ESC."""
@@ -207,7 +199,7 @@ class Tokenizer:
             self._found.append(Report(text))
             self._go_on()
         else:
-            named = name_of_sequence(text[: sequences.LONGEST_KEY + 1], kitty=self._mouse)
+            named = sequence_name(text[: sequences.LONGEST_KEY + 1], kitty=self._mouse)
             self._key(named)
             if named is None:
                 self._go_on()
@@ -275,12 +267,12 @@ class Tokenizer:
     def _stops_inside(self, text: str) -> bool:
         """Return True if a read is a stop key alone that was pressed while something has no end.
 
-        A Space that is read by itself, a while after the rest, was pressed: where the end of a
-        paste or of a reply was lost, no stop may be lost with it.
+        A Space read alone, a while after the rest, was pressed: if the end of a paste or of a reply
+        was lost, no stop may be lost with it.
         """
         if self._state not in (self._paste, self._reply) or self._now - self._last <= APART:
             return False
-        named = SPACE_ALONE if text == " " else name_of_sequence(text[: sequences.LONGEST_KEY])
+        named = SPACE_ALONE if text == " " else sequence_name(text[: sequences.LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:
             return False
         self._found.append(KeyToken(*named, self._now, self._now, self._here))

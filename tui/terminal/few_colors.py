@@ -1,7 +1,7 @@
 """Colors for terminals that have sixteen, or none: the same state, told by what there is.
 
-Without colors what has a color behind it is shown in reverse, and what is bold stays so; words
-and signs tell the state in any case.
+Without colors what has a color behind it is shown in reverse, and what is bold stays so; words and
+signs show the state in any case.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from textual.color import Color
 from textual.filter import LineFilter
 
 RAISED_FROM = 0.21
-"""Brightness of a background, from 0 to 1, that is no part of the calm ground any more."""
+"""Brightness of a background, from 0 to 1, from which it no longer belongs to the calm ground."""
 
 SUNK_TO = 0.09
 """Brightness up to which a background is darker than the ground: a field to type in."""
@@ -27,10 +27,11 @@ BRIGHT_FROM = 0.5
 BLACK, BLUE, WHITE = 0, 4, 15
 
 LEAST_DIFFERENCE = 60
-"""Difference between the strongest and the weakest part of a color, of 255, that is no grey."""
+"""Difference between the strongest and the weakest part of a color, of 255, up to which it is a
+gray."""
 
 GREYS: tuple[tuple[float, int], ...] = ((0.25, 0), (0.42, 8), (0.75, 7), (1.01, 15))
-"""Up to which brightness a grey is which of the sixteen: ground, rules, words, what stands out."""
+"""Up to which brightness a gray is which of the sixteen: ground, rules, words, emphasis."""
 
 
 class NoColors(LineFilter):

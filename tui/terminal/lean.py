@@ -1,9 +1,9 @@
 """Wanted and present contents of the terminal; only the cells that differ are sent.
 
 Textual 8.2 sends a changed part of a widget from its left edge on, a new screen as a whole and
-several times over, and sets every color anew for each piece of text; over a slow link that is
-most of what a panel sends. Here its updates come together in one picture, and what goes to the
-terminal is the difference at the moment at which the terminal can take it.
+several times over, and sets every color again for each piece of text; over a slow link that is most
+of what a panel sends. Here its updates come together in one picture, and what goes to the terminal
+is the difference at the moment at which the terminal can take it.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Picture:
         self._changed = {y: (0, len(row)) for y, row in self._wanted.items()}
 
     def clear(self) -> None:
-        """The terminal has another size: what it is to show is told anew."""
+        """The terminal has another size: its contents are sent again."""
         self._wanted.clear()
         self.forget()
 

@@ -31,13 +31,13 @@ PACKETS_APART = 0.02
 """Seconds between that piece and the next."""
 
 HURRY_FOR = 0.5
-"""Seconds for which what a key brings goes before what comes by itself."""
+"""Seconds for which the output of a key precedes automatic changes."""
 
 
 class LeanApp(App[None]):
     """Sends the difference between what is to be shown and what is, when the terminal can take it.
 
-    `fit_terminal` tells before it runs what the terminal and the way to it are like.
+    `fit_terminal` learns before it runs what the terminal and the way to it are like.
     """
 
     def __init__(self) -> None:
@@ -67,9 +67,10 @@ class LeanApp(App[None]):
         return [*own, *self._instead]
 
     def take_styles(self, screen: object) -> None:
-        """Know the styles of a screen before it is shown; they concern nothing that stands already.
+        """Know the styles of a screen before it is shown; they concern nothing that is already
+        shown.
 
-        Textual would read all styles of the app anew, and style all that stands.
+        Textual would read all styles of the app again, and style everything that is shown.
         """
         for path in screen.css_path if isinstance(screen, Screen) else ():
             if not self.stylesheet.has_source(str(path), ""):
@@ -163,7 +164,7 @@ class LeanApp(App[None]):
         self._picture.clear()
 
     def action_redraw(self) -> None:
-        """Draw the whole screen anew: something else may have written to the terminal."""
+        """Draw the whole screen again: another program may have written to the terminal."""
         self._anew()
         self.hurry()
         self.refresh()

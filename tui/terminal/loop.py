@@ -1,4 +1,4 @@
-"""The event loop of the app, for whoever calls from another thread.
+"""The event loop of the app, for callers in another thread.
 
 Textual's own `call_from_thread` waits until the loop has done it: a key that stops may not.
 """

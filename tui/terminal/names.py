@@ -57,7 +57,7 @@ _OTHER_KEYS = 27
 """xterm's modifyOtherKeys: ESC [ 27 ; modifiers ; character ~"""
 
 
-def name_of_character(character: str) -> Named | None:
+def character_name(character: str) -> Named | None:
     """The key that sends this one character; None for what no key sends."""
     value = ANSI_SEQUENCES_KEYS.get(character)
     if isinstance(value, tuple) and character < "\x80":
@@ -74,13 +74,13 @@ def with_alt(character: str) -> Named:
         return value[0].value, None
     if isinstance(value, str):
         return _character_to_key(value), value
-    plain = name_of_character(character)
+    plain = character_name(character)
     return f"alt+{plain[0] if plain else 'unknown'}", None
 
 
 @lru_cache(maxsize=512)
-def name_of_sequence(sequence: str, *, kitty: bool = False) -> Named | None:
-    """The key that sends this complete sequence; None for what is no key or not known.
+def sequence_name(sequence: str, *, kitty: bool = False) -> Named | None:
+    """The key that sends this complete sequence; None if it is not a key or not known.
 
     Only where the `kitty` protocol was asked for, ESC [ P to ESC [ S are its F1 to F4.
     """
@@ -127,19 +127,19 @@ def _only_listed(sequence: str) -> Named | None:
 def _typed(code: int, bits: int, text: str) -> Named | None:
     """A character that came as its number, with modifiers."""
     if name := FUNCTIONAL_KEYS.get(f"{code}u"):
-        return (_chord(bits, name), None) if bits else name_of_character(chr(code))
+        return (_chord(bits, name), None) if bits else character_name(chr(code))
     try:
         character = chr(int(text)) if text.isdecimal() else chr(code)
     except (ValueError, OverflowError):
         return None
     if bits == _CTRL and character.isascii() and character.isalpha():
-        return name_of_character(chr(ord(character) & 0x1F))
+        return character_name(chr(ord(character) & 0x1F))
     if bits & ~_SHIFT:
-        plain = name_of_character(character)
+        plain = character_name(character)
         return (_chord(bits, plain[0]), None) if plain else None
     if bits == _SHIFT and not text and character.isascii():
         character = character.upper()
-    return name_of_character(character)
+    return character_name(character)
 
 
 def _chord(bits: int, name: str) -> str:

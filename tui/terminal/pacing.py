@@ -12,7 +12,7 @@ from collections import deque
 from typing import Final
 
 ASK: Final = "\x1b[6n"
-"""Asks where the cursor stands; every terminal since the VT100 answers."""
+"""Requests the place of the cursor; every terminal since the VT100 answers."""
 
 MUTE_AFTER: Final = 2.0
 """Seconds that a frame waits for the answer of a terminal that has never answered."""
@@ -43,7 +43,7 @@ OWED_MOST: Final = 32
 
 
 class Pacing:
-    """Counts the frames that a terminal has not answered yet; their answers tell of the link.
+    """Counts the frames that a terminal has not answered yet; their answers measure the link.
 
     With `slow` the link is taken for slow until it has shown that it is not.
     """

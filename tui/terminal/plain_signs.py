@@ -1,6 +1,6 @@
 """Signs of ASCII, and of Latin-1 where the terminal has them, for those that are drawn otherwise.
 
-Each stands in one cell, as the sign that it replaces: nothing moves.
+Each is in one cell, as the sign that it replaces: nothing moves.
 """
 
 from __future__ import annotations

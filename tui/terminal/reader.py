@@ -55,7 +55,7 @@ TerminalInput = Pressed | Paste | Report
 
 
 class KeyReader:
-    """Takes bytes and times, gives what the app is to be told."""
+    """Takes bytes and times, returns the messages for the app."""
 
     def __init__(
         self, stops: Stops, *, mouse: bool = False, escape_delay: float = ESCAPE_DELAY

@@ -23,10 +23,10 @@ REPORT = re.compile(
 )
 MOUSE = re.compile(r"\x1b\[(<\d+;-?\d+;-?\d+[Mm]|\d+;\d+;\d+M|M...)", re.ASCII | re.DOTALL)
 RXVT = re.compile(r"\x1b\[([2-8]|1[1-9]|2[0-9]|3[0-4])", re.ASCII)
-"""A key with Shift ends with $, which elsewhere stands before the end."""
+"""A key with Shift ends with $, which elsewhere comes before the end."""
 EIGHT_BIT = {"\x9b": "[", "\x8f": "O", "\x90": "P", "\x9d": "]"}
 EIGHT_BIT |= {chr(0xDC00 + ord(code)): same for code, same in EIGHT_BIT.items()}
-"""ESC and what follows in one character, or in one byte that is no UTF-8."""
+"""ESC and what follows in one character, or in one byte that is not UTF-8."""
 REPLY_BEGINS = {"]": "0123456789", "P": "0123456789;>!$+=?|", "_": "G"}
 """Replies of any length, and how they go on: Alt+] and Alt+P begin the same."""
 REPLY_ENDS = "\x07\x9c\udc9c\x18\x1a"

@@ -97,7 +97,7 @@ class TypeAhead:
         return self._app.screen if self._app.is_running else None
 
     async def _emptied(self, pump: MessagePump, screen: Screen[Any]) -> None:
-        """Wait until a queue has come to what is in it now, or is none of the screen on top."""
+        """Wait until a queue has handled its present contents, or belongs to another screen."""
         done = asyncio.Event()
         if not pump.call_later(done.set):
             return

@@ -1,4 +1,4 @@
-"""Fields to type into: a text as it is written, and numbers in which Space is no letter."""
+"""Fields to type into: a text unchanged, and numbers in which Space is not a character."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Field(Input):
     """A field of one line; a space belongs to the text."""
 
     def update_node_styles(self, animate: bool = True) -> None:
-        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        """Nothing is styled before it is on a screen: then it is, as a whole."""
         if self.is_attached:
             super().update_node_styles(animate)
 

@@ -18,7 +18,7 @@ def gauge(
 ) -> Text:
     """A bar of exactly so many cells, filled from zero (or the low end) to the value.
 
-    With a low end below zero, zero stands within it and has a sign of its own.
+    With a low end below zero, zero is within it and has a sign of its own.
     """
     inner = max(1, width - 2)
     cells = [("─", BAR_REST)] * inner

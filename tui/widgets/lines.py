@@ -62,7 +62,7 @@ class Lines(Widget):
             self.refresh(layout=True)
 
     def _redraw(self, y: int, width: int) -> list[Region]:
-        """Draw a line anew; the parts of it that look different now."""
+        """Draw a line again; the parts of it that look different now."""
         before = self._strips.pop(y, None)
         if not width:
             return []
@@ -80,13 +80,13 @@ class Lines(Widget):
             self._lines = list(self._fit(width))
 
     def notify_style_update(self) -> None:
-        """Draw anew when colors change."""
+        """Draw again when colors change."""
         self._strips.clear()
         self._under = None
         super().notify_style_update()
 
     def render_lines(self, crop: Region) -> list[Strip]:
-        """The lines of a region; nothing stands around them, so Textual need not look for it."""
+        """The lines of a region; nothing surrounds them, so Textual need not look for it."""
         width = self.size.width
         if self.size != self.outer_size:
             return super().render_lines(crop)

@@ -19,7 +19,7 @@ QUANTITIES_NOW: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 """Quantities shown beside the state."""
 NUMBER_WIDTH = 7
 HEADLINE_WIDTH = 18
-"""Columns of the state's words, so that the numbers behind them stand still."""
+"""Columns of the state's words, so that the numbers after them do not move."""
 
 
 def motor_now(
@@ -27,8 +27,8 @@ def motor_now(
 ) -> Text:
     """State, frequency and current of the last cycle, or of the line watch's look at the drive.
 
-    `period` is the wished time of a cycle in seconds, `now` is monotonic. What is older than
-    three cycles, or came with an error, is told as what it was, with its age.
+    `period` is the wished time of a cycle in seconds, `now` is monotonic. A value older than three
+    cycles, or with an error, is shown as past, with its age.
     """
     if snapshot is None or (look is not None and look.time > snapshot.time):
         return _by_look(look, now)

@@ -52,8 +52,8 @@ def readout_cells(decimals: int, *, signed: bool, whole: int = 3) -> int:
 def big(text: str, width: int, *, plain: bool = False) -> list[str]:
     """A number in three rows, to the right of exactly so many cells.
 
-    What is too wide loses decimals first; what is no number, or is too wide still, stands in
-    the lowest row as it is. With `plain` it is drawn in ASCII.
+    What is too wide loses decimals first; texts other than numbers, and those still too wide, are
+    in the lowest row unchanged. With `plain` it is drawn in ASCII.
     """
     glyphs = PLAIN_GLYPHS if plain else GLYPHS
     for shown in _shorter(text):

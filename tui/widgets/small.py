@@ -50,7 +50,7 @@ def small_lines(view: StripView, target: str, width: int, height: int) -> list[T
 
 
 def _drive_lines(drive: DriveNow, width: int) -> list[Text]:
-    """State, figures with their units, and who it is."""
+    """State, figures with their units, and its identity."""
     style = STRIP_STYLES.get(drive.kind, STRONG)
     state = f"{STATE_SIGNS.get(drive.kind, '□')} {drive.words}"
     if drive.age is not None:

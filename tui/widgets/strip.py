@@ -78,7 +78,7 @@ class DriveNow(NamedTuple):
 
 
 class StripView(NamedTuple):
-    """All that the strip tells."""
+    """All that the status bar shows."""
 
     drive: DriveNow | None = None
     line: str = ""
@@ -116,7 +116,7 @@ def strip_line(view: StripView, width: int) -> Text:
 
 
 def _line_text(line: str, room: int) -> str:
-    """The line in so many cells: its long name loses its beginning, what is told of it nothing."""
+    """The line in so many cells: its long name loses its beginning, its facts lose nothing."""
     name, between, more = line.partition(BETWEEN)
     left = room - cell_len(between + more)
     if cell_len(name) <= left or left < NAME_LEAST:
@@ -264,7 +264,7 @@ def message_line(when: str, message: str, style: Style, hint: str, width: int) -
 
 
 class Said(NamedTuple):
-    """The message of now; `age` in seconds."""
+    """The present message; `age` in seconds."""
 
     when: str
     text: str
@@ -275,7 +275,7 @@ class Said(NamedTuple):
 
 
 class FrameView(NamedTuple):
-    """All that stands around a screen at one moment."""
+    """All parts around a screen at one moment."""
 
     strip: StripView
     place: str

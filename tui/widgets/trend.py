@@ -54,7 +54,7 @@ def trend_rows(
 def _above(
     value: float | None, wanted: float | None, high: float, rows: int, row: int
 ) -> TrendCell:
-    """A cell above zero; `row` 0 stands on it."""
+    """A cell above zero; `row` 0 is on it."""
     filled = 0 if value is None else _eighths(value, high, rows, row)
     line = None if wanted is None or wanted < 0 else _line_at(wanted, high, rows, row)
     if line is not None:

@@ -31,7 +31,7 @@ _ROWS = _rows()
 
 
 def frame_ends(data: bytes | bytearray) -> dict[int, int]:
-    """By beginning, the end of the shortest whole frame there, as is_whole() tells."""
+    """By beginning, the end of the shortest whole frame there, by is_whole()."""
     count = len(data)
     if count < MIN_FRAME:
         return {}

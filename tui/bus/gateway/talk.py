@@ -10,7 +10,7 @@ from typing import Any
 from .room import ServedConnection, host_of
 
 MOST_AT_ONCE = 128
-"""Requests of one connection that may be under way; a further read is told to come again."""
+"""Requests of one connection that may be under way; a further read is asked to come again."""
 
 
 @dataclass(slots=True, eq=False)

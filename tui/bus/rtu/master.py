@@ -20,7 +20,7 @@ from .notes import noted
 from .timer import PutOffTimer
 
 BABBLE = 1.0
-"""Seconds to wait for silence on a line that never falls silent, before sending all the same."""
+"""Seconds to wait for silence on a line that never falls silent, before sending anyway."""
 LEAD = 0.0004
 """Seconds before the end of the silence at which the next request is chosen and made ready."""
 TOLERANCE = 0.001
@@ -139,7 +139,7 @@ class RtuMaster:
         return early and seldom and len(self._early) >= JUDGED
 
     def lost(self, reason: str) -> None:
-        """The port went away: whoever waits is told at once."""
+        """The port went away: the waiting caller gets the error at once."""
         self._timer.stop()
         self.failure = LineLost(f"The line was lost: {reason}.")
         settle(self._done, ExchangeResult(ResultKind.NOTHING))

@@ -24,7 +24,7 @@ class PutOffTimer:
             self._timer = loop.call_at(self._due, self._ring)
 
     def _ring(self) -> None:
-        """The time that was set first is over; to set it anew for each piece costs more."""
+        """The time that was set first is over; a new one for each piece costs more."""
         loop, self._timer = asyncio.get_running_loop(), None
         if self._action is None:
             return

@@ -82,7 +82,7 @@ async def open_master(
     wake: Callable[[], None],
     opened: Callable[[str], None],
 ) -> Master:
-    """Open a line for requests; `opened` is told of it, with what is to be said of the port.
+    """Open a line for requests; `opened` is called for it, with the remark on the port.
 
     Raises the line's errors.
     """

@@ -1,4 +1,4 @@
-"""Takes requests from the queue one at a time, sends them, and hands back what became of them."""
+"""Takes requests from the queue one at a time, sends them, and returns their results."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Dispatcher:
         return self._queue.drain()
 
     def put_back(self, job: Job) -> None:
-        """Queue a job that was taken out and came to nothing, at its old place."""
+        """Queue a job that was taken out without a result, at its old place."""
         self._queue.put_back(job)
         self._wake.set()
 

@@ -49,7 +49,7 @@ class LineInside:
 
 
 Say = Callable[[LineStatus, str, LineError | None], None]
-"""Tell the line's status, what is to be said of it, and the error that a lost one has."""
+"""Report the line's status, the message about it, and the error of a lost one."""
 
 
 class SharedLine(Protocol):

@@ -59,7 +59,7 @@ class Outcomes:
         self._gateway = gateway
 
     def waited_for_us(self, job: Job, result: ExchangeResult) -> bool:
-        """True if a read is asked anew: when its answer came is not known.
+        """True if a read is sent again: the time of its answer is not known.
 
         This program may have been stopped in between, and the answer have waited for it.
         """
@@ -76,7 +76,7 @@ class Outcomes:
             result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
 
     def conclude(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> bool:
-        """Note what became of a request, and hand it back; True where it is to be sent again.
+        """Note the result of a request, and hand it back; True where it is to be sent again.
 
         `unsent`: the probe before it had no reply, so that it was not sent itself.
         """

@@ -42,7 +42,8 @@ class Pace:
         return {device: min(share, MOST_SHARE) for device, share in shares.items()}
 
     def claim(self, who: Hashable, device: int, seconds: float, period: float) -> float:
-        """Tell a wish: so many seconds of the line in each period; returns the period to keep."""
+        """Announce a wish: so many seconds of the line in each period; returns the period to
+        keep."""
         with self._lock:
             self._wishes[who] = device, seconds / period
         wished = sum(greatest(self.own, self.others).values())

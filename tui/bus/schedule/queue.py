@@ -50,7 +50,7 @@ class Job:
     requested: float = 0.0
     """When it was handed over, by the line's clock."""
     max_age: float = 0.0
-    """A reply to the same question is taken, from whoever asked it, up to this age in seconds."""
+    """A reply to the same request of any program is used, up to this age in seconds."""
 
     within: float | None = None
     """Seconds in which its answer is to begin, where the asker says it; else the line knows."""
@@ -80,7 +80,7 @@ class Job:
 
     @property
     def commands(self) -> bool:
-        """True if it changes anything and is no stop: a stop voids it."""
+        """True if it changes anything, except a stop: a stop discards it."""
         return self.request.changes and self.priority is not Priority.STOP
 
     def fail(self, error: LineError) -> None:

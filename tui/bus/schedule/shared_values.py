@@ -1,4 +1,4 @@
-"""Words that were read a moment ago, for whoever else wants them before they are old."""
+"""Words that were read a moment ago, for other programs before they are old."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class LineShares:
         return 2.0, kind, had, job.priority, job.order
 
     def come(self, job: Job, waiting: Iterable[Job]) -> None:
-        """A job comes to those that wait: its program makes up for no time in which it had none."""
+        """A job joins those that wait: its program makes up for no time in which it had none."""
         kind = kind_of(job.priority)
         if kind not in self._owed:
             return

@@ -69,7 +69,7 @@ class Worker:
             self._task.cancel()
 
     def done(self) -> bool:
-        """Return True if the work has ended: by itself, by cancel() or by an error."""
+        """Return True if the work has ended: completed, by cancel() or by an error."""
         return self._ended.done()
 
     def wait(self, timeout: float | None = None) -> bool:

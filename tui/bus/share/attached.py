@@ -71,7 +71,7 @@ class Client:
     """Number of checks without a heartbeat since the last one."""
 
     def say(self, message: AnyMessage) -> None:
-        """Tell it something; never waits."""
+        """Send it a message; never waits."""
         transport = self.writer.transport
         if transport.is_closing():
             return
@@ -122,7 +122,7 @@ class Client:
         return self.stops_left
 
     def ask(self, inside: LineInside, message: Asking) -> None:
-        """It asks for something on the line. Raises NoMessage."""
+        """A request of the program to the line. Raises NoMessage."""
         if len(self.requested) >= MOST_ASKED:
             raise NoMessage("too many requests at once")
         try:

@@ -118,7 +118,7 @@ _NAMED = {kind.__name__: kind for kind in _KINDS}
 
 
 def failure_message(error: BaseException) -> tuple[str, ErrorForm]:
-    """The kind of an error and what it tells, as a message carries them."""
+    """The kind and the details of an error, as a message carries them."""
     kind = _NAMED.get(type(error).__name__, LineError)
     held = {name: _clipped(getattr(error, name)) for name in _KINDS[kind]}
     return kind.__name__, ErrorForm(_clipped(str(error)), **held)

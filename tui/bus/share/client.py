@@ -124,7 +124,7 @@ class ShareClient:
             task.result()
 
     async def _leave(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Tell the owner, and wait for its answer: a program that needs the port may follow."""
+        """Notify the owner, and wait for its answer: a program that needs the port may follow."""
         with suppress(OSError, RuntimeError, TimeoutError):
             writer.write(packed(Goodbye()))
             async with asyncio.timeout(LEAVE_WITHIN):
@@ -160,7 +160,7 @@ class ShareClient:
         self._claim()
 
     def _claim(self) -> None:
-        """Tell the owner what this program commands, or give it up where it was taken for gone."""
+        """Report to the owner what this program commands, or give it up if it counts as exited."""
         facts = self._inside.facts
         if self._gone:
             give_up_own(facts, STOOD_STILL)

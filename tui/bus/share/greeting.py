@@ -1,4 +1,4 @@
-"""The socket on which the owner of a line listens: private, made anew, never left behind.
+"""The socket on which the owner of a line listens: private, newly made, never left after its end.
 
 And the first message of a program there, with its answer: it is taken in, or not. What is asked
 without being attached takes the place of that message.
@@ -232,9 +232,9 @@ class Listening:
             self._keeping = asyncio.create_task(self._keep(), name="socket of the line")
 
     async def _keep(self) -> None:
-        """Make the socket anew if its folder was taken away, as at the end of a log-in.
+        """Make the socket again if its folder was removed, as at the end of a log-in.
 
-        The lock is taken anew if its file was taken away.
+        The lock is taken again if its file was removed.
         """
         if not await asyncio.to_thread(lambda: self._lock.stands):
             self._renew_lock()
@@ -259,7 +259,7 @@ class Listening:
                 self._tell()
 
     def _tell(self) -> None:
-        """Write down where this program listens, and what was stopped, for who comes after it."""
+        """Write down this program's address and the stops, for the next owner."""
         self._stopped = self._facts.stops.late_times
         self._lock.tell(
             Owner(VERSION, self._facts.me, str(self._path), 0.0, self._stopped, self._line)

@@ -18,7 +18,7 @@ from .messages import LENGTH, VERSION, Goodbye, packed
 from .place import Owner, OwnerLock, SharePlace, reached
 
 MODULE = "tui.keeper"
-"""Started by its name: it stands above the bus, which does not import it."""
+"""Started by its name: it belongs above the bus, which does not import it."""
 NO_KEEPER = "DRIVEPANEL_NO_KEEPER"
 """Set by tests: a program that opens a line first holds it itself, as where no process can."""
 
@@ -117,7 +117,7 @@ def start_keeper(
 
 
 def _environment() -> dict[str, str]:
-    """This program's, and where this package is found if Python does not look there by itself."""
+    """This program's, and the place of this package if Python does not look there."""
     environment = dict(os.environ)
     for name in PATHS:
         if environment.get(name):

@@ -45,7 +45,7 @@ from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 VERSION = 7
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
-"""Bytes of one message; more is no message of ours."""
+"""Bytes of one message; a longer message is invalid."""
 LENGTH = 4
 
 SeenFrame = tuple[MonotonicTime, FrameDirection, ByteString, Word]
@@ -53,7 +53,7 @@ SeenFrame = tuple[MonotonicTime, FrameDirection, ByteString, Word]
 
 
 class Message(msgspec.Struct, frozen=True, tag=True):
-    """Something that one program tells another."""
+    """A message between programs."""
 
 
 class Hello(Message, frozen=True):
@@ -275,7 +275,7 @@ _DECODER: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessa
 
 
 class NoMessage(Exception):
-    """Bytes that are no message of ours."""
+    """Bytes that form no valid message."""
 
 
 def seen_frames(frames: Iterable[Frame]) -> tuple[SeenFrame, ...]:

@@ -1,6 +1,6 @@
 """Meeting place of programs that share a line: the lock that decides ownership, and the socket.
 
-The lock lies where nobody takes it away (the state folder), and tells where the socket is.
+The lock is in a folder that persists (the state folder), and contains the socket's place.
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ class SharePlace:
 
     @property
     def name(self) -> str:
-        """A file name of the line: something to read, and a digest that tells it from others."""
+        """A file name of the line: something to read, and a digest that distinguishes it from
+        others."""
         readable = re.sub(r"[^A-Za-z0-9]+", "-", self.key).strip("-")[-24:]
         return f"{readable}-{hashlib.sha256(self.key.encode()).hexdigest()[:12]}"
 
@@ -102,7 +103,7 @@ def make_private(folder: Path, *, shared: bool = False) -> None:
 
 
 class OwnerLock:
-    """The lock of one line; whoever holds it owns the line. Given back by the system at exit."""
+    """The lock of one line; its holder owns the line. Given back by the system at exit."""
 
     def __init__(self, place: SharePlace) -> None:
         self._place = place
@@ -276,7 +277,7 @@ def reached(path: Path, within: float) -> socket.socket:
 
 
 def has_ended(program: Program) -> bool:
-    """Return True if a program of this machine surely is no more; in doubt it lives."""
+    """Return True if a program of this computer has surely ended; in doubt it lives."""
     if program.process[0] != pid_namespace():
         return False
     try:

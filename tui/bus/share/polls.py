@@ -107,7 +107,7 @@ class PollsServed:
     def share_out(self, wishes: Mapping[int, float]) -> None:
         """Find the factor for the periods of all polls; `wishes` are those of the programs.
 
-        To be called again and again; it is found anew once in a while.
+        To be called again and again; it is looked up again once in a while.
         """
         pace, now = self._inside.pace, self._inside.clock()
         if now - self._shared_out < SHARED_OUT_EVERY:
@@ -186,7 +186,7 @@ class PollsServed:
 
 
 def _note_error(task: asyncio.Task[None]) -> None:
-    """An internal error has ended a plan; its program reads by itself after a while."""
+    """An internal error has ended a plan; its program reads after a while."""
     if not task.cancelled() and (error := task.exception()) is not None:
         log.error("%s ended by an error", task.get_name(), exc_info=error)
 

@@ -70,7 +70,7 @@ class RequestsAsked:
             self._tell(Withdraw(number))
 
     def answered(self, message: Answer | Failed) -> None:
-        """The owner tells what became of a request."""
+        """Result of a request from the owner."""
         job = self._requested.pop(message.number, None)
         if job is None or not (job.begun or job.answer.set_running_or_notify_cancel()):
             return
@@ -116,7 +116,7 @@ class RequestsAsked:
                 self._give_up(job, sent=True)
 
     def _give_up(self, job: Job, *, sent: bool) -> None:
-        """The owner ended before it answered: a read is asked anew, a write never is.
+        """The owner ended before it answered: a read is sent again, a write never is.
 
         A stop is sent again: it may have got lost, and does no harm twice.
         """

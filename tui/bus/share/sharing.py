@@ -32,7 +32,7 @@ ShareLine = Callable[[SharePlace, LineInside], SharedLine]
 OWNER_INTERVAL = 0.02
 """Seconds between two looks for an owner that is just beginning, or has just ended."""
 LONGEST_QUIET = 30.0
-"""Seconds that a line is left quiet at most, should a lock file tell of a later time."""
+"""Longest quiet time of a line in seconds, should a lock file state a later time."""
 NO_OWNER = 3.0
 """Seconds after which a locked line without an owner that answers is given up."""
 AWAY_FOR = 0.5
@@ -257,7 +257,7 @@ class Sharing:
             self._server.tell_state()
 
     async def close(self, quiet: float) -> None:
-        """Give the line to whoever is attached; a reply may still come for `quiet` seconds."""
+        """Hand the line over to an attached program; a reply may still come for `quiet` seconds."""
         now = self._inside.clock()
         quiet = max(quiet, self._quiet_until - now)
         if self._server is not None:

@@ -45,7 +45,7 @@ async def programs_back(
     now: Callable[[], float] = monotonic,
     pause: Callable[[float], Awaitable[None]] = asyncio.sleep,
 ) -> None:
-    """Wait until every program of the holder before has had its time to come to this one.
+    """Wait until every program of the previous holder has had its time to attach to this one.
 
     A computer that is short of time, as in a container with a quota, does not run this process
     for long: a program that has called in the meantime is heard first.
@@ -57,7 +57,7 @@ async def programs_back(
 
 
 class SignsOfLife:
-    """Tells the clients of a line again and again that its owner is well; in the line's loop."""
+    """Reports to the clients of a line repeatedly that its owner is well; in the line's loop."""
 
     def __init__(
         self,
@@ -73,13 +73,13 @@ class SignsOfLife:
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        """Begin to tell."""
+        """Begin the heartbeat."""
         self._beat = self._inside.clock()
         self._inside.dispatcher.held_back = lambda: self._stood > SENDS_WITHIN
         self._task = asyncio.get_running_loop().create_task(self._work(), name="signs of life")
 
     def close(self) -> None:
-        """Tell nothing any more."""
+        """End the heartbeat."""
         self._inside.dispatcher.held_back = bool
         if self._task is not None:
             self._task.cancel()

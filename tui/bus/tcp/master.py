@@ -87,12 +87,12 @@ class TcpMaster:
         return awaited and int.from_bytes(unit[:2], "big") == self._transaction
 
     def _reset(self, reason: str) -> None:
-        """Give up a connection whose bytes cannot be told apart any more."""
+        """Give up a connection whose bytes cannot be separated any more."""
         self._transport.close()
         self.lost(reason)
 
     def lost(self, reason: str) -> None:
-        """The connection ended: whoever waits is told at once."""
+        """The connection ended: the waiting caller gets the error at once."""
         if self.failure is not None:
             return
         self.failure = LineLost(f"The line was lost: {reason}.")

@@ -29,7 +29,7 @@ class PortErrors(NamedTuple):
 
 
 def port_errors(descriptor: int) -> PortErrors | None:
-    """The counts of an open port; None where the system or the driver does not tell them."""
+    """The counts of an open port; None if the system or the driver does not report them."""
     if os.name != "posix":
         return None
     import fcntl

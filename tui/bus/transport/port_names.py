@@ -30,7 +30,7 @@ class PortName:
     adapter: str = ""
     """USB vendor, product and serial number of the adapter; empty where there is none."""
     shared: bool = False
-    """True if its by-id name is no name of its own: its make has it, not the adapter."""
+    """True if its by-id name belongs to its make, and not to this adapter alone."""
 
     @property
     def lasting(self) -> bool:

@@ -30,7 +30,7 @@ class PortSeen:
     others: str = ""
     """Programs that have it open beside this one."""
     latency: int | None = None
-    """Milliseconds for which its adapter may keep a byte back; None where it does not tell."""
+    """Milliseconds for which its adapter may keep a byte back; None if it does not report it."""
 
 
 def see_port(path: str) -> PortSeen:

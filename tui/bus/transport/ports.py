@@ -77,7 +77,8 @@ OURS = {"tui": "drivepanel", "tui.keeper": "drivepanel, the keeper of the line"}
 
 
 def holder(path: str) -> str | None:
-    """Name and process id of the program that holds a port, None where the system does not tell.
+    """Name and process id of the program that holds a port, None if the system does not report
+    them.
 
     Linux only: the owner of the lock on the port, else another process that has it open.
     """

@@ -76,7 +76,7 @@ class ThreadedSerial:
         """Read on: the thread that waits for bytes cannot be paused."""
 
     def errors(self) -> PortErrors | None:
-        """Nothing: where ports are read by threads the system tells no counts."""
+        """Nothing: if ports are read by threads the system reports no counts."""
         return None
 
     def close(self) -> None:

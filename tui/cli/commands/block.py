@@ -71,7 +71,7 @@ def block(
     set NMA3=LCR ...  what slots are mapped to: a code, a number, an address, or none
     factory           every slot as it left the factory
     load FILE         the slots as a file has them
-    save FILE         the slots of now into a file, one line each
+    save FILE         the present slots into a file, one line each
 
     Slots are written at standstill, one after another, each read back. Another master on the line
     may rely on the present assignment.

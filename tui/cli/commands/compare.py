@@ -51,7 +51,7 @@ def compare(
 ) -> None:
     """Compare the settings of A and B: each a FILE, a LINE, or `factory`.
 
-    Measurements, counters and command words are no settings; address, baud and format of a drive
+    Measurements, counters and command words are not settings; address, baud and format of a drive
     are not compared with the factory. Ends with 0 where all are equal and with 1 where some differ.
     """
     from tui.drive.profile import library

@@ -1,4 +1,4 @@
-"""`drivepanel hold`: drives asked on, so that their communication timeout does not run out."""
+"""`drivepanel hold`: keeps polling drives, so that their communication timeout does not run out."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ DISARMS = (
 
 
 class HeldTeller(Protocol):
-    """Tells an event of a drive, at the beginning with what it is kept from."""
+    """Reports an event of a drive, at the beginning with the prevented reaction."""
 
     def __call__(
         self, event: str, device: int, text: str, found: Timeout | None = None, /
@@ -61,10 +61,10 @@ def hold(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Ask drives on until Ctrl-C, so that their communication timeout does not run out.
+    """Keep polling drives until Ctrl-C, so that their communication timeout does not run out.
 
-    It reads, and writes nothing. A drive that is asked cannot tell that its controller is lost:
-    its own protection is off meanwhile. At the end it is told what each drive does then, and when.
+    It reads, and writes nothing. A polled drive cannot detect that its controller is lost: its own
+    protection is off. At the end it reports what each drive does then, and when.
     """
     wanted = list(dict.fromkeys(device))
     targets = [Target(line_text, d, profile_id, force_profile=force_profile) for d in wanted]
@@ -90,7 +90,7 @@ def hold(
 async def _take_all(
     opened: OpenLine, targets: Sequence[Target], holding: Holding, tell: HeldTeller
 ) -> None:
-    """Ask each drive on as soon as it has answered; raises where none does."""
+    """Keep polling each drive as soon as it has answered; raises where none does."""
     from tui.session.monitor.timeout import timeout_now
 
     failure: Exception | None = None
@@ -114,7 +114,7 @@ async def _take_all(
 
 
 async def _connected(opened: OpenLine, target: Target) -> DriveSession:
-    """A drive that answers, with what it tells of its timeout."""
+    """A drive that answers, with its timeout."""
     session = await connect_drive(opened, target)
     if opened.line.device_state(target.device).heard is None:
         raise Failure(f"Device {target.device} does not answer.", LINE_TROUBLE)

@@ -50,7 +50,7 @@ def identify(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Ask a drive who it is (function 43)."""
+    """Request a drive's identity (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
     from ..running.holding import hold_on
@@ -118,7 +118,7 @@ def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
 
 
 async def _model_words(session: DriveSession | None) -> Mapping[str, int]:
-    """Raw values of the words that tell the model, where its family has them."""
+    """Raw values of the words that show the model, if its family has them."""
     from tui.bus.errors import LineError
     from tui.drive.errors import DriveError
     from tui.drive.model import model_codes

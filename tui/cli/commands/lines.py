@@ -27,8 +27,8 @@ def lines(as_json: bool) -> None:
 
     Lines that are open now are listed with the process that holds each, with the programs on it,
     and with the good replies of the last minute. A motor that may still run although the program
-    that started it has exited is listed too. The settings file is checked: each fault is told with
-    its file, line and key, and the status is 2 then.
+    that started it has exited is listed too. The settings file is checked: each fault is reported
+    with its file, line and key, and the status is 2 then.
     """
     from tui.bus.share.beside import line_look
     from tui.session.connect.known_lines import load_memory

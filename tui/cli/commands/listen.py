@@ -78,9 +78,9 @@ def listen(
 ) -> None:
     """Listen to what others say on a serial line, and send nothing.
 
-    Requests and replies of any master are told by drive, code and value, and at the end who
-    commands which drive, how well each is asked, and what goes wrong. The port is opened for
-    reading only, and for this program alone. A sim: LINE has a master of its own that asks.
+    Requests and replies of any master are shown by drive, code and value, and at the end which
+    master commands which drive, how well each is polled, and what goes wrong. The port is opened
+    for reading only, and for this program alone. A sim: LINE has a master of its own that asks.
     """
     if pcap_path is None and (raw or force):
         raise click.UsageError("--raw and --force require --pcap FILE.")
@@ -127,7 +127,7 @@ def listen(
 def _serial_line(
     opening: AbstractContextManager[PlaceToListen],
 ) -> Iterator[PlaceToListen]:
-    """The line that is meant; raises UsageError for one that is no serial line."""
+    """The line that is meant; raises UsageError if it is not a serial line."""
     from tui.session.listening.place import NothingToHear
 
     with ExitStack() as stack:

@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from tui.session.work import Permit
 
 COMMAND_POLL_INTERVAL = 0.02
-"""Seconds between two looks at what the line's thread has come to."""
+"""Seconds between two checks of the work in the line's thread."""
 PERIOD = 0.25
 """Target cycle time of the monitor in seconds."""
 FIRST_TRIES, FIRST_WITHIN = 3, 5.0
-"""Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word
-that it does not have may meet silence meanwhile, which is no answer of any kind."""
+"""Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word that
+it does not have may meet silence, which is not an answer of any kind."""
 LEARNT_WITHIN = 10.0
 """Seconds in which a drive's communication timeout is read on a quick line: words that it lacks
 meet silence, and a small computer is slow."""
@@ -149,7 +149,7 @@ def arm_drive(console: DriveConsole) -> None:
 
 
 async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome:
-    """Give an order and wait for what becomes of it.
+    """Give a command and wait for its result.
 
     Raises OrderRefused where it is not even begun; Failure where it is refused, with the status
     of who refused it: 5 here, 4 the drive, 3 no answer.

@@ -54,7 +54,7 @@ def profiles(
 ) -> None:
     """List the profiles, show one, check files, or create one of your own.
 
-    `path` tells the folder for your own profiles, `new NEW-ID --from ID` creates one there.
+    `path` shows the folder for your own profiles, `new NEW-ID --from ID` creates one there.
     """
     if wiring and (profile_id in (None, "new", "path")):
         raise click.UsageError("--wiring is of one profile: name its ID.")
@@ -82,7 +82,7 @@ def profiles(
 
 
 def check_files(files: list[Path], as_json: bool) -> None:
-    """Tell every fault of every file; status 2 if there is one."""
+    """Report every fault of every file; status 2 if there is one."""
     from tui.drive.profile import library
 
     from ..shared.output import print_json

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 ALIKE = 3
-"""More than so many that are left out for one reason are told without their values."""
+"""If more settings than this are omitted for one reason, they are reported without their values."""
 CODES_NAMED = 12
 """Number of codes named for one reason; --dry-run names all."""
 
@@ -89,7 +89,7 @@ def restore(
     With several -d the set goes to each of these drives in turn; one that cannot take it does
     not keep it from the others.
 
-    --dry-run tells what would be written, what is left out, and why. An interrupted restore is
+    --dry-run shows what would be written, what is omitted, and why. An interrupted restore is
     resumed by the same command: the drive is read, and what is missing is written.
     """
     from tui.drive.settings.restore_plan import Options

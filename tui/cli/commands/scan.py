@@ -52,8 +52,8 @@ def scan(
 ) -> None:
     """Find the drives on a line. It reads, and writes nothing. Ctrl-C ends it.
 
-    It listens first: where another master asks drives, it ends before it sends anything. What is
-    found is asked on until the end, so that its communication timeout does not run out.
+    It listens first: where another master asks drives, it ends before it sends anything. Drives
+    found are polled until the end, so that their communication timeout does not run out.
     """
     from tui.session.connect.addresses import parse_addresses
 
@@ -120,7 +120,7 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
 
 
 def _end(scans: list[Scan], addresses: str) -> str:
-    """Tell the end as JSON, where that is wanted; what it has come to, in a sentence."""
+    """Report the end as JSON, if requested; the result, in a sentence."""
     if not scans:
         return "Nothing was sent."
     (scan,) = scans

@@ -109,7 +109,7 @@ def simulate(
     """Serve simulated drives until Ctrl-C or SIGTERM.
 
     Lines such as "2: LI1=1, AI1=5V" on standard input set the inputs of the drive at address 2;
-    "2:" tells them.
+    "2:" shows them.
     """
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
         raise click.UsageError("Say where: one of --pty, --serial, --tcp, --rtu-tcp.")
@@ -167,7 +167,7 @@ def simulation_of(
 
 
 def _follow(simulation: Simulation, as_json: bool) -> None:
-    """Set inputs as the lines of standard input say; a line that is wrong is told of."""
+    """Set inputs as the lines of standard input say; a wrong line is reported."""
     from tui.simulator import SimulatorError, set_inputs
 
     for line in typed_lines():

@@ -51,7 +51,7 @@ def _ordered(
     *,
     as_json: bool,
 ) -> None:
-    """Do the work at the armed drive and print what it came to."""
+    """Do the work at the armed drive and print its result."""
     from ..shared.output import drive_json, print_json
 
     messages = Messages(as_json=as_json)

@@ -54,9 +54,9 @@ def status(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Tell a drive's state, control source, faults and reaction to a loss of communication.
+    """Show a drive's state, control source, faults and reaction to a loss of communication.
 
-    Several LINEs are told side by side; LINE@ADDRESS names drives on its line, as in pump@1,2.
+    Several LINEs are shown side by side; LINE@ADDRESS names drives on its line, as in pump@1,2.
     With --all it says where to look on that line.
     """
     if addresses and not every:
@@ -78,7 +78,7 @@ def status(
 
 
 def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
-    """Tell the drives of the one line that was named, and the highest exit status."""
+    """Report the drives of the one named line, and the highest exit status."""
     from ..running.holding import hold_on
 
     first, *others = wish.drives

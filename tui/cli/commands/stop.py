@@ -76,7 +76,7 @@ def stop(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Stop a motor on its ramp and wait until it stands. Needs no arming."""
+    """Stop a motor on its ramp and wait for standstill. Needs no arming."""
     if quick and freewheel:
         raise click.UsageError("Either --quick or --freewheel.")
     if addresses and not every:
@@ -170,7 +170,7 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
 
 
 async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish) -> int:
-    """Stop a drive, tell what became of it; returns the exit status."""
+    """Stop a drive, report the result; returns the exit status."""
     from tui.drive.orders import INSTEAD
     from tui.session.command.stop_report import Phase
 

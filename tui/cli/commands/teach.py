@@ -57,9 +57,9 @@ def teach(
 ) -> None:
     """Teach the scale and unit of a raw value by what the drive's display shows now.
 
-    VALUE is what the display shows while CODE is read: 50.3 Hz. Two looks at different values tell
-    scale and sign; one that contradicts them ends with 1. Without VALUE what was taught is shown.
-    Nothing is written to the drive.
+    VALUE is what the display shows while CODE is read: 50.3 Hz. Two readings at different values
+    show scale and sign; one that contradicts them ends with 1. Without VALUE what was taught is
+    shown. Nothing is written to the drive.
     """
     wishes = sum((forget, reference, no_reference, value is not None))
     if wishes > 1:

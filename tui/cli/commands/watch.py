@@ -116,12 +116,12 @@ def watch(
 ) -> None:
     """Watch parameters of drives, by default their monitoring set. Ctrl-C ends it.
 
-    Drives of several lines are watched where several LINEs stand before the CODEs; LINE@ADDRESS
-    names a drive on its line, as in pump@1,2 or tcp:HOST@5.
+    Drives of several lines are watched if several LINEs precede the CODEs; LINE@ADDRESS names a
+    drive on its line, as in pump@1,2 or tcp:HOST@5.
 
     A value is good if it was read in that cycle; otherwise it is the last one, with the quality
-    stale and the time at which it was read. State and direction are told while the status word
-    is watched.
+    stale and the time at which it was read. State and direction are shown while the status word is
+    watched.
     """
     more, codes = further_lines(codes)
     wishes = lines_wished(target, more)

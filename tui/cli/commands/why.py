@@ -90,7 +90,7 @@ async def _requested(
 async def _looked_after(
     opened: OpenLine, target: Target, profile: Profile | None, found: Diagnosis
 ) -> dict[str, Any]:
-    """Have it told what the drive does that was asked and is asked no more.
+    """Report the reaction of a drive that was polled and is polled no longer.
 
     On a sick line it is asked once, at the end.
     """

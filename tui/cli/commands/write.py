@@ -147,7 +147,7 @@ async def _staged(
 async def _tell(
     session: DriveSession, edits: Edits, messages: Messages
 ) -> tuple[dict[str, Any], int]:
-    """Tell what would be written; the same for JSON, and the exit status."""
+    """Show what would be written; the same for JSON, and the exit status."""
     past = await _past_limits(session, edits)
     rows = []
     for edit in edits:
@@ -180,7 +180,7 @@ async def _write(
     *,
     save: bool,
 ) -> tuple[dict[str, Any], int]:
-    """Write, tell each; what became of all for JSON, and the exit status."""
+    """Write, report each; the results for JSON, and the exit status."""
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import save_to_eeprom
 

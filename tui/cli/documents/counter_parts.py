@@ -58,7 +58,7 @@ class LoadField(DocumentPart):
 
 
 class DriveCountersField(DocumentPart):
-    """A pair of the drive's counters as it tells them, and what it counted since the first look."""
+    """A pair of the drive's counters as it reports them, and its counts since the first reading."""
 
     name: str
     frames: int

@@ -1,4 +1,4 @@
-"""Documents about a drive: what it says, does and was told to do."""
+"""Documents about a drive: identity, state, and commands."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class HoldDocument(Document, kw_only=True):
 
 
 class WatchingFamilyField(msgspec.Struct, forbid_unknown_fields=True):
-    """A family that acts when it was asked once and is asked no more."""
+    """A family that reacts when polling stops after the first request."""
 
     profile: str
     name: str
@@ -198,7 +198,7 @@ class ScanHitDocument(Document, kw_only=True):
 
 
 class ScanUnclearDocument(Document, kw_only=True):
-    """`scan`: what came from an address is no answer; it may be taken twice."""
+    """`scan`: bytes from an address that are not an answer; it may be taken twice."""
 
     command: Literal["scan"]
     line: str
@@ -276,7 +276,7 @@ class CountersDocument(DriveDocument, kw_only=True):
 
 
 class CommandDocument(DriveDocument, kw_only=True):
-    """`reference`, `reset`: what the command came to."""
+    """`reference`, `reset`: the result of the command."""
 
     command: Literal["reference", "reset"]
     text: str
@@ -284,7 +284,7 @@ class CommandDocument(DriveDocument, kw_only=True):
 
 
 class StopDocument(DriveDocument, kw_only=True):
-    """`stop`: what became of one drive; a list with --all or several -d."""
+    """`stop`: the result for one drive; a list with --all or several -d."""
 
     command: Literal["stop"]
     stopped: bool

@@ -1,4 +1,4 @@
-"""Documents of `listen`: what others said on a line, and what that comes to."""
+"""Documents of `listen`: the traffic on a line, and the conclusions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class HeardValueField(DocumentPart):
 
 
 class HeardExchangeDocument(Document, kw_only=True):
-    """`listen`: one request with what became of it; `request` and `reply` are hexadecimal."""
+    """`listen`: one request with its result; `request` and `reply` are hexadecimal."""
 
     command: Literal["listen"]
     event: Literal["exchange"]
@@ -141,7 +141,7 @@ class HeardDriveField(DocumentPart):
 
 
 class HeardSummaryDocument(Document, kw_only=True):
-    """`listen`: what it came to by now."""
+    """`listen`: the summary so far."""
 
     command: Literal["listen"]
     event: Literal["summary"]

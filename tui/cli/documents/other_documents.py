@@ -209,7 +209,7 @@ class JournalEntryField(msgspec.Struct, kw_only=True):
 
 
 class DamagedLineField(msgspec.Struct, kw_only=True):
-    """A line of the journal that is no entry, with its beginning."""
+    """A damaged line of the journal, with its beginning."""
 
     file: str
     line: int

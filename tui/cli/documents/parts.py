@@ -11,7 +11,7 @@ QualityText = Literal["good", "stale", "bad"]
 
 
 class DocumentPart(msgspec.Struct, forbid_unknown_fields=True):
-    """Something whose every field is told here."""
+    """An object whose every field is listed here."""
 
 
 class LeftBehindDocument(DocumentPart):
@@ -54,7 +54,7 @@ class WatchedValueField(DocumentPart):
 
 
 class TimeoutField(DocumentPart):
-    """The communication timeout of a drive; all null where the drive does not tell it."""
+    """The communication timeout of a drive; all null if the drive does not report it."""
 
     seconds: float | None
     reaction: str | None
@@ -81,7 +81,7 @@ class HeardField(DocumentPart):
     breaks: int
     turnaround_ms: float | None
     latency_timer_ms: int | None
-    """Of the adapter; null where it does not tell one."""
+    """Of the adapter; null if it does not report one."""
 
 
 class FirstWordField(DocumentPart):
@@ -132,7 +132,7 @@ class EditField(DocumentPart):
 
 
 class PlanItemField(DocumentPart):
-    """One parameter of a set, and what becomes of it."""
+    """One parameter of a set, and its result."""
 
     code: str
     kind: Literal["write", "equal", "skip"]

@@ -11,7 +11,7 @@ from .parts import ComparedSettingField, EditField, PlanItemField
 
 
 class WriteDocument(DriveDocument, kw_only=True):
-    """`write`: what became of each setting."""
+    """`write`: the result of each setting."""
 
     command: Literal["write"]
     dry_run: bool
@@ -23,7 +23,7 @@ class WriteDocument(DriveDocument, kw_only=True):
 
 
 class RestoreDocument(DriveDocument, kw_only=True):
-    """`restore`: the plan, and what became of each setting."""
+    """`restore`: the plan, and the result of each setting."""
 
     command: Literal["restore"]
     dry_run: bool
@@ -96,7 +96,7 @@ class BlockFileDocument(DriveDocument, kw_only=True):
 
 
 class LessonDocument(DriveDocument, kw_only=True):
-    """`teach` with a VALUE: what the look came to."""
+    """`teach` with a VALUE: the result of the reading."""
 
     command: Literal["teach"]
     code: str

@@ -1,4 +1,4 @@
-"""The drives whose values go out to the plant: found, read cycle by cycle, found anew when lost."""
+"""The drives whose values are published: found, read cycle by cycle, found again when lost."""
 
 from __future__ import annotations
 
@@ -29,18 +29,19 @@ FIRST_LOOK_WITHIN = 15.0
 FIND_AGAIN = 3.0
 """Seconds between two looks for drives that are not there, one after the other on each line."""
 SILENT_FOR_LONG = 60.0
-"""Seconds without a good cycle after which it is asked anew who the drive is."""
+"""Seconds without a good cycle after which the drive is identified again."""
 PLANT_LOOK_INTERVAL = 2.0
 RATE_LOOK_INTERVAL = 10.0
 """Seconds between two looks whether the line keeps the wished cycle time."""
 TIMEOUT_READ_AGAIN = 20.0
-"""Seconds after which a drive's communication timeout is read anew."""
+"""Seconds after which a drive's communication timeout is read again."""
 
 GATEWAY = "serve"
 """Name of the program on a line whose clients may start motors."""
 
 Sign = Callable[[int], float | None]
-"""When whoever started the motor of a device was last heard; None where nobody is known to have."""
+"""When the program that started the motor of a device was last heard; None where nobody is known to
+have."""
 
 
 def no_sign(_device: int) -> float | None:
@@ -128,7 +129,7 @@ class PlantDrive:
         self._changed = changed
         self._sign = sign
         self.looked_for = asyncio.Event()
-        """Set once it was asked who it is, whatever it came to."""
+        """Set once its identity was requested, with any result."""
         self._session: DriveSession | None = None
         self.cycle: Snapshot | None = None
         """Its last cycle."""
@@ -258,7 +259,7 @@ class PlantDrive:
 
 
 async def _learn_timeout(session: DriveSession) -> None:
-    """Read anew how long the drive waits for the line; what fails is asked again later."""
+    """Read again how long the drive waits for the line; what fails is asked again later."""
     from tui.bus.api import Priority
     from tui.bus.errors import LineError
     from tui.session.monitor.timeout import read_timeout
@@ -271,7 +272,8 @@ async def _learn_timeout(session: DriveSession) -> None:
 
 
 def _is_orphan(session: DriveSession) -> bool:
-    """Return True if whoever started the motor has ended, and did not mean to leave it running.
+    """Return True if the program that started the motor has ended, and did not mean to leave it
+    running.
 
     So has the client of another program's gateway that commands the drive no more. Reads files.
     """

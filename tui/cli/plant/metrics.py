@@ -1,6 +1,6 @@
 """Lines and drives in the text format of Prometheus, version 0.0.4.
 
-A value stands in the base unit of its kind, which its name tells: seconds for ms and h, ratios for
+A value is in the base unit of its kind, which its name contains: seconds for ms and h, ratios for
 per cent. One that is not good is left out, so that a graph has a gap there and no old number.
 """
 
@@ -114,7 +114,7 @@ METRICS: Mapping[str, MetricHead] = {
     "word": MetricHead("gauge", "A word of bits or names, as it is on the wire."),
     "value": MetricHead("gauge", "A value without a unit."),
 }
-"""All metrics but those of values with a unit, in the order in which they are told."""
+"""All metrics but those of values with a unit, in the order of output."""
 
 
 def metrics_text(lines: Sequence[LineSight], version: str, now: float) -> str:

@@ -1,4 +1,4 @@
-"""The metrics by HTTP, for Prometheus and whoever asks as it does."""
+"""The metrics by HTTP, for Prometheus and similar clients."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Publishing to a broker: everything retained, a last will, and anew after each connection.
+"""Publishing to a broker: everything retained, a last will, and again after each connection.
 
-Nothing is subscribed to, and what a broker sends all the same is thrown away: no message that
-comes from there reaches a drive.
+Nothing is subscribed to, and messages that a broker sends anyway are discarded: none of them
+reaches a drive.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Changes:
-    """Tells one listener that something was read; set once that is there."""
+    """Notifies one listener that something was read; set once that is there."""
 
     def __init__(self) -> None:
         self.listener: Callable[[], None] = lambda: None
@@ -75,7 +75,7 @@ async def metrics_at(lines: Sequence[PlantLine], host: str, port: int) -> AsyncI
 async def published_to(
     lines: Sequence[PlantLine], broker: Broker, changes: Changes
 ) -> AsyncIterator[str]:
-    """While inside, a broker is kept told; gives what is told where, for a person."""
+    """While inside, a broker is kept told; returns what is reported where, for a person."""
     from .mqtt import LAST_WORD_WITHIN, MqttPublisher
 
     warn_of_plain_password(broker)

@@ -21,7 +21,7 @@ class DriveSight:
     cycle: Snapshot | None = None
     """As it was read: what was not read in it is not good."""
     error: str = ""
-    """Why there are no values of now; empty where there are."""
+    """Why there are no current values; empty where there are."""
     contact: Contact = "not_polled"
     """Result of the last requests to it."""
 
@@ -41,7 +41,7 @@ class LineSight:
 def drive_sight(
     device: int, session: DriveSession | None, cycle: Snapshot, now: float
 ) -> DriveSight:
-    """A drive by its last cycle; one that is too old has no value of now any more.
+    """A drive by its last cycle; one that is too old has no current value any more.
 
     `now` is on the monotonic clock.
     """
@@ -51,7 +51,8 @@ def drive_sight(
 
 
 def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
-    """The same without a good value: whoever reads the drive has not come round for long."""
+    """The same without a good value: the program that reads the drive has not reached it for
+    long."""
     from tui.session.drive_state import drive_state
 
     readings = {code: one.aged(now, -1.0) for code, one in cycle.readings.items()}

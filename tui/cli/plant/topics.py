@@ -1,4 +1,4 @@
-"""Lines and drives as retained messages of MQTT: the tree of topics and what stands in each.
+"""Lines and drives as retained messages of MQTT: the tree of topics and their contents.
 
 ROOT/status          online, or offline: the last will of this program
 ROOT/LINE/line       the line as JSON

@@ -1,1 +1,1 @@
-"""A motor that runs as long as a command does: its end, what is told of it, its way to rest."""
+"""A motor that runs as long as a command does: its end, the reports on it, its stop."""

@@ -18,7 +18,7 @@ def may_ask() -> bool:
 
 
 async def says_yes(question: str) -> bool:
-    """Ask on standard error, and wait for a line; everything but y is no.
+    """Show a question on standard error, and wait for a line; everything but y is no.
 
     The loop goes on meanwhile, and may be cancelled.
     """

@@ -16,7 +16,7 @@ WAITS = "a run command that waits at the terminals starts the motor"
 
 
 async def give_control_back(session: DriveSession, *, arm: bool) -> str:
-    """Give it back; the motor was stopped before. What it came to; raises Failure."""
+    """Give it back; the motor was stopped before. Its result; raises Failure."""
     from tui.drive.orders import deciding_codes
     from tui.session.command.commander import Commander
     from tui.session.read.reader import Reader

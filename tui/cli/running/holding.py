@@ -31,7 +31,7 @@ HOLD_POLL_INTERVAL = 0.2
 
 @dataclass(slots=True)
 class Holding:
-    """Drives that are asked on, from the moment in which each is taken."""
+    """Drives that are kept polled, from the moment each is found."""
 
     fleet: Fleet
     tell: Tell
@@ -40,7 +40,7 @@ class Holding:
     """The fault that each drive was last seen in; empty for none."""
 
     def take(self, session: DriveSession) -> None:
-        """Ask a drive on from now on."""
+        """Keep polling a drive from now on."""
         self.fleet.take(session)
 
     async def until(self, ending: Ending, seconds: float | None = None) -> None:
@@ -54,7 +54,7 @@ class Holding:
                 await asyncio.wait_for(ending.event.wait(), left)
 
     def look(self) -> None:
-        """Tell what has changed: drives that do not answer, or do again, and faults."""
+        """Report changes: drives that do not answer, or do again, and faults."""
         looks = self.fleet.line_watch.looks
         for device, look in looks.items():
             self._compare(device, look)
@@ -80,7 +80,7 @@ class Holding:
 async def hold_on(
     opened: OpenLine, sessions: Sequence[DriveSession], seconds: float | None
 ) -> None:
-    """Ask drives on for so many seconds; nothing is done where none are named.
+    """Keep polling drives for so many seconds; nothing is done where none are named.
 
     Raises Exit with 128 and the number of the signal that ended it before.
     """
@@ -108,7 +108,7 @@ async def hold_lines_on(
 
 @asynccontextmanager
 async def keep_polling(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Holding, Ending]]:
-    """Whoever asks drives on, and its end by a signal.
+    """The poller of drives, and its end by a signal.
 
     Raises Exit with 128 and the number of the signal, once the block has ended.
     """
@@ -120,7 +120,7 @@ async def keep_polling(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Hold
 
 @contextmanager
 def _polling(opened: OpenLine, tell: Tell) -> Iterator[Holding]:
-    """Whoever asks the drives of a line on, until the block ends."""
+    """Keeps polling the drives of a line until the block ends."""
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
 

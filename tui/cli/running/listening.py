@@ -53,7 +53,7 @@ class HearingRun:
             self._hearing.take(*self._hearing.read(left))
 
     def end(self) -> None:
-        """Tell what is still open, and what it came to."""
+        """Report open requests, and the summary."""
         now = time.monotonic()
         self._hearing.end(now)
         self._sum_up(now)

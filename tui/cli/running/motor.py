@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 
 RUN_POLL_INTERVAL = 0.05
 CYCLES_AT_REST = 2
-"""Cycles in a row that show a motor at rest before it counts as stopped by itself."""
+"""Cycles in a row that show a motor at rest before it counts as stopped on its own."""
 STOPS_THAT_MAY_FAIL = 2
-"""Stops that may fail on a line without trouble before it is told that the motor runs."""
+"""Stops that may fail on a line without trouble before the motor is reported as running."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class Run:
         self.telling.tell("control", text)
 
     async def _follow(self) -> None:
-        """Tell about the motor until the end; raises Failure where it stops by itself."""
+        """Report on the motor until the end; raises Failure if it stops on its own."""
         begun = time.monotonic()
         seen, rest = 0, 0
         while not self.ending.event.is_set():
@@ -196,7 +196,7 @@ class Run:
         return text, ENDED_AFTER_WRITING
 
     async def _bring_to_rest(self) -> None:
-        """Stop the motor and see it stand; on a lost line as soon as that is back.
+        """Stop the motor and wait for its standstill; on a lost line as soon as that is back.
 
         Raises Failure where the drive answers and does not stop.
         """

@@ -62,13 +62,13 @@ class Progress:
 
 
 class ScanTelling:
-    """Tells of one search; a hit goes out at once."""
+    """Reports on one search; a hit goes out at once."""
 
     def __init__(self, line_text: str, *, as_json: bool) -> None:
         self._line = line_text
         self._as_json = as_json
         self._drawn = ""
-        """The line of progress that stands on the terminal."""
+        """The line of progress on the terminal."""
         self._on_terminal = sys.stderr.isatty()
 
     def families(self, found: Sequence[WatchingFamily]) -> None:
@@ -105,7 +105,7 @@ class ScanTelling:
         sys.stdout.flush()
 
     def unclear(self, setting: LineSetting | None, result: ScanResult) -> None:
-        """Something came from an address that is no answer."""
+        """Report bytes from an address that are not an answer."""
         if self._as_json:
             where = _setting_json(setting)
             reported = {"event": "unclear", "device": result.device, **where, "text": result.error}
@@ -148,7 +148,7 @@ class ScanTelling:
 
 
 def hit_json(hit: Hit) -> dict[str, Any]:
-    """A drive that answered, as JSON tells it."""
+    """A drive that answered, as it appears in JSON."""
     who = hit.identity
     return {
         "device": who.device,

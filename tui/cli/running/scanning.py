@@ -159,7 +159,7 @@ class Scan:
         return [device for device in self.devices if device not in known]
 
     async def _searched(self, search: Search, work: asyncio.Future[None]) -> None:
-        """Tell how far a search is until it has ended."""
+        """Report how far a search is until it has ended."""
         try:
             while not work.done():
                 await asyncio.wait({work}, timeout=PROGRESS_EVERY)
@@ -185,7 +185,7 @@ class Scan:
         return Progress(self.setting, search.requested, search.of, found, left, len(later))
 
     async def _take(self, fleet: Fleet, result: ScanResult) -> None:
-        """An address is not silent: tell it at once, then ask the drive on."""
+        """An address is not silent: report it at once, then keep polling the drive."""
         if result.identity is None or result.error:
             self.unknown.append(result.device)
             self.tell.unclear(self.setting, result)

@@ -1,6 +1,6 @@
 """Messages to systemd by the protocol of sd_notify: ready, alive, ending.
 
-A datagram to the socket that NOTIFY_SOCKET names; without it nothing is told to anybody.
+A datagram to the socket that NOTIFY_SOCKET names; without it nothing is sent.
 """
 
 from __future__ import annotations

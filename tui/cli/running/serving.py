@@ -42,7 +42,7 @@ class GatewayWish:
 
 @dataclass(frozen=True, slots=True)
 class OpenedLine:
-    """A line that is served, with what is told of its drives."""
+    """A line that is served, with the facts configured for its drives."""
 
     name: str
     opened: OpenLine

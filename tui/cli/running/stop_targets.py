@@ -58,7 +58,7 @@ class StopWish:
 
 
 async def first_stopped(wish: StopWish, device: int, before: StartRecord | None) -> StoppableDrive:
-    """Send the first word, then find out what the drive is; both are told.
+    """Send the first word, then find out what the drive is; both are reported.
 
     `before` is the last start of its motor from here. Raises UsageError where it is not known what
     stops it, NoAnswer where it is not there, Failure where it took no stop word.
@@ -176,9 +176,9 @@ async def found_at(
 ) -> StoppableDrive | None:
     """The drive at an address; None where nobody answers.
 
-    What comes but is no answer is asked for anew with an operator's patience. A drive that tells
-    nothing of its family is sent the word that stops them all first. Raises what
-    `first_stopped` raises, Failure for answers that are none; where it is asked shortly, LineError.
+    Damaged answers are requested again with an operator's patience. A drive that shows no family is
+    sent the word that stops them all first. Raises what `first_stopped` raises, Failure for answers
+    that are none; where it is asked shortly, LineError.
     """
     from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import LineError, NoAnswer

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class StopTelling:
-    """Tells each drive as soon as it is known, and keeps all for JSON."""
+    """Reports each drive as soon as it is known, and keeps all for JSON."""
 
     def __init__(self, line_text: str, *, as_json: bool) -> None:
         self.as_json = as_json
@@ -44,7 +44,7 @@ class StopTelling:
         ]
 
     def stopped(self, session: DriveSession, text: str) -> None:
-        """A motor stands."""
+        """A motor is at standstill."""
         from tui.session.monitor.timeout import timeout_now
 
         if not self.as_json:
@@ -54,7 +54,7 @@ class StopTelling:
         self.documents[-1]["timeout"] = timeout_json(timeout_now(session))
 
     def failed(self, device: int, profile: str | None, text: str, status: int) -> None:
-        """A motor is not known to stand."""
+        """A motor is not known to be at standstill."""
         complain(text)
         self._keep(device, profile, text, status)
 

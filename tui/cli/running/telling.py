@@ -19,7 +19,7 @@ TOLD_EVERY = 1.0
 
 
 class RunTelling:
-    """Tells of one motor; `say` puts a line out."""
+    """Reports on one motor; `say` puts a line out."""
 
     def __init__(self, session: DriveSession, say: Callable[[str], None], *, as_json: bool) -> None:
         self._session = session
@@ -32,7 +32,7 @@ class RunTelling:
     def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
         """A line about the motor once a second; trouble on the line when it begins and ends.
 
-        `left_alone` gives what becomes of the motor where nobody asks its drive.
+        `left_alone` gives what happens to the motor when polling stops.
         """
         if latest.error:
             if not self._trouble:

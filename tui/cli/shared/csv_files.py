@@ -1,4 +1,4 @@
-"""CSV files of `watch`: begun anew, continued or replaced as told, and rotated."""
+"""CSV files of `watch`: started, continued or replaced as configured, and rotated."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ class CsvFile:
         return size > head and size + more > self._rotate
 
     def _put_aside(self) -> None:
-        """Give what was written so far a name of its own, and begin anew."""
+        """Give the written file a name of its own, and start a new one."""
         self._file.close()
         by_day = self._rotate == DAY
         when = self._day.isoformat() if by_day else f"{datetime.now():%Y-%m-%dT%H%M%S}"
@@ -142,7 +142,7 @@ class CsvFile:
         return Failure(f"{self.path} cannot be written: {error.strerror or error}.", USAGE)
 
     def close(self) -> None:
-        """Close the file; what a full disk did not take was told when it was written."""
+        """Close the file; a full disk was reported at the time of writing."""
         with suppress(OSError):
             self._file.close()
 

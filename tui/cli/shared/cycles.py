@@ -1,4 +1,4 @@
-"""Cycles of a watched drive as `watch` tells them: good is what was read in that very cycle."""
+"""Cycles of a watched drive for `watch`: good is what was read in that very cycle."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ CHANNEL_NAMES: dict[Quantity, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """All that `status` tells of one drive."""
+    """Everything that `status` shows about one drive."""
 
     session: DriveSession
     state: DriveState
@@ -236,7 +236,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
 def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
     """Return the SHOWN values by quantity; null if the family lacks it or it was not read.
 
-    What was taught stands there by its code.
+    Taught scales are stored there by their code.
     """
     from .output import reading_json
 

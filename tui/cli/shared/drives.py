@@ -42,7 +42,7 @@ async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool 
 
 
 def failed(target: Target, text: str, status: int, line_name: str = "") -> dict[str, Any]:
-    """Tell what is wrong with one of several drives; the same as an object.
+    """Report what is wrong with one of several drives; the same as an object.
 
     `line_name` is what its line is called where there are several.
     """
@@ -53,6 +53,6 @@ def failed(target: Target, text: str, status: int, line_name: str = "") -> dict[
 
 
 def failed_line(line_text: str, line_name: str, text: str, status: int) -> dict[str, Any]:
-    """Tell what is wrong with one of several lines; the same as an object, without a device."""
+    """Report what is wrong with one of several lines; the same as an object, without a device."""
     say(f"drivepanel: {line_name}: {text}", err=True)
     return {"line": line_text, "error": text, "status": status}

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    """Do the work; whatever becomes of it, say what drives do that are asked no more.
+    """Do the work; in any case, report what drives do when polling stops.
 
     Raises Exit with 128 and the number of a signal that ended it; one that comes once the work is
     done ends only what is said of the drives.

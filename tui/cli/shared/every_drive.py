@@ -18,7 +18,7 @@ USUAL_SEARCH = "1-10"
 async def every_drive(opened: OpenLine, target: Target, addresses: str | None) -> Target:
     """The target with every drive that answers at the addresses, or on a simulated line.
 
-    Raises LinkSyntaxError for what are no addresses, Failure where nobody answers.
+    Raises LinkSyntaxError for invalid addresses, Failure if no drive answers.
     """
     from tui.session.connect.addresses import parse_addresses
     from tui.session.connect.search import Search

@@ -36,7 +36,7 @@ class FaultFinding:
     hint: Hint | None
     readings: Mapping[str, Reading]
     alarm: str = ""
-    """The name of the alarm that is told of, where there is no fault."""
+    """The name of the reported alarm, if there is no fault."""
 
     @property
     def advice(self) -> FaultAdvice | None:
@@ -46,7 +46,7 @@ class FaultFinding:
 
     @property
     def ready(self) -> bool | None:
-        """True if the drive says that a reset can work now; None where it does not tell."""
+        """True if the drive says that a reset can work now; None if it does not report it."""
         raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
         return reset_ready(self.profile, raws)
 

@@ -27,7 +27,7 @@ async def find_drives(
 ) -> tuple[FoundOnLines, int]:
     """The wanted drives that are there, in order, and the highest status of the others.
 
-    What is wrong with one of several is told; raises it where there is one drive only.
+    Errors of one of several are reported; raises it where there is one drive only.
     """
     wanted = sum(len(wish.on(opened)) for opened, wish in lines)
     found = _Finding(alone=wanted == 1, several=len(lines) > 1, as_json=as_json)
@@ -36,7 +36,7 @@ async def find_drives(
 
 
 class _Finding:
-    """Finds drives, and tells of those that it does not."""
+    """Finds drives, and reports those that it does not find."""
 
     def __init__(self, *, alone: bool, several: bool, as_json: bool) -> None:
         self.worst = DONE

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tui.session.timeout_report import Timeout
 
 TOLD_WITHIN = 3.0
-"""Seconds in which a drive tells its timeout at the end of a command, on a quick line."""
+"""Seconds in which a drive reports its timeout at the end of a command, on a quick line."""
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ class LeftAlone:
     """True if the drive is there afterwards: a simulated one ends with its line."""
 
     async def learn(self) -> None:
-        """Have the drive tell its timeout, unless it has; no answer fails nothing."""
+        """Read the drive's timeout, unless it is known; no answer fails nothing."""
         from tui.bus.api import Priority
         from tui.bus.errors import LineError
         from tui.session.monitor.timeout import read_timeout
@@ -91,7 +91,7 @@ def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
 
 
 def hold_text(session: DriveSession, line_text: str) -> str:
-    """The command that asks a drive on."""
+    """The command that keeps polling a drive."""
     words = ["drivepanel", "hold", shlex.quote(line_text), "-d", str(session.device)]
     if session.known_identity.profile != session.profile.id:
         words += ["-p", session.profile.id]
@@ -101,7 +101,7 @@ def hold_text(session: DriveSession, line_text: str) -> str:
 def timeout_json(found: Timeout) -> dict[str, Any] | None:
     """The object `timeout` of every command: null where a drive has none or it is off.
 
-    Its fields are null where the drive does not tell it.
+    Its fields are null if the drive does not report it.
     """
     if not found.known:
         return {"seconds": None, "reaction": None, "fault": None, "begun": None}

@@ -62,7 +62,7 @@ class LineArgument(click.Argument):
         ]
 
     def _is_left_out(self, ctx: click.Context, opts: Mapping[str, Any]) -> bool:
-        """Return True if what stands in its place belongs to the arguments behind it."""
+        """Return True if the word in its place belongs to the arguments that follow."""
         text = opts.get(self.name or "")
         if not isinstance(text, str) or self.resolve_envvar_value(ctx) is None:
             return False
@@ -228,7 +228,7 @@ def mind_the_line(opened: OpenLine) -> None:
 
 
 def tell_changes(opened: OpenLine, before: tuple[str, ...]) -> None:
-    """Say what is not as it was, but for what was said `before`; a refusal tells it itself."""
+    """Say what is not as it was, but for what was said `before`; a refusal contains it."""
     ctx = click.get_current_context(silent=True)
     if opened.known is None or (ctx is not None and ctx.params.get("arm")):
         return

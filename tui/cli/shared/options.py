@@ -212,8 +212,8 @@ def usual_settings(profile_id: str | None) -> UsualSettings | None:
 async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     """The wanted drive with its profile: the named one, else that of its identity.
 
-    Raises UsageError with what to type where the drive does not say who it is, Contradiction
-    where it says that it is another than the profile named.
+    Raises UsageError with what to type if the drive does not identify itself, Contradiction if it
+    reports another identity than the profile named.
     """
     from tui.drive.profile import library
     from tui.session.connect.contradiction import own_words

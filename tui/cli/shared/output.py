@@ -127,7 +127,7 @@ def iso_time(wall: float) -> str:
 
 
 def console() -> Console:
-    """A console on standard output, wide where that is no terminal, so that no line is folded.
+    """A console on standard output, wide unless that is a terminal, so that no line is folded.
 
     Nothing that is printed on it is markup, and no control character of a text reaches it.
     Raises BrokenPipeError where its reader went away.

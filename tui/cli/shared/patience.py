@@ -25,7 +25,7 @@ def patience(line: ModbusLine, seconds: float) -> float:
 async def read_until(
     console: DriveConsole, codes: Sequence[str], end: float
 ) -> tuple[dict[str, Reading], list[str]]:
-    """Readings by code, those that tell the state first, and the codes that did not come in time.
+    """Readings by code, the state first, and the codes that did not arrive in time.
 
     `end` is a time of the loop. Raises the line's errors if nothing comes.
     """

@@ -1,4 +1,4 @@
-"""The LINEs of a service: names resolved, with the drives and profiles that are told of each."""
+"""The LINEs of a service: names resolved, with the drives and profiles configured for each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .several_lines import split_addresses
 
 @dataclass(frozen=True, slots=True)
 class ServedLine:
-    """One line, and what is told of it on the command line and in the settings file."""
+    """One line, and its configuration on the command line and in the settings file."""
 
     name: str
     """As it was typed first, without addresses."""
@@ -35,8 +35,8 @@ class ServedLine:
 def served_lines(words: Sequence[str]) -> list[ServedLine]:
     """The lines that are meant; `LINE@1,2` names drives, and so does a name of the settings file.
 
-    Two names of one line, with their drives, are one. Raises UsageError, and LinkSyntaxError for
-    what is no address.
+    Two names of one line, with their drives, are one. Raises UsageError, and LinkSyntaxError for an
+    invalid address.
     """
     from tui.session.connect.line_key import line_key
 

@@ -123,7 +123,7 @@ def set_of_drive(
 
 
 async def take_set(session: DriveSession, *, settings_only: bool = False) -> ParameterSet:
-    """Every readable parameter of a drive, with who it is, as far as it says so.
+    """Every readable parameter of a drive, with its identity, as far as it reports one.
 
     With `settings_only` no measurement, counter or command word is among them.
     """
@@ -174,7 +174,7 @@ def counter(what: str) -> Callable[[int, int], None] | None:
 
 
 class ResultTelling:
-    """Tells each written or refused setting as soon as it is known, and keeps what was told."""
+    """Reports each written or refused setting as soon as it is known, and keeps the reports."""
 
     def __init__(self, messages: Messages) -> None:
         self.messages = messages

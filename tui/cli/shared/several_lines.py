@@ -1,6 +1,6 @@
 """Several LINEs for one command: which drives of each are meant, and their opening side by side.
 
-The LINEs stand first; each may have its drives behind an `@`, as in `pump@1,2` or `tcp:HOST@5`.
+The LINEs come first; each may have its drives behind an `@`, as in `pump@1,2` or `tcp:HOST@5`.
 """
 
 from __future__ import annotations
@@ -109,8 +109,8 @@ def _is_line(word: str) -> bool:
 def lines_wished(target: Target, more: Sequence[str]) -> list[LineWish]:
     """Return the lines of the first LINE, which made the target, and of those after it; each once.
 
-    -d and -p count for every LINE; the addresses behind a LINE go before -d. Raises UsageError,
-    and LinkSyntaxError for what is no LINE or no address.
+    -d and -p count for every LINE; the addresses behind a LINE go before -d. Raises UsageError, and
+    LinkSyntaxError for an invalid LINE or address.
     """
     from tui.session.connect.line_key import line_key
     from tui.session.connect.open_line import check_line
@@ -178,7 +178,7 @@ def on_lines(
 
 @contextmanager
 def _line_of(wish: LineWish, *, read_only: bool) -> Iterator[OpenLine]:
-    """A line that connects by itself, closed at the end."""
+    """A line that connects automatically, closed at the end."""
     from tui.session.connect.open_line import open_line
 
     opened = open_line(

@@ -92,7 +92,7 @@ def handled(handle: Handler, *, but: str = "", always: str = "") -> Iterator[Non
 
 @contextmanager
 def never_suspended(tell: Callable[[str], None] | None = None) -> Iterator[None]:
-    """While inside, nothing but SIGSTOP suspends the program; `tell` is given a sentence for it.
+    """While inside, nothing but SIGSTOP suspends the program; The callback gets a sentence for it.
 
     To be entered before threads start that belong to the line: what the main thread holds back
     here, they hold back too. Signals of errors that another program sends become SIGTERM.

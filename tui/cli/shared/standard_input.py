@@ -14,8 +14,8 @@ BACKGROUND_PAUSE = 1.0
 def typed_lines(handle: int = 0) -> Iterator[str]:
     """Lines without their ends, until the input ends; for a thread of its own.
 
-    Reads the handle itself: a buffered stream that waits would hold up the end of the program.
-    In the background of a shell it waits until the program comes to the front.
+    Reads the handle itself: a buffered stream that waits would hold up the end of the program. In
+    the background of a shell it waits until the program is in the foreground.
     """
     rest = b""
     while (data := _read(handle)) != b"":

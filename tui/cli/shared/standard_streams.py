@@ -67,7 +67,8 @@ def output_lost() -> str:
 
 
 def acts(command: Callable[..., object]) -> bool:
-    """Return True if a command's status tells what became of a drive, whoever reads its output."""
+    """Return True if a command's status reports the result for a drive, even if nothing reads its
+    output."""
     return command.__name__ in ACTING
 
 

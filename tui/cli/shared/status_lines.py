@@ -39,10 +39,10 @@ class StatusWish:
     """Options of `status` besides lines and drives."""
 
     every: bool
-    """True if every drive that answers is told, a line each."""
+    """True if every drive that answers is reported, a line each."""
     addresses: str | None
     hold: float | None
-    """Seconds for which the drives are asked on."""
+    """Seconds for which the drives are kept polled."""
     as_json: bool
 
     def where(self, wish: LineWish) -> str | None:
@@ -60,13 +60,13 @@ class LineField:
 
 
 def say_status(status: Status) -> None:
-    """Tell a person all of one drive."""
+    """Show a person everything about one drive."""
     for title, text in status_table(status):
         say_row(title, plain(text) or "-----", STATUS_TITLES)
 
 
 def say_in_a_line(status: Status, before: str = "") -> None:
-    """Tell a person of one drive in a line, and in another one of a motor left behind."""
+    """Show a person one drive in a line, and in another one a motor that was left running."""
     say(f"{before}{plain(drive_in_a_line(status))}")
     if status.left:
         text = plain(status.left.sentence(status.session.line_text))
@@ -74,7 +74,7 @@ def say_in_a_line(status: Status, before: str = "") -> None:
 
 
 async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: StatusWish) -> int:
-    """Tell the drives of several lines, in order; what is wrong with one is told as it is seen.
+    """Report the drives of several lines, in order; problems of one are reported as they occur.
 
     Returns the highest exit status. Raises what nobody foresaw.
     """

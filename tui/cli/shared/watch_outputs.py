@@ -27,7 +27,7 @@ class WatchedDrive:
 
     session: DriveSession
     codes: list[str]
-    """All that is told of it."""
+    """All that is reported about it."""
     line_text: str
     line_name: str
     """The line as it was typed: the name of the settings file where that has one."""
@@ -35,7 +35,7 @@ class WatchedDrive:
 
 @dataclass(frozen=True, slots=True)
 class Several:
-    """Of what there are several, so that it has to be told which."""
+    """There are several of them, so each is named."""
 
     lines: bool
     drives: bool
@@ -45,7 +45,7 @@ class Several:
         return self.named(one.line_name, one.session.device)
 
     def named(self, line_name: str, device: int) -> str:
-        """The same of a drive that is told by its line, as typed, and its address."""
+        """The same for a drive named by its line, as typed, and its address."""
         line = line_name if self.lines else ""
         drive = f"device {device}" if self.drives else ""
         return "  ".join(part for part in (line, drive) if part)
@@ -56,7 +56,7 @@ class Several:
         return [*line, *([str(one.session.device)] if self.drives else [])]
 
     def titles(self) -> list[str]:
-        """The columns that tell which."""
+        """The columns that identify it."""
         return [*(["line"] if self.lines else []), *(["device"] if self.drives else [])]
 
 
@@ -103,7 +103,7 @@ def cycle_json(line_text: str, session: DriveSession, snapshot: Snapshot) -> dic
 
 
 def known_state(state: DriveState) -> str | None:
-    """The kind of a state that was read; None where its words were not, or tell nothing."""
+    """The kind of a state that was read; None if its words are missing, or show nothing."""
     return state.kind if state.headline and state.kind != "unknown" else None
 
 

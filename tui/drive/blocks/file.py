@@ -139,7 +139,7 @@ def _check_end(
     lines: Mapping[tuple[str, str], int],
     count: int,
 ) -> None:
-    """Raise MappingError unless the end tells the number of slots that are there."""
+    """Raise MappingError unless the end states the number of slots that are there."""
     end = tables.get(END_OF_BLOCKS)
     if not isinstance(end, dict):
         last = text.count("\n") + 1

@@ -17,12 +17,12 @@ from .shared_rows import ProfileTables, read_tables
 from .toml_lines import TomlPath
 
 TOLD = 10
-"""Faults that are told where a profile is wanted; a check tells all."""
+"""Faults that are reported if a profile is requested; a check reports all."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProfileFault:
-    """One fault, and where it stands."""
+    """One fault, and its place."""
 
     file: str
     line: int
@@ -46,8 +46,8 @@ def checked_data(path: Path, packaged: Path) -> ProfileData:
 def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[ProfileFault]]:
     """The data of a profile file, None where it has no form, and all its faults by line.
 
-    `packaged` is the folder of the profiles that come with the panel. Raises ProfileError where
-    the file cannot be read, or is no TOML.
+    `packaged` is the folder of the profiles that come with the panel. Raises ProfileError if the
+    file cannot be read, or is not valid TOML.
     """
     sources = read_tables(path, packaged)
     try:
@@ -58,7 +58,7 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
 
 
 def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
-    """Faults of form, and those of the rest as far as that can be told."""
+    """Faults of form, and those of the rest as far as they can be known."""
     form, mended = form_faults(sources.tables)
     reported = [
         (path, f"{place_label(sources.tables, path)}: {text.rstrip('.')}.")

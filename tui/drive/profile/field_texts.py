@@ -283,7 +283,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
 
 @lru_cache(maxsize=128)
 def _written_below(table: type) -> Mapping[str, str]:
-    """Texts that stand below the fields of a table in its source."""
+    """Texts below the fields of a table in its source."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(table))).body[0]
     body = tree.body if isinstance(tree, ast.ClassDef) else []
     found: dict[str, str] = {}

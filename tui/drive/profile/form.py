@@ -14,7 +14,7 @@ from .schema import ProfileData
 from .toml_lines import TomlPath
 
 TOLD_SINGLY = 12
-"""Allowed values that are told one by one; of more the nearest are."""
+"""Allowed values that are listed one by one; of more the nearest are."""
 TEXT_FORMS = {
     r"^[0-9]+(\.[0-9]+)?$": 'a decimal number in quotes, such as "0.1"',
     r"^[a-z][a-z0-9_-]*$": "small letters, digits, - and _, a letter first",

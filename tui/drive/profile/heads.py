@@ -19,14 +19,14 @@ from ..errors import ProfileError
 from ..small_file import open_regular, read_small_text
 
 HEAD_BYTES = 4096
-"""Characters in which a head stands."""
+"""Characters within which a head ends."""
 _HEADER = re.compile(r"^\[+[ \t]*([\w-]+)[^\n]*", re.MULTILINE)
 _PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
 _CODE = re.compile(r"""^\[\[parameters\]\]\ncode = (["'])(.+)\1$""", re.MULTILINE)
 
 
 class ProfileFileHead(NamedTuple):
-    """The first table of a file as it stands there, unchecked."""
+    """The first table of a file unchanged and unchecked."""
 
     table: Mapping[str, Any] = MappingProxyType({})
     parameters: int = 0
@@ -168,7 +168,7 @@ def _whole(path: Path, packaged: Path) -> Mapping[str, Any]:
 
 
 def section(text: str, name: str) -> Any:
-    """A table of the top read by itself; None where that cannot be done."""
+    """A table of the top read alone; None where that cannot be done."""
     import tomli
 
     from ..toml_text import toml_tables

@@ -1,6 +1,6 @@
 """Reading what the faults and alarms of a family point at, once somebody asks.
 
-It stands in a file of its own beside the profiles, so that a profile stays readable and the first
+It is in a file of its own beside the profiles, so that a profile stays readable and the first
 picture of a drive waits for none of it.
 """
 
@@ -22,9 +22,9 @@ HelpPlace = tuple[str, int]
 def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
     """Read the help on a family's faults: its own rows before those of its help file.
 
-    `folders` hold profiles; the file is sought in their folder `help`, the first found counts.
-    From a file that does not stand beside the profile (the first folder) what does not fit is
-    left out: it belongs to another edition. Raises ProfileError with each fault, its file and line.
+    `folders` hold profiles; the file is sought in their folder `help`, the first found counts. From
+    a file that is not beside the profile (the first folder) rows that do not fit are omitted: it
+    belongs to another edition. Raises ProfileError with each fault, its file and line.
     """
     name = (data.faults.help_file or data.profile.id) + ".toml"
     found = next((f / FOLDER / name for f in folders if (f / FOLDER / name).is_file()), None)
@@ -65,7 +65,7 @@ def help_findings(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpP
 
 
 def _hints(reported: HelpData) -> Iterator[tuple[HelpPlace, str, Hint]]:
-    """Everything a help file tells, with its place and its name."""
+    """All contents of a help file, with their place and name."""
     for index, fault in enumerate(reported.faults):
         yield ("faults", index), _label(fault), fault
     for index, alarm in enumerate(reported.alarms):

@@ -71,8 +71,8 @@ def profile_files() -> Iterator[tuple[Path, bool]]:
 def listings() -> list[Listing]:
     """All profiles by id; a user's profile takes the place of a packaged one with its id.
 
-    A file whose head cannot be read is listed under its file name, so that it is seen; using
-    it then tells the fault.
+    A file whose head cannot be read is listed under its file name, so that it is seen; using it
+    then reports the fault.
     """
     return [listing for listing in all_files() if listing.hidden_by is None]
 
@@ -132,7 +132,7 @@ def load_file(path: Path) -> Profile:
 
 
 def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
-    """All parameters of a profile as a file would tell them; None where it shares none."""
+    """All parameters of a profile as a file would list them; None where it shares none."""
     from .shared_rows import parsed, read_tables, source_text
 
     if "rows_from" not in parsed(source_text(listing.path)).get("profile", {}):
@@ -188,7 +188,7 @@ def mentions_function(listing: Listing, code: int) -> bool:
 
 @lru_cache(maxsize=64)
 def version_shown(profile_id: str | None, version: str) -> str:
-    """The version that a drive of a family tells, as a person reads it: 0201 may be 2.1."""
+    """The version that a drive of a family reports, as a person reads it: 0201 may be 2.1."""
     listing = next((one for one in listings() if one.id == profile_id), None)
     if listing is None or len(version) != 4 or not version.isdecimal():
         return version

@@ -1,8 +1,8 @@
-"""A profile's tables with the rows that it shares with others, and where each of them stands.
+"""A profile's tables with the rows that it shares with others, and the place of each of them.
 
 `profile.rows_from` names files beside the profile. Their tables come first; a row of the profile
-with the same key (code, id, raw) changes fields of the shared one; any other is added behind the
-row that stands above it in its file, or at the end.
+with the same key (code, id, raw) changes fields of the shared one; any other is added after the row
+above it in its file, or at the end.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ROW_KEYS: Mapping[TomlPath, str] = {
     ("enumerations",): "id",
     ("parameters",): "code",
 }
-"""By the place of a list of rows, the field that tells its rows apart."""
+"""By the place of a list of rows, the field that identifies its rows."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,10 @@ class ProfileTables:
 
     tables: dict[str, Any]
     origins: Mapping[TomlPath, list[RowOrigin]] = field(default_factory=dict)
-    """By path, where it stands, the profile's own file first; rows only, if several files."""
+    """By path, its place, the profile's own file first; rows only, if several files."""
 
     def place(self, path: TomlPath) -> tuple[str, int]:
-        """File and line of a path; of the row that it is in, where it stands nowhere itself."""
+        """File and line of a path; of the row that contains it, if it has no place of its own."""
         for length in range(len(path), -1, -1):
             for source, start in self.origins.get(path[:length], ()):
                 if (line := source.lines.get((*start, *path[length:]))) is not None:
@@ -116,7 +116,7 @@ def source_text(path: Path) -> SourceText:
 
 
 def parsed(source: SourceText) -> dict[str, Any]:
-    """The tables of a text; raises ProfileError with the line where it is no TOML."""
+    """The tables of a text; raises ProfileError with the line if it is not valid TOML."""
     try:
         return toml_tables(source.text)
     except tomli.TOMLDecodeError as error:
@@ -135,7 +135,7 @@ def _shared_file(own: SourceText, path: Path, packaged: Path, name: object) -> P
 
 
 def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables, with the family's order of words at each 32-bit value that tells none."""
+    """The tables, with the family's order of words at each 32-bit value that has none."""
     reading, rows = tables.get("reading"), tables.get("parameters")
     order = reading.get("low_word_first") if isinstance(reading, dict) else None
     if isinstance(order, bool) and isinstance(rows, list):

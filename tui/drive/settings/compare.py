@@ -33,7 +33,7 @@ class Side:
     texts: Mapping[str, str] = field(default_factory=dict)
     """Text instead of a number: a factory setting that depends on the rating."""
     unsure: Mapping[str, str] = field(default_factory=dict)
-    """Codes of values that no document of the family tells, and how that is said."""
+    """Codes of values that no document of the family states, and how that is reported."""
     left: Mapping[str, str] = field(default_factory=dict)
     """Codes that are not compared with this side, and why."""
 
@@ -95,7 +95,7 @@ def compare_settings(
 ) -> list[ComparedRow]:
     """Differences of the settings in the profile's order; every parameter with `all_rows`.
 
-    Measurements, orders and counters never differ: they are no settings. A factory setting that
+    Measurements, commands and counters never differ: they are not settings. A factory setting that
     is not known differs from nothing.
     """
     rows = [

@@ -82,8 +82,8 @@ class Edits:
     ) -> Edits:
         """Stage what a person typed for a parameter; raises ValueRefused and UnknownParameter.
 
-        `raws` is what the drive holds, by code; `absent` what it has not. What equals the held
-        value is no edit. Edits whose scale this one changes keep their engineering value.
+        `raws` is what the drive holds, by code; `absent` what it has not. A value equal to the held
+        one is not an edit. Edits whose scale this one changes keep their engineering value.
         """
         edit = Edit(profile[code].code, typed, raws.get(code), 0)
         return self._with([edit], profile, raws, absent)
@@ -96,7 +96,7 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str] = (),
     ) -> Edits:
-        """Stage a raw value, whatever its scale comes to; raises ValueRefused."""
+        """Stage a raw value, whatever it means with its scale; raises ValueRefused."""
         return self._with(
             [Edit(profile[code].code, "", raws.get(code), raw)], profile, raws, absent
         )
@@ -118,12 +118,12 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str] = (),
     ) -> Edits:
-        """Without the edit of one parameter; those that follow its scale are encoded anew."""
+        """Without the edit of one parameter; those that follow its scale are encoded again."""
         left = [edit for edit in self.requested if edit.code != code]
         return Edits(_resolve(left, profile, raws, absent))
 
     def now(self, profile: Profile, raws: Mapping[str, int], absent: Collection[str] = ()) -> Edits:
-        """The same edits against other held values; those that the drive holds are no edits."""
+        """The same edits against other held values; those that the drive holds are not edits."""
         fresh = [replace(edit, old=raws.get(edit.code, edit.old)) for edit in self.requested]
         return Edits(_resolve(fresh, profile, raws, absent))
 

@@ -1,7 +1,7 @@
 """The factory setting of a parameter on the drive at hand, and whether it was changed from it.
 
 Some follow another parameter (50 or 60 Hz), some the drive's rated current, and of some only words
-are known. What cannot be told for sure is told as not changed.
+are known. Uncertain settings count as unchanged.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .writable import is_setting
 def factory_raw(
     profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> int | None:
-    """The raw factory setting, given what the drive holds; None where that does not tell it.
+    """The raw factory setting, given what the drive holds; None if that does not state it.
 
     A raw value counts with the factory scale: see `factory_value`.
     """
@@ -47,13 +47,13 @@ def factory_value(
 
 
 def factory_sources(parameter: Parameter) -> tuple[str, ...]:
-    """Codes that must be read before its factory setting can be told."""
+    """Codes that must be read before its factory setting can be known."""
     by, of = parameter.factory_by, parameter.factory_of
     return tuple(one.parameter for one in (by, of) if one is not None)
 
 
 def factory_is_sure(parameter: Parameter) -> bool:
-    """Return True if a document of this family tells the factory setting."""
+    """Return True if a document of this family states the factory setting."""
     grounds = parameter.factory_grounds
     known = parameter.confidence if grounds is None else grounds.confidence
     return known not in UNVERIFIED

@@ -17,7 +17,7 @@ from .multiple import value_of
 
 @dataclass(frozen=True, slots=True)
 class LimitsInForce:
-    """The lowest and the highest value of now, in the parameter's unit; None where not known."""
+    """The present lowest and highest value, in the parameter's unit; None where not known."""
 
     low: Decimal | None
     high: Decimal | None
@@ -28,7 +28,7 @@ class LimitsInForce:
     """The parameter whose value the lowest is; empty where it is the parameter's own."""
     high_by: str = ""
     sure: bool = True
-    """False where no document of the family tells them: marked with a ?."""
+    """False if no document of the family states them: marked with a ?."""
 
     @property
     def text(self) -> str:

@@ -58,7 +58,7 @@ def limit_sources(profile: Profile, codes: Iterable[str]) -> set[str]:
 
 
 def limits_are_sure(parameter: Parameter) -> bool:
-    """Return True if a document of this family tells the limits."""
+    """Return True if a document of this family states the limits."""
     grounds = parameter.limit_grounds
     known = parameter.confidence if grounds is None else grounds.confidence
     return known not in UNVERIFIED

@@ -1,8 +1,8 @@
 """A parameter set as text: one line a parameter, in the order of the profile, made for a diff.
 
-It is TOML. A person may edit the `value` of a line by hand after taking its `raw` out; with
-both in a line they must agree. Header and end tell how many parameters there are, so that a
-file that was cut short is noticed.
+It is TOML. A person may edit the `value` of a line by hand after taking its `raw` out; with both in
+a line they must agree. Header and end state the number of parameters, so that a file that was cut
+short is noticed.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _line(profile: Profile, parameter: Parameter, values: ParameterSet) -> str:
 
 
 def lacking(profile: Profile, raws: Mapping[str, int]) -> frozenset[str]:
-    """Scale sources without a value: the drive does not have them, as far as a set can tell."""
+    """Scale sources without a value: the drive does not have them, as far as a set can show."""
     return frozenset(code for code in scale_sources(profile) if code not in raws)
 
 

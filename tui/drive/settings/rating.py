@@ -22,7 +22,7 @@ RATED: frozenset[Quantity] = frozenset(
 
 
 def rating_codes(profile: Profile) -> list[str]:
-    """Codes of read-only words that tell the drive's model or rating."""
+    """Codes of read-only words that show the drive's model or rating."""
     current = profile.quantity("drive_current")
     own = current.code if current is not None and current.access == "r" else ""
     return [code for code in (profile.data.identification.model_parameter, own) if code]
@@ -31,7 +31,7 @@ def rating_codes(profile: Profile) -> list[str]:
 def same_rating(
     profile: Profile, held: Held, source: ParameterSet, *, across: bool = False
 ) -> bool | None:
-    """Return True if set and drive are of one rating; None where one of them does not tell."""
+    """Return True if set and drive are of one rating; None if one of them does not show it."""
     if across:
         return False
     reported = source.head.identity.get("reference", "")

@@ -56,7 +56,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class RestoreItem:
-    """One parameter of the set with what becomes of it."""
+    """One parameter of the set with its result."""
 
     code: str
     kind: ItemKind
@@ -74,7 +74,7 @@ class RestorePlan:
     items: tuple[RestoreItem, ...]
     edits: Edits
     same_rating: bool | None
-    """None where one side does not tell its model."""
+    """None if one side does not report its model."""
     needs_stop: bool
     """True if some of it is written with the motor stopped only."""
     across: bool

@@ -213,7 +213,7 @@ class _Planner:
         return None
 
     def settle(self) -> None:
-        """Make edits of what is to be written, in range of each other, and tell the rest."""
+        """Make edits of the values to be written, in range of each other, and report the rest."""
         while True:
             self.edits = Edits().stage_many(
                 self.profile, self._wanted.values(), self.held.raws, self.held.lacking

@@ -122,7 +122,7 @@ def _head(tables: Mapping[str, Any], text: str, fault: _Fault) -> SetHead:
 
 
 def _check_whole(tables: Mapping[str, Any], text: str, count: int, fault: _Fault) -> None:
-    """Raise SetError unless header and end tell the number of parameters that are there."""
+    """Raise SetError unless header and end state the number of parameters that are there."""
     last = text.count("\n") + 1
     if END_OF_SET not in tables:
         raise fault(

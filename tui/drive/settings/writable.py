@@ -163,7 +163,7 @@ def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
 
 
 def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
-    """Why a value is never written from here, whoever wants it; else empty."""
+    """Why Drive Panel never writes a value; else empty."""
     watch = profile.data.communication_fault
     if watch is None or parameter.code != watch.reaction:
         return ""

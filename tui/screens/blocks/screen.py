@@ -29,16 +29,16 @@ from ..keys.table import BLOCKS, bindings
 from .block_keys import BlockKeys
 
 LINES_BESIDE_SLOTS = 16
-"""Lines that are no slots: the frame, headings, details, cost, words, keys."""
+"""Lines besides slots: the frame, headings, details, cost, words, keys."""
 
 ROWS_FOR = {"#words": 24, "#cost": 22}
 """Rows of the terminal from which user words and cost are shown: the slots come first."""
 ROWS_FOR_DETAIL, SHORT_DETAIL = 18, 3
-"""Rows from which all is told of a slot, and how many lines there are below that."""
+"""Rows from which a slot is shown in full, and the number of lines below that."""
 
 
 class BlocksScreen(BlockKeys):
-    """Two tables side by side; the block editor reads, and writes when it is told so."""
+    """Two tables side by side; the block editor reads, and writes on request."""
 
     CSS_PATH = "blocks.tcss"
     BINDINGS: ClassVar = bindings(BLOCKS)
@@ -79,7 +79,7 @@ class BlocksScreen(BlockKeys):
         self.block_editor.stop()
 
     def draw(self, width: int) -> None:
-        """The block editor's state, and what it has come to."""
+        """The block editor's state, and its result."""
         super().draw(width)
         self.put("words", user_word_lines(self.block_editor, self.block_editor.words, width))
         if self.block_editor.proposals.blocks:

@@ -21,7 +21,7 @@ from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, S
 from tui.wire.frames import hex_text
 
 BOTH = 50
-"""Columns of a table from which the direct value stands in it too."""
+"""Columns of a table from which it also shows the direct value."""
 WIDE_SLOTS = 110
 """Columns from which each slot takes two lines."""
 VERDICT_STYLES = {

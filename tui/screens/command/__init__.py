@@ -1,1 +1,1 @@
-"""Commanding a drive from any of its screens: arming, commands, and what became of them."""
+"""Commanding a drive from any of its screens: arming, commands, and their results."""

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 NOT_ARMED = "Not armed: a arms this drive."
 ARMED_AFTER_ALL = "Armed now; each key makes it a minute again."
-"""Takes the place of the message that it is not, which would stand there untrue."""
+"""Replaces the message that it is not, which would then be untrue."""
 
 
 class ArmingKeys(PanelScreen):
-    """Knows whether the drive is armed; where a refusal is told is up to the screen."""
+    """Knows whether the drive is armed; the screen decides where a refusal is shown."""
 
     console: DriveConsole
     session: DriveSession
@@ -38,7 +38,7 @@ class ArmingKeys(PanelScreen):
         return self.console.commander
 
     def _refuse(self, text: str) -> None:
-        """Tell on this screen why something was not done."""
+        """Show on this screen why something was not done."""
         raise NotImplementedError
 
     def motor_now(self) -> MotorsNow:
@@ -58,7 +58,7 @@ class ArmingKeys(PanelScreen):
         *,
         by_itself: bool = False,
     ) -> Confirm:
-        """Ask with `y` before something is written or moved; refusals are told on this screen.
+        """Ask with `y` before something is written or moved; refusals are shown on this screen.
 
         `work` gets the drive's count of stops of the moment of asking: a stop since voids it.
         `refused` is called for a no. A question that no key has asked for comes `by_itself`.
@@ -88,7 +88,7 @@ class ArmingKeys(PanelScreen):
         return self.commander.armed_for is not None
 
     def _require_armed(self) -> bool:
-        """Return True if the drive is armed; where it is not, that is told."""
+        """Return True if the drive is armed; otherwise a message says so."""
         if not self._armed():
             self._refuse(self.session.arming.hindrance or self._how_to_arm())
         return self._armed()

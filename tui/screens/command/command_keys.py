@@ -17,7 +17,7 @@ from .teaching import PickWord, TeachKeys, words_to_teach
 
 SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
-"""Seconds for which it is shown what became of an order."""
+"""Seconds for which the result of a command is shown."""
 
 
 STOPS_THAT_ASK = {

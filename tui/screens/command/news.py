@@ -13,7 +13,7 @@ OUTCOME_STYLES = {
     OutcomeKind.REFUSED: ALARM,
 }
 NEWS_FOR = {OutcomeKind.WORKING: 60.0, OutcomeKind.DONE: 15.0, OutcomeKind.REFUSED: 60.0}
-"""Seconds for which it is shown what the last work has come to."""
+"""Seconds for which the result of the last work is shown."""
 
 
 def news(

@@ -105,7 +105,7 @@ class TeachKeys(ArmingKeys):
         self._ask(f"No reference by {code} any more?", follows, "ends it", "keeps it", confirmed)
 
     async def _settle(self, change: Callable[[], str]) -> None:
-        """Make a change that waits for the disk, and tell what it came to."""
+        """Make a change that waits for the disk, and report its result."""
         work = self.session.work
         try:
             work.tell(OutcomeKind.DONE, await asyncio.to_thread(change))

@@ -156,7 +156,7 @@ def same_line(one: str, other: str) -> bool:
 
 
 def line_in(text: str, width: int) -> str:
-    """A line in at most so many cells; of an adapter's lasting name the end tells which it is."""
+    """A line in at most so many cells; the end of an adapter's lasting name identifies it."""
     found = _LASTING.match(text)
     if found is None or len(text) <= width:
         return short(text, width)

@@ -17,7 +17,7 @@ class DriveList(OptionList):
     """
 
     def update_node_styles(self, animate: bool = True) -> None:
-        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        """Nothing is styled before it is on a screen: then it is, as a whole."""
         if self.is_attached:
             super().update_node_styles(animate)
 

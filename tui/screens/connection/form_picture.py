@@ -20,8 +20,7 @@ FIELD_NAME = Style(color="#85898d")
 FIELD_TEXT = Style(color=TEXT, bgcolor=SURFACE)
 EMPTY = Style(color="#7a7d7f", bgcolor=SURFACE)
 OFF = Style(color="#969a9e", bgcolor="#24272b")
-"""The colors that Textual mixes for a name, a field, what stands in an empty one, one that is
-off."""
+"""The colors that Textual mixes for a name, a field, the text in an empty one, one that is off."""
 
 
 def form_lines(rows: Sequence[tuple[str, Sequence[Text]]], width: int) -> list[Text]:

@@ -68,7 +68,7 @@ class LineForm(Vertical):
         return drawn_field(field.value, field.placeholder, off=field.disabled)
 
     async def put_fields(self) -> None:
-        """Put the fields where their picture stands; they are not seen below another screen."""
+        """Put the fields in the place of their picture; they are not seen below another screen."""
         picture, self._picture = self._picture, None
         if picture is None:
             return
@@ -91,7 +91,7 @@ class LineForm(Vertical):
 
     @property
     def addresses_text(self) -> str:
-        """The addresses as they stand in the field."""
+        """The addresses as typed in the field."""
         return self._typed("addresses")
 
     def addresses(self) -> list[int]:
@@ -137,7 +137,7 @@ class LineForm(Vertical):
         self._draw()
 
     def show_settings(self, baud: int, format: str) -> None:
-        """The settings at which drives answered stand in their fields."""
+        """The settings at which drives answered are in their fields."""
         for name, value in (("baud", str(baud)), ("format", format)):
             field = self._fields[name]
             with field.prevent(Input.Changed):

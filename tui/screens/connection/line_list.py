@@ -18,10 +18,10 @@ from .choices import Group, LineChoice, ListMark, choice_line, groups
 
 
 class LineList(OptionList):
-    """Lines under headings; drawn anew only when they or its width have changed."""
+    """Lines under headings; drawn again only when they or its width have changed."""
 
     def update_node_styles(self, animate: bool = True) -> None:
-        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        """Nothing is styled before it is on a screen: then it is, as a whole."""
         if self.is_attached:
             super().update_node_styles(animate)
 

@@ -34,7 +34,7 @@ class Scanning(LineView):
     def action_scan(self) -> bool:
         """Search for drives at the addresses given; those that were found stay.
 
-        False where there is no line, or where they are no addresses: then it says so.
+        False without a line, or with invalid addresses: then it says so.
         """
         if self.app.fleet is None:
             self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
@@ -52,8 +52,8 @@ class Scanning(LineView):
     async def scan(self, devices: Sequence[int], typed: str = "", *, once: bool = False) -> None:
         """Ask each address; drives appear as they answer, whatever screen is on top.
 
-        `typed` is remembered as the addresses of this line. What was asked `once` is one of
-        several settings: whoever tries them tells what it came to.
+        `typed` is remembered as the addresses of this line. A search made `once` is one of several
+        settings: the caller that tries them reports the result.
         """
         from tui.session.connect.other_masters import MasterLookout, OtherMaster
         from tui.session.connect.search import Search
@@ -108,7 +108,7 @@ class Scanning(LineView):
         return heard
 
     async def name_families(self, *, wanted: bool = True) -> None:
-        """Before the first request: who may be there and acts when it is asked no more.
+        """Before the first request: possible drives that react to lost polling.
 
         Not where they are known drives, or those of a simulation in this very program.
         """
@@ -120,7 +120,8 @@ class Scanning(LineView):
         self.look()
 
     async def hears_another_master(self, link: Link) -> bool:
-        """Listen on a port before anything is sent; another master is told, and what it asks."""
+        """Listen on a port before anything is sent; another master is reported, with its
+        requests."""
         from tui.bus.link import SerialLink
         from tui.session.connect import other_masters
 

@@ -31,7 +31,7 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
             self.open_line(self.line_of(choice), choice.device)
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
-        """Say all that the chosen drive says of itself; a line that is no port has no settings."""
+        """Say all that the chosen drive says of itself; only a port has settings."""
         if event.option_list is self.lines:
             choice = self.lines.choice(event.option.id)
             self.form.offer_settings(bool(choice and choice.path))

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from tui.session.connect.search import Search
 
 IN_MINUTES = 100
-"""Seconds from which on a time is told in minutes."""
+"""Seconds from which on a time is given in minutes."""
 
 
 def left_text(search: Search | None, later: float) -> str:

@@ -45,7 +45,7 @@ QUIET = 1.0
 """Seconds without a key after which drives go to their places in the list."""
 SEARCH_LABEL = 11
 SEARCH_TEXT = 18
-"""Cells that tell how far a search is."""
+"""Cells that show how far a search is."""
 NOBODY: Mapping[int, WallRow] = MappingProxyType({})
 
 
@@ -125,7 +125,7 @@ class LineView(PanelScreen):
         self.call_after_refresh(self._redraw)  # with a scroll bar where one came
 
     def on_screen_suspend(self) -> None:
-        """Stand still while another screen is on top.
+        """Do not change while another screen is on top.
 
         What stirs below a screen makes Textual draw the whole terminal again.
         """
@@ -237,7 +237,7 @@ class LineView(PanelScreen):
         self._show_advice()
 
     def fail(self, error: Exception) -> None:
-        """Tell an error with what to do next."""
+        """Show an error with the next step."""
         self.app.events.add(ERROR_KIND, str(error))
         self.hint_keys(hint_for(error) if self.found else "")
         self.advise(str(error), hint_for(error), ERROR_KIND)

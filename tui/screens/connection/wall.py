@@ -47,7 +47,7 @@ class WallRow(NamedTuple):
     drive: str
     name: str = ""
     kind: str = "none"
-    """Kind of its state, `stop` while one is on its way, `none` where there is none to tell."""
+    """Kind of its state, `stop` while a stop is under way, `none` if there is none to show."""
     words: str = ""
     frequency: str = ""
     current: str = ""
@@ -55,7 +55,7 @@ class WallRow(NamedTuple):
     share: float | None = None
     """Its current over the rated one."""
     age: float | None = None
-    """Seconds since what is told was on the wire."""
+    """Seconds since the shown value was on the wire."""
     old: bool = False
     """True if that is too long ago to be the present."""
 

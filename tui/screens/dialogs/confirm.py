@@ -79,7 +79,7 @@ class Confirm(KeyQuestion[bool]):
         self.answer(True)
 
     def action_enter(self) -> None:
-        """Go on where nothing can be lost; elsewhere say that Enter is no answer."""
+        """Go on where nothing can be lost; elsewhere say that Enter does nothing."""
         if not self._loses:
             self.answer(True)
             return

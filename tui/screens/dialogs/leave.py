@@ -19,7 +19,7 @@ LeaveChoice = Literal["stop", "leave", "stay"]
 
 
 class Leave(KeyQuestion[LeaveChoice]):
-    """Asks what becomes of the motors; to stop them is safe, so Enter does that too."""
+    """Confirms what happens to the motors; to stop them is safe, so Enter does that too."""
 
     NO: ClassVar[LeaveChoice] = "stay"
     GUARDED = "enter,l"

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 DRIVES_TOLD = 4
-"""Drives that are told of; more are counted."""
+"""Drives that are reported; more are counted."""
 
 
 class MotorsNow:
-    """Tells in a line a drive what its motor does, as known at the moment of the call."""
+    """Shows in a line a drive what its motor does, as known at the moment of the call."""
 
     def __init__(self, app: Panel, sessions: Sequence[DriveSession]) -> None:
         self._app, self._sessions = app, list(sessions)

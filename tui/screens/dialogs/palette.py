@@ -28,7 +28,7 @@ MORE = "Typed words find what other screens can do, too."
 class Palette(Question[FoundAction | None]):
     """Gives the chosen action back, or None.
 
-    Nothing stands ready by itself: only what begins with each word that was typed.
+    Nothing is selected at first: only what begins with each word that was typed.
     """
 
     BINDINGS: ClassVar = [

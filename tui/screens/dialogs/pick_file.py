@@ -26,7 +26,7 @@ from .question import KeyQuestion, hint
 FILES_LISTED = 200
 """Files that are listed at most, the newest."""
 NAME_WIDTH, DRIVE_WIDTH, TOLD_WIDTH = 24, 15, 14
-"""Columns of a file; between name and drive stand its date and time."""
+"""Columns of a file; date and time are between name and drive."""
 SUFFIX = ".toml"
 
 
@@ -59,7 +59,7 @@ class PickFile(KeyQuestion[str | None]):
     ) -> None:
         """`others` are choices beside files: the answer, and how it reads.
 
-        With `about` each file is read once the list stands, one after another, the last first.
+        With `about` each file is read once the list is shown, one after another, the last first.
         """
         super().__init__()
         self._question = question

@@ -39,7 +39,7 @@ DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
 rows that a list keeps."""
 
 NOT_TYPING = 1.0
-"""Seconds without a key after which a question that comes by itself takes an answer."""
+"""Seconds without a key after which an automatic question takes an answer."""
 TYPED_ON = "A question came meanwhile: after a second without a key it takes an answer."
 
 TOO_EARLY = "Key ignored: it came before this could be read. Press it again."
@@ -61,8 +61,8 @@ class Question(Framed, ModalScreen[T]):
     NO_KEYS: ClassVar[str] = ""
     """Keys that are no, besides Esc."""
     by_itself = False
-    """True if it comes while somebody may be typing something else: what is typed on is no answer,
-    no is none either."""
+    """True if it comes while a person may be typing something else: continued typing answers
+    nothing, neither yes nor no."""
     BINDINGS: ClassVar = [Binding("escape", "no", show=False)]
 
     def __init_subclass__(cls, **how: Any) -> None:
@@ -130,7 +130,7 @@ class Question(Framed, ModalScreen[T]):
         return rows + part.styles.margin.height
 
     def tell_keys(self, keys: Text) -> None:
-        """Tell the keys anew; they may take more rows than before."""
+        """Show the keys again; they may take more rows than before."""
         self.query_one("#hint", Plain).update(keys)
         self._fit_list()
 
@@ -198,7 +198,7 @@ class Question(Framed, ModalScreen[T]):
 
 
 class KeyQuestion(Question[T]):
-    """A question that keys alone answer: no text is typed, so `q` and `n` are no too."""
+    """A question answered by keys alone: no text is typed, so `q` and `n` mean no too."""
 
     GUARDED = "enter,y"
     NO_KEYS = "q,n"

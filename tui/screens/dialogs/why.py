@@ -66,7 +66,7 @@ class WhyScreen(Framed, ModalScreen[None]):
         self.action_again()
 
     def on_resize(self, _: Resize) -> None:
-        """Break the lines anew."""
+        """Break the lines again."""
         if not self.is_too_small:
             self._show()
 

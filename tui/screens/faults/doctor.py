@@ -45,7 +45,7 @@ TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
     "mains_voltage": "mains ",
 }
 CONTACTS = ("digital_inputs", "digital_outputs")
-"""Words that are told by the names of what is closed, not in hexadecimal."""
+"""Words that are shown by the names of closed inputs, not in hexadecimal."""
 STORED_MARK = " stored"
 STORED_WIDTH = len(STORED_MARK) + 28
 """Columns of what the drive stored; the mark keeps it apart from what was last read here."""
@@ -147,7 +147,7 @@ def _tripped(view: DoctorView) -> str:
 
 
 def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
-    """Lines behind a heading that stands before the first."""
+    """Lines after a heading that precedes the first."""
     return [
         Text.assemble((f"  {label if not number else '':<{LABEL - 2}}", FAINT)).append_text(line)
         for number, line in enumerate(lines)

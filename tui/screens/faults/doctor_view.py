@@ -34,7 +34,7 @@ class DoctorView:
     raws: Mapping[str, int] = field(default_factory=dict)
     """All raw values that the drive was last seen to hold."""
     alarms: Sequence[tuple[str, int, str]] = ()
-    """Alarms that are on: word, bit and name; told where there is no fault to tell of."""
+    """Alarms that are on: word, bit and name; shown if there is no fault."""
 
     @property
     def help(self) -> FaultHelp | None:
@@ -45,7 +45,7 @@ class DoctorView:
 
     @property
     def alarm(self) -> tuple[str, int, str] | None:
-        """The alarm that is told of: the first that anything is known of."""
+        """The alarm that is shown: the first that anything is known of."""
         if self.fault is not None or self.present or not self.alarms:
             return None
         known = [one for one in self.alarms if self.profile.guide.alarm(one[0], one[1])]
@@ -72,7 +72,7 @@ class DoctorView:
 
     @property
     def ready(self) -> bool | None:
-        """True if the drive says that a reset can work now; None where it does not tell."""
+        """True if the drive says that a reset can work now; None if it does not report it."""
         return reset_ready(self.profile, self._good())
 
     @property

@@ -35,7 +35,7 @@ READ_AGAIN = 2.0
 OLD = 3 * READ_AGAIN
 """Seconds after which a value that was read is shown as an old one."""
 BESIDE = 36
-"""Rows from which on the seconds before the trip stand below the doctor."""
+"""Rows from which on the seconds before the trip are below the doctor."""
 DOCTOR_ROWS = 24
 
 
@@ -215,7 +215,7 @@ class FaultsScreen(OrderKeys):
         self.look()
 
     def action_leave(self) -> None:
-        """From a fault of the history to that of now, then back to Monitor."""
+        """Go from a fault of the history to the present one, then back to Monitor."""
         if self._chosen is not None or self._before:
             self._chosen, self._before, self._at = None, False, 0
             self.look()

@@ -1,7 +1,7 @@
 """Which frames are shown: by drive, function, errors, and what they say. Pure.
 
 A request and what followed it until the next one are an exchange, chosen or left as a whole: a
-refusal without its request would tell little.
+refusal without its request would show little.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def choice_of(text: str) -> FrameChoice:
 
 
 def _is_number(word: str) -> bool:
-    """Return True if it is a number; more digits than any has are looked for as they stand."""
+    """Return True if it is a number; more digits than any has are searched for unchanged."""
     return word.isascii() and word.isdigit() and len(word) <= MOST_DIGITS
 
 

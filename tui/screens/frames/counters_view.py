@@ -15,7 +15,7 @@ from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNI
 from tui.widgets.trend import EIGHTHS
 
 LEFT = 42
-"""Columns of our counts; those of the drive stand beside them."""
+"""Columns of our counts; those of the drive are beside them."""
 BAR_WIDTH = 7
 TALL, TALL_BARS, LOW_BARS = 30, 6, 1
 """Rows from which on the bars are tall; the rows of both."""
@@ -89,7 +89,8 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
 
 
 def _pair(name: str, one: Comparison) -> list[Text]:
-    """Frames as the drive tells them, those since the first look, and how many we sent by then."""
+    """Frames as the drive reports them, those since the first reading, and how many we sent by
+    then."""
     # counters of another port are no part of the comparison
     other = one.counts_this_line is False
     strong, sent = FAINT if other else STRONG, one.sent

@@ -35,7 +35,7 @@ class Asked:
 def decoded(
     frames: Sequence[Frame], profile_of: ProfileOf, raws_of: RawsOf, *, tcp: bool
 ) -> list[str]:
-    """A sentence for each frame; empty where it is none. A reply is told by its request."""
+    """A sentence for each frame; empty where it is none. A reply is explained by its request."""
     requested: Asked | None = None
     found = []
     for frame in frames:

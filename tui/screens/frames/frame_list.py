@@ -33,7 +33,7 @@ FIND_HINT = "Enter: the one before; drive, function, error, or what it says"
 
 
 class KeptLine(Protocol):
-    """A line with its last frames, and what they are told by."""
+    """A line with its last frames, and the profiles that explain them."""
 
     @property
     def link(self) -> Link:
@@ -44,7 +44,7 @@ class KeptLine(Protocol):
         """The frames that are kept now, oldest first."""
 
     def profile(self, device: int) -> Profile | None:
-        """The profile by which the frames of a drive are told."""
+        """The profile that explains the frames of a drive."""
 
     def raws(self, device: int) -> Mapping[str, int]:
         """Raw values of a drive that scale others."""
@@ -99,7 +99,7 @@ class FrameListScreen(PanelScreen):
 
     @property
     def _shows_sum(self) -> bool:
-        """True if the last page stands in the place of the frames."""
+        """True if the last page replaces the frames."""
         return self._page == "sum"
 
     def draw(self, width: int) -> None:

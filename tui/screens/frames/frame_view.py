@@ -16,9 +16,9 @@ from tui.wire.frames import hex_text
 FEWEST = 12
 """Columns of bytes that are shown, however long the note on the frame is."""
 BYTES_WIDTH = 44
-"""Columns of the bytes where they stand beside the words."""
+"""Columns of the bytes if they are beside the words."""
 BESIDE_BYTES = 110
-"""Columns from which on words and bytes stand side by side, and the hour before the minutes."""
+"""Columns from which on words and bytes are side by side, and the hour before the minutes."""
 
 
 def frame_time(wall: float) -> str:

@@ -36,7 +36,7 @@ def _here(text: str) -> str:
 
 
 def _sentence(text: str, width: int) -> list[Text]:
-    """A sentence on as many rows as it takes; those about a drive stand behind its name."""
+    """A sentence on as many rows as it takes; those about a drive follow its name."""
     about_drive = text.startswith(" ")
     first = OF_A_DRIVE if about_drive else 1
     name = not about_drive and text.startswith(("Device", "All devices"))

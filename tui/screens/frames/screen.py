@@ -61,7 +61,7 @@ class FramesScreen(CounterKeys, FrameListScreen):
 
     @property
     def shows_counters(self) -> bool:
-        """True if the counters stand in the place of the frames."""
+        """True if the counters replace the frames."""
         return self._shows_sum
 
     def sum_lines(self, width: int, height: int) -> list[Text]:

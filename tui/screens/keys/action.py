@@ -46,7 +46,7 @@ class Action(NamedTuple):
     keys: str
     """Keys as Textual names them, separated by commas."""
     label: str
-    """One or two words for the line of keys; none where it does not stand there."""
+    """One or two words for the line of keys; none if it is not in the line."""
     help: str
     """A sentence for the help screen and the palette."""
     screens: tuple[str, ...] = EVERYWHERE

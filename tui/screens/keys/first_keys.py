@@ -25,7 +25,7 @@ def was_tried() -> bool:
 
 
 def remember() -> None:
-    """F12 arrived; a folder that cannot be written is no error."""
+    """F12 arrived; a folder that cannot be written is not an error."""
     tried = stored_json(_file())
     known = [*(tried if isinstance(tried, list) else []), terminal_name()]
     with suppress(OSError):

@@ -45,13 +45,13 @@ OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 WHILE_OPENING: tuple[KeyLabel, ...] = (("leave", "Esc", "cancel"), ("help", "?", "help"))
 """Keys that mean something while a line is being opened, besides those that stop."""
 NEVER_DROPPED = ("stop_by_space", "help")
-"""Actions that stand in the line of keys however narrow the terminal is."""
+"""Actions in the line of keys however narrow the terminal is."""
 WHILE_TYPING: tuple[KeyLabel, ...] = (
     ("command_palette", "^p", "all"),
     ("help", "F1", "help"),
     ("quit", "^q", "leave"),
 )
-"""Keys of the whole panel that are no letters."""
+"""Keys of the whole panel other than letters."""
 STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
 """Labels of the stop key if it stops every drive, or none."""
 WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."

@@ -11,7 +11,7 @@ READOUT_ROWS = 5
 BIG_WIDTH = 56
 """Columns below which the readouts are plain lines."""
 WIDE_WORDS = (110, 36)
-"""Columns and rows from which all words stand side by side."""
+"""Columns and rows from which all words are side by side."""
 ROOMY = 18
 """Rows between the tabs and the message from which empty lines keep the parts apart."""
 VALUE_COLUMN = 25
@@ -34,7 +34,7 @@ class Arrangement:
     width: int
     height: int
     wide: bool
-    """True if words stand side by side below the trends of frequency and current."""
+    """True if words are side by side below the trends of frequency and current."""
     big: bool
     """True if the readouts are large."""
     top: int

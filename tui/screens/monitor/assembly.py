@@ -1,4 +1,4 @@
-"""All lines of Monitor, by the place in which they stand; pure functions of a view."""
+"""All lines of Monitor, by their place; pure functions of a view."""
 
 from __future__ import annotations
 

@@ -156,12 +156,12 @@ class RunKeys(OrderKeys):
         super().action_step_reference(steps)
 
     def _would_start(self) -> bool:
-        """Return True if the drive is enabled and stands at 0 Hz: a reference turns the motor."""
+        """Return True if the drive is enabled at 0 Hz: a reference turns the motor."""
         latest = self.console.latest
         return latest is not None and latest.state.motion == "running" and self._output() == 0
 
     def _output(self) -> Decimal | None:
-        """The output frequency of now, below 0 in reverse; None where it is not known."""
+        """The present output frequency, below 0 in reverse; None where it is not known."""
         latest, frequency = self.console.latest, self.session.profile.quantity("output_frequency")
         if latest is None or frequency is None:
             return None
@@ -176,7 +176,7 @@ def _after_esc(way: str) -> str:
 
 
 def _alone(event: Key) -> bool:
-    """Return True if a key was pressed by itself; one that no terminal has sent was."""
+    """Return True if a key was pressed alone; one that no terminal has sent was."""
     stroke = stroke_of(event)
     return stroke is None or stroke.alone
 

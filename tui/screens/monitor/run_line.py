@@ -117,7 +117,7 @@ class RunLine:
 
     @property
     def is_zero(self) -> bool:
-        """True if what stands in it turns no motor."""
+        """True if its contents turn no motor."""
         try:
             return bool(self.unit) and Decimal(self.text or "0") == 0
         except InvalidOperation:

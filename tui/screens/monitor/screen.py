@@ -31,7 +31,7 @@ from .view import SPANS, USUAL_SPAN, View
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
 STILL_TOLD = 5.0
-"""Seconds under a dialog after which it is told that the values below it stand still."""
+"""Seconds under a dialog after which the values below it are reported as frozen."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
@@ -111,7 +111,7 @@ class MonitorScreen(InputKeys):
             self._place(self._room())
 
     def on_screen_suspend(self) -> None:
-        """Stand still while another screen is on top.
+        """Do not change while another screen is on top.
 
         What stirs below a screen makes Textual draw the whole terminal again.
         """
@@ -135,7 +135,7 @@ class MonitorScreen(InputKeys):
         self.call_after_refresh(self.look)
 
     def draw_frame(self, view: FrameView) -> None:
-        """A message of several lines moves what stands above it, and hides none of it."""
+        """A message of several lines moves what is above it, and hides none of it."""
         super().draw_frame(view)
         if not self.is_too_small:
             self._place(self._room())
@@ -145,7 +145,7 @@ class MonitorScreen(InputKeys):
         return arrange(*self.size, len(other_values(self.session.profile)))
 
     def _place(self, room: Arrangement) -> None:
-        """Give each part its rows; only where they change is anything laid out anew."""
+        """Give each part its rows; the layout runs again only if they change."""
         bottom = max(room.bottom, self._run_rows)
         placed = (room, bottom, self.message_rows)
         if placed == self._placed:
@@ -218,7 +218,7 @@ class MonitorScreen(InputKeys):
                 self.put(place, lines)
 
     def action_rating(self) -> None:
-        """Tell the rated current of a drive that gives its current in %."""
+        """Enter the rated current of a drive that gives its current in %."""
         from ..dialogs.ask import Ask
 
         current = self.session.profile.quantity("motor_current")

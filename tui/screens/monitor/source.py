@@ -28,7 +28,7 @@ class ViewSource:
         self._was = ""
 
     def view(self, control: Control, span: float, word: int | None) -> View:
-        """All that the screen tells now; `span` is the window of the trend in seconds."""
+        """All that the screen shows now; `span` is the window of the trend in seconds."""
         app, console, session = self._app, self._console, self._console.session
         now, monitor, fleet = app.clock.monotonic(), console.monitor, app.fleet
         snapshot = monitor.latest

@@ -29,7 +29,7 @@ from .view import View, directed
 
 STATE_LABEL_CELLS = 11
 STANDSTILL = 0.05
-"""Hz below which a motor stands."""
+"""Hz below which a motor is at standstill."""
 HEADS = {
     Phase.SENDING: ("STOP WAITS", ATTENTION),
     Phase.UNHEEDED: (" NOT STOPPED ", FAULT_BLOCK),
@@ -147,7 +147,7 @@ def _hertz(view: View, quantity: Quantity) -> float | None:
 
 
 def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]:
-    """Its code, its name, when, and where it is told what to do."""
+    """Its code, its name, its time, and the key that shows what to do."""
     fault = state.fault
     code = fault.code if fault else "code not read"
     name = wrapped(fault.name if fault else "", width, 2)

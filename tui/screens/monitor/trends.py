@@ -81,7 +81,7 @@ def _drawn(
     signed: bool,
     style: Style,
 ) -> list[Text]:
-    """The rows; they shift by a column now and then only, and whoever takes them copies them."""
+    """The rows; they shift by a column now and then only, and callers copy them."""
     return trend_rows(points, wanted, high, height, signed=signed, style=style)
 
 
@@ -140,7 +140,7 @@ def span_text(seconds: float) -> str:
 
 
 def trend_columns(view: View, index: int, count: int, step: float) -> list[float | None]:
-    """The last value of each column; columns stand on whole steps, so they shift as one."""
+    """The last value of each column; columns are at whole steps, so they shift as one."""
     last = int(view.now / step)
     columns: list[float | None] = [None] * count
     for point in view.trend:

@@ -49,7 +49,7 @@ class View:
     span: float = USUAL_SPAN
     """Seconds that the trend shows."""
     stands_by: bool = False
-    """True if the motor stands and the next command from here runs it."""
+    """True if the motor is at standstill and the next command of this panel runs it."""
     fault_at: str = ""
     """Time of day at which the fault was seen first; empty where that is not known."""
     word: int | None = None
@@ -74,7 +74,7 @@ class View:
 
     @property
     def time_left(self) -> float | None:
-        """Seconds until the drive acts on its timeout if nobody asks it; None if it does not."""
+        """Seconds until the drive reacts to its timeout if polling stops; None if it does not."""
         if self.watch is None or not self.watch.active or self.heard is None:
             return None
         return self.watch.timeout - (self.now - self.heard)
@@ -128,7 +128,7 @@ READOUT_NAMES: dict[Quantity, tuple[str, ...]] = {
 
 
 def directed(view: View, parameter: Parameter | None, reading: Reading | None) -> float | None:
-    """A value with the sign of its direction, which the drive may tell beside it."""
+    """A value with the sign of its direction, which the drive may report beside it."""
     if reading is None or reading.number is None or parameter is None or view.snapshot is None:
         return None
     return with_direction(parameter, reading.number, view.snapshot.state)

@@ -54,13 +54,13 @@ SHORT_NAMES: Mapping[str, str] = {
 """Short forms of what bits say; nothing for what is so while all is well."""
 CODE_CELLS, RAW_CELLS = 6, 9
 BIT_CELLS = 26
-"""Least cells of a bit where bits stand in columns."""
+"""Least cells of a bit if bits are in columns."""
 SHORTEST_NAME = 6
-"""Characters of a bit's name that still tell which one it is."""
+"""Characters of a bit's name that still identify it."""
 PLAIN_ANSWERS = frozenset(
     {"", "yes", "no", "on", "off", "none", "normal", "0", "1", "in force", "in progress"}
 )
-"""Texts of bits that are no more than yes or no: alone they would not say of what."""
+"""Texts of bits that mean only yes or no: alone they would not name their subject."""
 DENIALS = frozenset({"no", "off", "none", "normal", "0"})
 """Words of a bit that deny its name."""
 GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
@@ -111,7 +111,7 @@ def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
 
 
 def alarm_line(view: View, width: int, *, tab: bool) -> Text:
-    """The alarms of now; at the right the key that shows all bits."""
+    """The present alarms; at the right the key that shows all bits."""
     text = Text(f"  {'Alarms':<{CODE_CELLS + RAW_CELLS}} ", FAINT, no_wrap=True)
     message, style = _alarms(view)
     room = width - text.cell_len - (ALL_BITS_CELLS if tab else 1)
@@ -199,7 +199,7 @@ def _heading(view: View, page: WordPage, width: int) -> Text:
 
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
-    """A bit in exactly so many cells; whoever takes it copies it before changing it."""
+    """A bit in exactly so many cells; callers copy it before changing it."""
     if raw is not None and not _counts(bit, raw):
         return _dim_bit(bit, width)
     return _drawn_bit(bit, None if raw is None else bool(raw >> bit.bit & 1), width)

@@ -46,7 +46,7 @@ class EditNumber(Question[str | None]):
         self._editor, self._parameter = editor, parameter
 
     def dialog(self) -> ComposeResult:
-        """The field, what it comes to, and what is known."""
+        """The field, the resulting value, and the known facts."""
         editor, parameter = self._editor, self._parameter
         staged = editor.staging.edits.get(parameter.code)
         raw = staged.new if staged else editor.values.raws.get(parameter.code)
@@ -62,15 +62,15 @@ class EditNumber(Question[str | None]):
             yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
-        """Tell what stands there."""
+        """Show the contents."""
         self._check(self.query_one(Input).value)
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """Tell at once what it comes to."""
+        """Show the resulting value at once."""
         self._check(event.value)
 
     def _check(self, text: str) -> bool:
-        """Show what the text comes to; whether it may be staged."""
+        """Show the value of the text; whether it may be staged."""
         held = self.query_one("#held", Plain)
         editor, parameter = self._editor, self._parameter
         values = editor.values

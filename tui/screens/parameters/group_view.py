@@ -35,9 +35,9 @@ class GroupEntry:
 
     choice: Choice
     count: int | None = None
-    """None where the number tells nothing."""
+    """None if the number identifies none."""
     pinned: bool = False
-    """True if it stands above the groups however far they are scrolled."""
+    """True if it stays above the groups however far they are scrolled."""
 
     @property
     def label(self) -> str:

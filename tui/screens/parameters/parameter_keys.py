@@ -28,7 +28,7 @@ class ParameterKeys(TeachKeys):
         return self.console.editor
 
     def list_again(self) -> None:
-        """Make the list anew, by what was chosen and what is searched."""
+        """Make the list again, by the choice and the search."""
         for search in self.query("#search").results(Input):  # none once the screen was left
             self.listed.fill(self.editor, search.value)
             self.look()

@@ -22,7 +22,7 @@ from .start_up_view import start_up_items
 from .table_view import TableLine, items_of
 
 FIRST: tuple[FilterId, ...] = ("not factory", "favourites", "staged", "unsaved")
-"""Filters that stand above the groups; behind a comparison `differs` stands there too."""
+"""Filters above the groups; after a comparison `differs` is there too."""
 LAST: tuple[FilterId, ...] = ("recent", "unverified", "read-only", "settings", "all")
 """Filters below the groups."""
 
@@ -64,7 +64,7 @@ class ParameterList:
         return self.chosen
 
     def fill(self, editor: Editor, search: str) -> None:
-        """Make the list anew; the cursor stays on its parameter where that is still in it."""
+        """Make the list again; the cursor stays on its parameter where that is still in it."""
         profile, before = editor.session.profile, self.code
         if not self.groups:
             self.groups, self.home = group_order(profile), home_group(profile)

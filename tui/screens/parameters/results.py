@@ -45,7 +45,7 @@ class Results(KeyQuestion[bool | None]):
         self._applied, self._staged = applied, staged
 
     def dialog(self) -> ComposeResult:
-        """Each with what became of it."""
+        """Each with its result."""
         with Vertical(id="dialog"):
             yield Plain(results_head(self._applied), id="question")
             with VerticalScroll(id="says"):
@@ -63,7 +63,7 @@ class Results(KeyQuestion[bool | None]):
 
 
 class RestQuestion(KeyQuestion[bool]):
-    """True if the edits behind one that failed are written all the same."""
+    """True if the edits after one that failed are written anyway."""
 
     NO = False
     by_itself = True
@@ -99,7 +99,7 @@ def results_head(applied: Applied) -> str:
 
 
 def results_table(applied: Applied) -> Table:
-    """A line an edit: code, what became of it, old and new value; the reason below it."""
+    """A line an edit: code, result, old and new value; the reason below it."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for result in applied.results:
         edit = result.edit
@@ -122,5 +122,5 @@ def _style(result: Result) -> Style:
 
 
 def _reason(result: Result) -> str:
-    """Why it was not written, without its code, which stands in front already."""
+    """Why it was not written, without its code, which precedes it already."""
     return result.text.removeprefix(f"{result.edit.code}: ").removeprefix(f"{result.edit.code} ")

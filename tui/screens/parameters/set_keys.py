@@ -182,7 +182,7 @@ class SetKeys(ParameterKeys):
         self.editor.other_label = f"device {device}"
 
     async def _look_at_source(self) -> None:
-        """Read the drive's settings, and tell what would be staged and what left out."""
+        """Read the drive's settings, and show what would be staged and what omitted."""
         editor = self.editor
         assert editor.source is not None
         self._tell_reading("reading the settings")

@@ -58,7 +58,7 @@ class Columns:
 
     @property
     def taken(self) -> int:
-        """The cells of all columns but the name, with what stands between them."""
+        """The cells of all columns but the name, with the spaces between them."""
         columns = (self.code, self.value, self.staged, self.other, self.number, self.address)
         return 1 + sum(columns) + self.range + 3 + 1 + 3
 

@@ -35,7 +35,7 @@ def other_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def factory_text(editor: Editor, parameter: Parameter) -> str:
-    """The factory value, with a ? where no document of the family tells it; or words for it."""
+    """The factory value, with a ? if no document of the family states it; or words for it."""
     values = editor.values
     value = factory_value(editor.session.profile, parameter, values.raws, values.lacking)
     if value is None:
@@ -65,7 +65,7 @@ def old_text(editor: Editor, code: str) -> str:
 def limits_now(
     editor: Editor, parameter: Parameter, *, staged: bool = False
 ) -> LimitsInForce | None:
-    """The limits of now, or those after what is staged."""
+    """The present limits, or those after the staged edits."""
     raws = editor.staging.edits.after(editor.values.raws) if staged else editor.values.raws
     return limits_in_force(editor.session.profile, parameter, raws, editor.values.lacking)
 

@@ -67,7 +67,7 @@ class WriteKeys(ParameterKeys):
             self._ask(question, order.does, "does it", "leaves all as it is", work)
 
     def show_results(self) -> None:
-        """Tell once what became of each edit; where one failed, ask before the rest."""
+        """Report once the result of each edit; where one failed, ask before the rest."""
         applied = self.editor.applied
         if applied is None or self.editor.busy or self.editor.moved is not None:
             return

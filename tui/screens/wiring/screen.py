@@ -92,7 +92,7 @@ class WiringScreen(PanelScreen):
         self.look()
 
     def action_page(self, pages: int) -> None:
-        """As much as stands on the screen, but a line."""
+        """A page of the screen, less a line."""
         self.action_scroll(pages * max(1, self._room() - 1))
 
     def action_section(self, step: int) -> None:

@@ -1,4 +1,4 @@
-"""A line and its drives for scripts: open, read, watch, write, stop. docs/api.md tells how.
+"""A line and its drives for scripts: open, read, watch, write, stop. docs/api.md explains how.
 
 Each call waits until it is done, from any thread. What goes wrong is raised: LineError by the
 line, DriveError by the drive, its profile, or a check from here.

@@ -27,7 +27,7 @@ from .values import DriveValue, NotStopped, NotWritten, Sample, value_from
 from .work import LOOK_WHETHER_OPEN, waited
 
 STANDS_WITHIN = 120.0
-"""Seconds in which a motor is to stand after a stop."""
+"""Seconds in which a motor must reach standstill after a stop."""
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.05, 86400.0
 """Seconds of a cycle of `Drive.watch`."""
 SAMPLES_WAITING = 64
@@ -57,7 +57,7 @@ class Drive:
         return self._session.known_identity.reference
 
     def read(self, *codes: str) -> dict[str, DriveValue]:
-        """Values of now, by code as asked for; one that the drive refuses has no value."""
+        """Present values, by code as requested; one that the drive refuses has no value."""
         named = self._named(codes)
         found = waited(self._session.line, lambda: Reader(self._session).read(list(named.values())))
         return {requested: self._value(found[code]) for requested, code in named.items()}
@@ -108,8 +108,8 @@ class Drive:
     def write(self, values: Mapping[str, object], *, rounded: bool = False) -> dict[str, str]:
         """Write settings, each read back: numbers in the parameter's unit, or as they are typed.
 
-        Returns what became of each, by code. Raises NotWritten where one was not, WouldRound where
-        the drive can hold only another value and `rounded` is not given, and other DriveErrors.
+        Returns the results, by code. Raises NotWritten where one was not, WouldRound where the
+        drive can hold only another value and `rounded` is not given, and other DriveErrors.
         """
         permit = self._permit()
         typed = [(self._session.profile.find(code).code, str(v)) for code, v in values.items()]
@@ -133,9 +133,9 @@ class Drive:
         return waited(session.line, lambda: save_to_eeprom(session, journal, permit))
 
     def stop(self) -> str:
-        """Stop the motor on its ramp and wait until it stands; needs no arming.
+        """Stop the motor on its ramp and wait for standstill; needs no arming.
 
-        Raises NotStopped where it does not stand in the end.
+        Raises NotStopped if it does not reach standstill.
         """
         self._fleet.stop([self._session], by="a script")
         summary = self._fleet.stopper.wait([self._session], STANDS_WITHIN)

@@ -51,7 +51,7 @@ def _warn(trouble: str) -> None:
 
 
 class DriveLine:
-    """An open line. Drives that were taken are asked on until it is closed."""
+    """An open line. Taken drives are kept polled until it is closed."""
 
     def __init__(self, opened: OpenLine) -> None:
         self._opened = opened

@@ -12,7 +12,7 @@ from tui.bus.errors import LineClosed
 
 T = TypeVar("T")
 LOOK_WHETHER_OPEN = 0.5
-"""Seconds between two looks whether the line is open yet, for who waits for it."""
+"""Seconds between two checks whether the line is open yet, for callers that wait for it."""
 
 
 def waited(line: ModbusLine, work: Callable[[], Coroutine[Any, Any, T]]) -> T:

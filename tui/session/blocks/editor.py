@@ -87,7 +87,7 @@ class BlockEditor:
             self._reader = None
 
     def verify(self) -> None:
-        """Compare every slot several times at the next look, and tell what came of it."""
+        """Compare every slot several times at the next check, and report the result."""
         self._verify = True
         self._say("Comparing each slot with direct reads", OutcomeKind.WORKING)
 
@@ -114,7 +114,8 @@ class BlockEditor:
             self._say(text, OutcomeKind.DONE if good else OutcomeKind.REFUSED)
 
     def _wait_for_a_reset(self) -> None:
-        """Note when the drive was silent or starts anew: what waits for a reset may count then."""
+        """Note when the drive was silent or restarts: values that wait for a reset may now
+        apply."""
 
         def seen(snapshot: Snapshot) -> None:
             if snapshot.error or snapshot.state.kind == "starting":
@@ -134,7 +135,7 @@ class BlockEditor:
     # Writing
 
     def not_now(self, block: Block) -> str:
-        """Why the slots of a block cannot be written in the state of now, as Monitor knows it."""
+        """Why the slots of a block cannot be written in the present state, as Monitor knows it."""
         latest = self.monitor.latest
         if latest is None or latest.error or latest.state.motion in AT_REST:
             return ""
@@ -254,7 +255,7 @@ class BlockEditor:
                 self.proposals.seen[id] = view.raws
 
     def refuse(self, text: str) -> None:
-        """Tell why something was not done."""
+        """Report why something was not done."""
         self._say(text, OutcomeKind.REFUSED)
 
     def _say(self, text: str, kind: OutcomeKind) -> None:

@@ -209,7 +209,7 @@ class _Exchange:
             raise NotTaken(f"{'; '.join(texts)}.")
 
     def _not_held(self, raws: Mapping[str, int], back: Mapping[str, int]) -> list[str]:
-        """Codes of what was named and is not held; the state tells what a command word did."""
+        """Codes of what was named and is not held; the state shows what a command word did."""
         commands = {chart.command for chart in self.session.profile.data.charts}
         named = [code for code in self.wanted if code in back and code not in commands]
         return [code for code in named if back[code] != raws[code]]

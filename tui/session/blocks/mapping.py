@@ -1,9 +1,9 @@
 """Mapping of the slots of a drive's blocks, the values that they return, and their check.
 
-What a slot brings is compared with direct reads before and after. The slots of a scanner are
-read again after each use: a word counts only when its slot still stands for the same. What an
-indirect block really brings until the drive's next reset cannot be read; it is told by the same
-comparison, with every parameter that could stand in it. What the words prove, `proof` concludes.
+What a slot brings is compared with direct reads before and after. The slots of a scanner are read
+again after each use: a word counts only when its slot still stands for the same. What an indirect
+block really brings until the drive's next reset cannot be read; it is identified by the same
+comparison, with every parameter that could be in it. What the words prove, `proof` concludes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..read.verdict import SlotMatch
 from ..reading import Reading
 
 COMPARISONS_MOST = 2 * SURE
-"""Comparisons after which what is not proved stays so: values that are alike cannot be told."""
+"""Comparisons after which unproved slots stay so: equal values cannot be distinguished."""
 
 
 class Force(StrEnum):
@@ -118,7 +118,7 @@ class Mapper:
 
     session: DriveSession
     in_force: Callable[[], Mapping[str, int]] = dict
-    """Raw values by slot of what a monitor has proved to stand in each place."""
+    """Raw values by slot, which a monitor has confirmed for each place."""
     priority: Priority = Priority.OPERATOR_READ
     written: dict[str, int] = field(default_factory=dict)
     """Slots written from here that count after a reset, which was not seen yet."""

@@ -30,7 +30,7 @@ from .mapping import wire_timing
 
 @dataclass(slots=True)
 class Proposals:
-    """The assignments that are proposed for a drive's blocks, and what they come to."""
+    """The assignments that are proposed for a drive's blocks, and their results."""
 
     session: DriveSession
     busy: Callable[[], bool]
@@ -66,7 +66,8 @@ class Proposals:
         return sum(len(self.changes(block)) for block in self.blocks)
 
     def propose(self, plan: Assignment) -> None:
-        """Propose an assignment; one that equals today's is no proposal. Raises MappingError."""
+        """Propose an assignment; one that equals the present assignment is not a proposal. Raises
+        MappingError."""
         today = self.today(plan.block)
         if today is None:
             raise MappingError(f"{plan.block.name} could not be read yet.")

@@ -1,7 +1,7 @@
 """Writing an assignment into a drive, slot by slot, each read back.
 
-Everything is looked at anew before each write. What somebody else changed meanwhile is not
-overwritten. A slot whose answer was lost is looked at: it is written once, whatever became of it.
+Everything is read again before each write. What somebody else changed meanwhile is not overwritten.
+A slot whose answer was lost is read: it is written once, with any result.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Written:
     after_reset: bool
     """True where it counts only once the drive was reset."""
     unsaved: bool
-    """True where it is lost at power-off until the drive is told to save."""
+    """True if it is lost at power-off until the drive is ordered to save."""
 
     @property
     def text(self) -> str:
@@ -156,7 +156,7 @@ class _Writing:
             await self._see_taken(step, error)
 
     async def _see_taken(self, step: SlotChange, lost: LineError) -> None:
-        """See what became of a write without an answer; raises AssignmentRefused where it is not
+        """Read the result of a write without an answer; raises AssignmentRefused where it is not
         held."""
         try:
             now = (await self.retrying.ask_raws([step.slot])).get(step.slot)

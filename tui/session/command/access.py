@@ -65,7 +65,7 @@ class CommandAccess:
         return await reader.read(codes, priority=Priority.OPERATOR_READ)
 
     async def chart(self, wanted: OrderId | None = None) -> Chart:
-        """The chart in force, with every word read anew that a command depends on.
+        """The chart in force, with every word read again that a command depends on.
 
         Raises OrderRefused where the drive is not commanded from here, or an interlock speaks
         against the wanted command.

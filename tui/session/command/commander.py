@@ -1,7 +1,7 @@
 """Commanding one drive: armed first, interlocked, walked through its chart, seen to obey.
 
-Methods may be called from any thread and return at once; the work is done in the line's loop,
-and `outcome` tells what it has come to. A stop needs none of this: see stop.py.
+Methods may be called from any thread and return at once; the work is done in the line's loop, and
+`outcome` holds its result. A stop needs none of this: see stop.py.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Commander:
         self._begin(lambda access: give_order(access, id), stamp)
 
     def run(self, id: OrderId, reference: str | None = None, stamp: int | None = None) -> None:
-        """Run forward or reverse at a reference as typed, or at the one that stands.
+        """Run forward or reverse at a typed reference, or at the present one.
 
         Raises OrderRefused when the drive is not armed.
         """
@@ -161,7 +161,7 @@ class Commander:
         self._begin(work, stamp)
 
     def refuse(self, text: str) -> None:
-        """Tell why a command was not given."""
+        """Report why a command was not given."""
         self.session.work.tell(OutcomeKind.REFUSED, text)
 
     def _take_steps(self) -> Decimal:

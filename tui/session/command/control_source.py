@@ -18,9 +18,9 @@ from ..settings.write import Writer
 async def configure(session: DriveSession, writer: Writer, source: ControlSource) -> str:
     """Write what differs from a configuration; returns what was done, for a person.
 
-    Everything is read anew before. A word may change others behind it (the access level does),
-    so each is looked at when its turn comes. Raises OrderRefused while the motor is not surely
-    at rest, the line's errors, ValueRefused and NotTaken.
+    Everything is read again before. A word may change others behind it (the access level does), so
+    each is looked at when its turn comes. Raises OrderRefused while the motor is not surely at
+    rest, the line's errors, ValueRefused and NotTaken.
     """
     profile = session.profile
     written: list[str] = []

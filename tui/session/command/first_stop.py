@@ -1,7 +1,7 @@
 """The first word of a stop: sent before the drive has said what it is.
 
-Who it may be is told by reads, which move nothing: the status word of each kind of family, and
-what decides by which word that is stopped. Then the one word goes out that stops all that is left
+Its family is found by reads, which move nothing: the status word of each kind of family, and the
+word that decides how that is stopped. Then the one word goes out that stops all that is left
 (`tui.drive.first_stop`).
 """
 
@@ -35,7 +35,7 @@ class SentFirst:
 
     what: FirstWord
     answer: str
-    """`ok`, or what became of it instead, in few words."""
+    """`ok`, or its other result, in few words."""
 
     @property
     def taken(self) -> bool:
@@ -130,7 +130,7 @@ async def stop_first(
 
 
 async def _look(line: ModbusLine, device: int, place: StopPlace, *, again: bool) -> _Look:
-    """Read what tells whether a drive is of these families, and by which word it is stopped."""
+    """Read what shows whether a drive is of these families, and by which word it is stopped."""
     raws: dict[int, int] = {}
     there: bool | None = False
     for address in place.status:
@@ -164,7 +164,7 @@ async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> 
 
 
 async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord) -> SentFirst:
-    """Write the word, once. It goes into the journal whatever becomes of it."""
+    """Write the word, once. It is recorded in the journal with any result."""
     answer = reported = "a signal came: not known whether it was taken"
     try:
         await line.write(device, what.address, [what.word], priority=Priority.STOP)

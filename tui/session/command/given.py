@@ -28,7 +28,7 @@ class GivenCommands:
         self._wanted, self.reference_text = reference, text
 
     def forget_reference(self) -> None:
-        """The drive has put it back: nothing may bring it anew."""
+        """The drive has put it back: nothing may send it again."""
         self._wanted = None
 
     def note_command(self, code: str, word: int) -> None:

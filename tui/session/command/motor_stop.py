@@ -1,4 +1,4 @@
-"""One stop of one drive: its word chosen by what the drive tells now, sent, followed to its end."""
+"""One stop of one drive: its word chosen by the drive's state, sent, followed to its end."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ TellStop = Callable[[DriveSession, Phase, str, float], None]
 
 @dataclass(slots=True)
 class MotorStop:
-    """One stop of one drive: its word chosen by what the drive tells now, sent, followed."""
+    """One stop of one drive: its word chosen by the drive's state, sent, followed."""
 
     session: DriveSession
     writer: Writer
@@ -150,7 +150,7 @@ class MotorStop:
         return order_target(self.session.profile, chart, order).code, list(order.words)
 
     async def _chosen(self) -> tuple[Chart, Order]:
-        """The words that stop this drive now; what decides is read anew where it may differ."""
+        """The words that stop this drive now; deciding words are read again if they may differ."""
         profile = self.session.profile
         deciding = [chart.when.parameter for chart in profile.data.charts if chart.when]
         try:
@@ -263,7 +263,7 @@ class MotorStop:
         return "it still turns after a minute."
 
     def _tell_standing(self) -> None:
-        """It stands, as its profile reads it; by a guessed one that proves nothing."""
+        """It is at standstill, as its profile reads it; by a guessed one that proves nothing."""
         session = self.session
         if session.guessed:
             self.say(session, Phase.FAILED, not_proved(session.profile.name), self.ordered)

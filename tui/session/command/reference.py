@@ -140,8 +140,8 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Readin
     """The reference that a person typed, as a raw value; the drive's own unit without one.
 
     Another unit is converted by what the drive holds: pairs of poles, what 100 % is. Raises
-    UnitRefused where nothing leads from one to the other, ValueRefused for what is no reference,
-    has no place on this drive, or follows a scale that was not read or is another one now.
+    UnitRefused if no conversion exists from one to the other, ValueRefused for a text that is not a
+    reference, has no place on this drive, or follows a scale that was not read or has changed.
     """
     match = _TYPED.fullmatch(text.strip())
     if match is None:

@@ -1,8 +1,8 @@
 """Stopping motors: from any thread, before everything else on the line, seen to its end.
 
-The first frame goes out behind at most the one exchange in flight. What became of it is then
-read from the drive: an answer alone stops no motor. Several drives are stopped in two waves: the
-word by what was seen last of each, to all of them; then what has to be read, repeated, verified.
+The first frame goes out behind at most the one exchange in flight. Its result is then read from the
+drive: an answer alone stops no motor. Several drives are stopped in two waves: the word by what was
+seen last of each, to all of them; then what has to be read, repeated, verified.
 
 An internal error anywhere on that way costs no stop: see `LastStop`.
 """
@@ -108,9 +108,9 @@ class Stopper:
     ) -> None:
         """Order drives to stop; ends their work and their arming. Raises LineClosed.
 
-        True `given` for a stop that all programs have heard of already.
-        A stop whose word has not gone out yet is not begun anew: a key that is held down would
-        keep every one of them from going out.
+        True `given` for a stop that all programs have heard of already. A stop whose word was not
+        yet sent does not restart: a key that is held down would keep every one of them from being
+        sent.
         """
         wanted = list(sessions)
         ordered = _now(wanted[0]) if wanted else 0.0

@@ -26,10 +26,10 @@ class Contradiction(DriveError):
 async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdentity | None:
     """Return the identity that a drive reports; None if it reports none.
 
-    Silence and refusals are no contradiction: families without function 43 do either. One that was
-    silent is asked for its status word, so that it does not count as absent. Raises ChecksumFault
-    or WrongReply if its reply only comes damaged, or is lost on a line that loses frames, and the
-    errors of a line that is lost.
+    Silence and refusals are not contradictions: families without function 43 do either. One that
+    was silent is asked for its status word, so that it does not count as absent. Raises
+    ChecksumFault or WrongReply if its reply only comes damaged, or is lost on a line that loses
+    frames, and the errors of a line that is lost.
     """
     # a family that has the function is waited for as always; the others are silent
     has_it = profile.function(IDENTIFY) is not None
@@ -81,7 +81,7 @@ def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
 
 
 def _may_be(reference: str, profile: Profile) -> bool:
-    """Return True if a reference that no profile claims may be of a family all the same."""
+    """Return True if a reference that no profile claims may still be of a family."""
     prefixes = [one.upper() for one in profile.data.identification.reference_prefixes]
     if not prefixes:
         return True

@@ -1,4 +1,4 @@
-"""Which computer a host's name or number means, as far as this machine knows it by itself.
+"""The computer of a host's name or number, as far as this machine knows it without others.
 
 No name server is asked: one that is away would hold up a stop. Names are those of the hosts file.
 """

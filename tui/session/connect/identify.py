@@ -60,7 +60,7 @@ class ScanResult:
 async def identify_drive(
     line: Askable, device: int, *, priority: Priority = Priority.OPERATOR_READ
 ) -> DriveIdentity:
-    """Ask a drive who it is by function 43.
+    """Request a drive's identity by function 43.
 
     A drive that refuses the function is there, but nameless. One that stays silent, or of which
     it is known that it has no function 43 (its limits came from a profile before), is asked for
@@ -115,9 +115,9 @@ async def find_drive(
     """Find out whether anybody is at an address, by the fewest requests, and then who.
 
     An empty address costs one request a probe, and `within` seconds for each; None leaves that to
-    the line. Who tells its state, as a family does that cannot say who it is, is asked who it is
-    with so much `patience`, in seconds. Raises NoAnswer where nothing answers, and the line's
-    other errors.
+    the line. A drive that reports its state, as a family does that cannot identify itself, gets an
+    identity request with so much `patience`, in seconds. Raises NoAnswer where nothing answers, and
+    the line's other errors.
     """
     there = await _present(line, device, probes, priority, within)
     try:
@@ -154,7 +154,7 @@ class _Presence:
 
     register: int = 0
     families: tuple[str, ...] = ()
-    """Ids of those that tell their state by the read that was answered."""
+    """Ids of those that report their state by the read that was answered."""
     objects: IdentificationObjects | None = None
     damaged: bool = False
     """True if nothing of what came was intact."""

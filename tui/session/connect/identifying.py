@@ -62,7 +62,7 @@ class Askable(Protocol):
 
 
 class NotIdentified(ChecksumFault):
-    """Frames were lost or damaged while a device was asked who it is: nothing is decided."""
+    """Frames were lost or damaged while a device was identified: nothing is decided."""
 
     def __init__(self, device: int, function: int = IDENTIFY) -> None:
         text = (

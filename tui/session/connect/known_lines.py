@@ -86,7 +86,7 @@ class LineName:
     """The same for as long as it is the same adapter, host or port; empty for a line that
     nobody finds again, such as the number of a pseudo-terminal."""
     typed: str = ""
-    """Typed name of a serial port if that may come to mean another port; else empty."""
+    """Typed name of a serial port if that may later mean another port; else empty."""
     port: PortName = NO_PORT
 
 

@@ -19,7 +19,7 @@ def line_key(text: str) -> str:
 
     Takes what a person typed, or a line's label. A port is called by its adapter where that has a
     name of its own, else by its real path, as links lead now; a host by its number where the hosts
-    file has its name. A text that is no line is its own key.
+    file has its name. An invalid line is its own key.
     """
     from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, parse_link
 

@@ -35,7 +35,7 @@ LINES_TABLE = "lines"
 MOST_NAMED = 200
 _NAME = re.compile(r"(?!COM\d+$)[A-Za-z][A-Za-z0-9_-]{0,31}", re.IGNORECASE)
 _TAKEN = frozenset({"factory"})
-"""Words that mean something else where a LINE may stand."""
+"""Words with another meaning in the place of a LINE."""
 _KEYS = ("line", "device", "profile")
 _DEVICES = range(1, 248)
 NO_LINES: Mapping[str, NamedLine] = MappingProxyType({})
@@ -64,7 +64,7 @@ class LineSettings(NamedTuple):
     faults: tuple[str, ...] = ()
     """File, line, key and fault; the lines that they are about are not among the others."""
     text: str = ""
-    """The file as it stands; empty where it cannot be read."""
+    """The file unchanged; empty where it cannot be read."""
     places: Mapping[str, str] = NO_PLACES
     """File, line and key by name."""
 
@@ -97,7 +97,7 @@ def is_name(text: str) -> bool:
 def line_named(text: str) -> NamedLine | None:
     """The line of a name; None where the text is a LINE, or no name of any.
 
-    Raises SettingsError where the name stands in a part of the file that cannot be used.
+    Raises SettingsError if the name is in a part of the file that cannot be used.
     """
     if not is_name(text):
         return None
@@ -112,7 +112,7 @@ def line_named(text: str) -> NamedLine | None:
 def line_to_stop(text: str) -> NamedLine | None:
     """The line of a name, even where the rest of the file is broken: a stop has to get through.
 
-    Raises SettingsError where it cannot be told which line or which drive is meant.
+    Raises SettingsError if it is not clear which line or which drive it means.
     """
     try:
         return line_named(text)
@@ -230,7 +230,7 @@ _HEAD = re.compile(r"""\s*\[\s*(?:lines\s*\.\s*)?["']?([\w-]+)["']?\s*\]""")
 def _salvaged(text: str, name: str) -> NamedLine | None:
     """The line of a name out of a broken file, by its lines of text.
 
-    Raises SettingsError where the line is told and its address is not to be made out.
+    Raises SettingsError if the line is clear and its address is not.
     """
     wanted, section = name.casefold(), ""
     parts: dict[str, str] = {}

@@ -33,7 +33,7 @@ class Farewell(Protocol):
 
 @dataclass(slots=True)
 class OpenLine:
-    """A line with what stands behind it."""
+    """A line with its address part."""
 
     text: str
     """As it was typed."""
@@ -46,7 +46,7 @@ class OpenLine:
     known: KnownLine | None = None
     """True if it is still what it was, where that is looked at; None for a simulated line."""
     again: Callable[[SerialLink], ModbusLine] | None = None
-    """Makes the line anew at other settings, for this program alone."""
+    """Opens the line again at other settings, for this program alone."""
     farewells: dict[int, Farewell] = field(default_factory=dict)
     """By address, what is to be said of each drive at the end."""
 
@@ -81,8 +81,8 @@ def open_line(
     `program` is what others on the line call this one; a program without a name shares nothing.
     Without `keeper` it holds a line itself that no other program holds.
 
-    With `wait` it returns connected, or raises the line's error after so many seconds;
-    without, it connects by itself. Raises LinkSyntaxError, UnknownProfile, ProfileError.
+    With `wait` it returns connected, or raises the line's error after so many seconds; otherwise it
+    connects automatically. Raises LinkSyntaxError, UnknownProfile, ProfileError.
     """
     if text.casefold().startswith(SIMULATED_PREFIX):
         from tui.simulator import parse_drives
@@ -131,7 +131,7 @@ def reopen(opened: OpenLine, baud: int, format: str, *, wait: float) -> None:
 
 
 def check_line(text: str) -> None:
-    """Raise LinkSyntaxError, or the simulator's error, for a text that is no LINE."""
+    """Raise LinkSyntaxError, or the simulator's error, for an invalid LINE."""
     if text.casefold().startswith(SIMULATED_PREFIX):
         from tui.simulator import SimulatorError, parse_drives
 

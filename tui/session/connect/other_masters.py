@@ -1,4 +1,5 @@
-"""True if another master asks drives on a line: heard before anything is sent, and while it is."""
+"""True if another master polls drives on a line: heard before the first request, and during the
+search."""
 
 from __future__ import annotations
 
@@ -36,7 +37,7 @@ class Overheard:
     answered: tuple[int, ...] = ()
     """Addresses that answered somebody."""
     loose: int = 0
-    """Bytes that are no frame at this baud and format."""
+    """Bytes that form no frame at this baud and format."""
 
     @property
     def text(self) -> str:

@@ -35,12 +35,12 @@ Found = Callable[[ScanResult], Awaitable[None]]
 class Search:
     """Asks each address in turn, behind everything else; those that stay silent once more.
 
-    An address at which nobody is costs its request and the longest turnaround of the profiles.
-    Whoever answers later than that is heard all the same, and asked again with more patience;
-    unless `once`, so are all the others. A `patient` search waits as the line does by itself: for
-    a stop, and for drives simulated in this very program, which are late when it is. `between` is
-    called before each address, and may end the search by what it raises.
-    Any loop may look at how far it is.
+    An address at which nobody is costs its request and the longest turnaround of the profiles. A
+    device that answers later than that is heard anyway, and gets another request with more
+    patience; unless `once`, so are all the others. A `patient` search waits as long as the line
+    does: for a stop, and for drives simulated in this very program, which are late when it is.
+    `between` is called before each address, and may end the search by what it raises. Any loop may
+    look at how far it is.
     """
 
     def __init__(
@@ -137,7 +137,7 @@ class Search:
             self.at = None
 
     async def _refused_at_once(self, line: ModbusLine, found: Found) -> bool:
-        """Return True if the one device that was named has said who it is.
+        """Return True if the one device that was named has identified itself.
 
         It is asked before all profiles are read, of which the questions to strangers are made:
         that takes longer than most drives do to say it.

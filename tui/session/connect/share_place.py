@@ -83,7 +83,7 @@ def group_number(group: str, folder: Path) -> int:
 
 
 def this_program(name: str) -> Program:
-    """This program as others on the line are told of it."""
+    """This program as others on the line see it."""
     user = os.environ.get("USER") or os.environ.get("LOGNAME") or ""
     # as others take it: the environment holds any bytes
     texts = (text.encode(errors="replace").decode()[:200] for text in (name, user, _terminal()))

@@ -38,7 +38,7 @@ class Strangers:
 
 
 def known_profiles() -> list[Profile]:
-    """Every profile that can be used; one that cannot is told where it is chosen."""
+    """Every profile that can be used; one that cannot is reported when it is chosen."""
     found = []
     for listing in library.listings():
         try:

@@ -2,7 +2,7 @@
 
 Pure. Counts are taken at two looks and subtracted. While other frames go over the line, how many
 were sent by the moment at which the drive looked at its counter is known within bounds only; a
-difference is told as far as it is certain.
+difference is reported as far as it is certain.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MODULO = 0x10000
 MOST = 0xFFFF
 """Value at which a count of checksum errors stays."""
 STRANGE = 0x8000
-"""Frames more than were sent from here, from which on a count that fell was begun anew."""
+"""Frames more than this program sent, from which on a count that fell was restarted."""
 
 COUNTED_ANEW = (
     "The drive has begun to count anew: it was switched off, or somebody reset its counters. It is"
@@ -71,10 +71,10 @@ class Comparison:
     """Frames that it counted since the first look."""
     damaged: int = 0
     anew: bool = False
-    """True if it began to count anew just before the first look."""
+    """True if it restarted counting just before the first reading."""
 
     def with_look(self, now: DriveCount) -> Comparison:
-        """With one look more; begun again where either side counts anew."""
+        """With one look more; restarted if either side restarts counting."""
         sent = now.sent.since(self.last.sent)
         frames = frames_since(self.last.frames, now.frames, sent)
         if now.sent.high < self.last.sent.low:
@@ -112,7 +112,7 @@ class Difference:
 
 
 def frames_since(before: int, now: int, sent: Bounds) -> int | None:
-    """Frames between two counts modulo 65536; None where the drive began to count anew.
+    """Frames between two counts modulo 65536; None if the drive restarted counting.
 
     Of the numbers that the counts allow, the one nearest to what was sent from here.
     """

@@ -106,7 +106,7 @@ class CounterWatch:
 
     @property
     def has_diagnostics(self) -> bool:
-        """True if the drive tells its counters by function 8."""
+        """True if the drive reports its counters by function 8."""
         return self._has(DAMAGED) and self._has(FRAMES)
 
     @property
@@ -208,7 +208,7 @@ class CounterWatch:
     async def echo(self, times: int) -> int:
         """Send frames that change nothing; how many were answered.
 
-        Echoes of function 8, or reads of the word that tells the state where the drive has none.
+        Echoes of function 8, or reads of the word that shows the state if the drive has none.
         """
         answered = 0
         for _ in range(times):

@@ -37,7 +37,7 @@ SERIAL = "serial:"
 FRAMES_COME_WITHIN = 0.5
 """Seconds in which the keeper of a line has sent its frames."""
 LATE_WITHIN = 1.0
-"""Seconds in which a reply comes to the last request of those that got none in time."""
+"""Seconds in which a reply arrives to the last request of those that got none in time."""
 Asks = Callable[[], Awaitable[object]]
 
 
@@ -71,7 +71,7 @@ async def sight_of_drive(
     changed: str = "",
     neighbors: Sequence[int] = (),
 ) -> Sight:
-    """Ask a drive on an open line a few times, and see what becomes of it."""
+    """Send a drive on an open line a few requests, and see their results."""
     seen = await asyncio.to_thread(sight_of_port, line.link, device)
     seen = replace(seen, profile=profile, changed=changed, neighbors=tuple(neighbors))
     if _attached(line) and seen.port is not None:
@@ -100,7 +100,8 @@ async def sight_of_drive(
 async def _outcomes(
     line: ModbusLine, device: int, profile: Profile | None
 ) -> list[LineError | None]:
-    """Return the results of the reads, None for an answer. Raises what is no end of an exchange."""
+    """Return the results of the reads, None for an answer. Raises an error other than the end of an
+    exchange."""
     questions = await asyncio.to_thread(_questions, line, device, profile)
     outcomes: list[LineError | None] = []
     for question in questions[:ASKED_IN_VAIN]:

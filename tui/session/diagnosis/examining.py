@@ -37,7 +37,7 @@ CLEAN_READS = ceil(log(RISK) / log(1 - EXCLUDED))
 LEAST_READS = 50
 """Reads beside the replies that the last minute of the drive has counted."""
 PAUSED_READS, PAUSE, PAUSED_WITHIN = 16, 0.1, 4.0
-"""Reads with pauses, in s, that tell copies of replies from those of a second drive."""
+"""Reads with pauses, in s, that distinguish copies of replies from those of a second drive."""
 RECONNECTED_WITHIN = 3.0
 """Seconds in which a gateway takes a new connection."""
 IDLE = 3.0

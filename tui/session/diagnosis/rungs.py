@@ -1,6 +1,6 @@
 """The ladder of what may keep a drive from answering: a test, a sentence and the next step each.
 
-Pure: all is told from what was seen. The first rung whose test holds is the one that fails.
+Pure: all follows from the evidence. The first rung whose test holds is the one that fails.
 """
 
 from __future__ import annotations
@@ -243,4 +243,4 @@ LADDER: tuple[Rung, ...] = (
     ),
     Rung("exception", _refused, _says_refused, steps.ask_otherwise),
 )
-"""Every rung, in the order in which they are tried; each test but the first ones' stands alone."""
+"""Every rung, in the order in which they are tried; each test but the first ones' works alone."""

@@ -1,4 +1,4 @@
-"""Verdicts from the shares of sick frames: how each is told, and how sure it is; pure."""
+"""Verdicts from the shares of sick frames: the text of each, and its certainty; pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that was seen of a line and one drive on it; what the rungs of the ladder are told from."""
+"""All that was seen of a line and one drive on it; the facts for the checks of the diagnosis."""
 
 from __future__ import annotations
 

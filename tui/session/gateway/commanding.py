@@ -29,8 +29,8 @@ class GatewayCommanding:
 
     A client that repeats its words would start a motor again that a person has just stopped: after
     such a stop its commands are refused until a client has sent a stop word, as a controller does
-    that has seen the motor stand. A stop by another client counts the same for those that have
-    commanded the drive: they have to send their own.
+    that has seen the motor at standstill. A stop by another client counts the same for those that
+    have commanded the drive: they have to send their own.
     """
 
     def __init__(
@@ -148,7 +148,8 @@ class GatewayCommanding:
             self._by.pop(device, None)
 
     def _requested(self, device: int, program: Program) -> None:
-        """A program wants a drive, which it gets where the motor stands; in the line's thread."""
+        """A program requests a drive, which it gets if the motor is at standstill; in the line's
+        thread."""
         with suppress(LineClosed):
             self._line.spawn(lambda: self._decide(device, program), f"question about {device}")
 

@@ -1,4 +1,4 @@
-"""Which drive stands behind each device of a line, found out when a client first asks for it."""
+"""The drive of each device of a line, found when a client first asks for it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ READ_THROUGH = Limits(
 )
 """For what no profile fits: it may be no drive at all, and is read as its client asks."""
 WHO_AGAIN_AFTER = 30.0
-"""Seconds after which a drive that did not say who it is is asked again."""
+"""Seconds after which an unidentified drive is identified again."""
 
 CHART_AGE = 2.0
 """Seconds up to which that word is taken from a read before; a write makes it unknown."""
@@ -58,11 +58,11 @@ class GatewayDrives:
         self._losses = 0
         """Number of losses of the line; the only field that is changed in the line's thread."""
         self._sure: dict[int, int] = {}
-        """Those losses when a device began to say who it is; none where it was silent since."""
+        """Those losses when a device began to identify itself; none where it was silent since."""
         self._candidates: dict[int, tuple[str, ...]] = {}
         """Families of which a nameless device may be."""
         self._requested: dict[int, tuple[int, float]] = {}
-        """Those losses, and the time, when a device was last asked who it is."""
+        """Those losses, and the time, of a device's last identification."""
         self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
         self._charts: dict[int, float] = {}
         """When the word that decides between charts was last asked for, by device."""
@@ -83,7 +83,7 @@ class GatewayDrives:
         return self._found[device]
 
     def find_out(self, device: int) -> None:
-        """Ask a device that answers who it is, beside what else is done; not again and again."""
+        """Identify a device that answers, beside other work; not again and again."""
         sure = self.known(device) is not None and self._is_sure(device)
         if not sure and device not in self._tasks:
             losses, since = self._requested.get(device, (-1, 0.0))
@@ -120,7 +120,7 @@ class GatewayDrives:
         self._take(device, None, self._losses)
 
     def doubt(self, device: int) -> None:
-        """It was silent: who it is is asked again before anything but a stop is written to it."""
+        """It was silent: it is identified again before anything but a stop is written to it."""
         self._sure.pop(device, None)
         self._requested.pop(device, None)
 

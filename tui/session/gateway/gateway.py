@@ -62,7 +62,7 @@ class Gateway:
         self._rules = rules
 
     async def close(self) -> list[StopSummary]:
-        """Leave all lines alone; what became of the motors that had to be stopped."""
+        """Leave all lines alone; the results for the motors that had to be stopped."""
         return [reported for line in self._lines if (reported := await line.close()) is not None]
 
     def gone(self, client: TcpClient) -> None:
@@ -236,7 +236,7 @@ def _unsent(line: ModbusLine, device: int) -> int:
 
 
 def exception_of(error: LineError) -> int:
-    """The exception that tells a client of trouble on the line, or what the drive itself said."""
+    """The exception that reports trouble on the line to a client, or the drive's own."""
     if isinstance(error, DeviceException):
         return error.code
     if isinstance(error, ExchangeError):

@@ -46,7 +46,7 @@ class GatewayLine:
         self.commanding = GatewayCommanding(line, self._stands, self.started)
 
     async def close(self) -> StopSummary | None:
-        """Leave the line alone; what became of motors that clients had started, None for none."""
+        """Leave the line alone; the results for motors that clients had started, None for none."""
         summary = await self.started.end()
         self.resting.close()
         self.commanding.close()
@@ -82,7 +82,7 @@ class GatewayLine:
         return self.commanding.last_sign(device) if self.started.holds(device) else None
 
     async def _stands(self, device: int) -> bool:
-        """Return True if a motor surely stands now, asked for another program that wants the
+        """Return True if a motor is surely at standstill now, for another program that requests the
         drive."""
         session = self.drives.known(device)
         if session is None:

@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 STANDSTILL_LOOK = 0.5
 LONGEST_LOOK = 300.0
-"""Seconds after a stop in which the motor is looked at until it stands."""
+"""Seconds after a stop in which the motor is read until it is at standstill."""
 CLIENT_MOTORS_STOP_WITHIN = 10.0
 """Seconds that the end of the gateway waits for its motors."""
 
@@ -45,8 +45,8 @@ class StartedMotors:
         self._leave = line.facts.on_stop(lambda devices, *_: self.stopped(*devices))
 
     def holds(self, device: int) -> bool:
-        """Return True if a motor that a client has started is not yet known to stand. For any
-        thread."""
+        """Return True if a motor that a client has started is not yet known to be at standstill.
+        For any thread."""
         return self._keeper.holds(device)
 
     async def begin(self, session: DriveSession, order: StartDirection) -> bool:
@@ -71,7 +71,8 @@ class StartedMotors:
         (self._keeper.sent if sent else self._keeper.never_sent)(session)
 
     def stopped(self, *devices: int) -> None:
-        """A stop was given, by whomever: see the motors stand. For any thread."""
+        """A stop was given, by any program: check that the motors reach standstill. For any
+        thread."""
         for device in devices:
             if self._keeper.holds(device):
                 self._loop.call_soon_threadsafe(self._look_at, device)

@@ -110,7 +110,7 @@ class GatewayWrite:
         return not self._line.pending.changes_before(self._write, registers)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
-        """Words that surely are as they are told now."""
+        """Words whose shown values are surely present."""
         try:
             await Reader(self._session).read(codes, priority=Priority.OPERATOR_WRITE)
         except LineError as error:

@@ -83,8 +83,8 @@ class Feeding:
 def feeding(profile: Profile, drive: DriveTally, now: float) -> Feeding | None:
     """Return how a drive's timeout is kept from running out; None if it has none, or is unknown.
 
-    What the drive has told to whoever asked goes before its factory setting; of several timeouts
-    the shortest counts.
+    Values that the drive has reported to any program precede its factory setting; of several
+    timeouts the shortest counts.
     """
     rules = profile.data.communication_fault
     if rules is None or not rules.timeout or drive.fed is None:

@@ -1,4 +1,4 @@
-"""A line that is listened to in a thread of its own, for whoever looks at it now and then."""
+"""A line that is monitored in a thread of its own, for a screen that reads it now and then."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class HeardLine:
         self._trace = Trace(FRAMES_HEARD)
         self._summed: tuple[float, ListeningSummary] | None = None
         self.trouble = ""
-        """Why it has ended by itself; empty while it goes on."""
+        """Why it has ended without a command; empty while it goes on."""
 
     def open(self) -> None:
         """Open the line and begin; reads files. Raises as `line_to_listen` does."""
@@ -73,7 +73,7 @@ class HeardLine:
 
     @property
     def frames(self) -> tuple[Frame, ...]:
-        """The last frames, oldest first: requests are `out`, replies `in`, whoever sent them."""
+        """The last frames, oldest first: requests are `out`, replies `in`, of any sender."""
         return self._trace.frames()
 
     def summary(self) -> ListeningSummary:
@@ -114,4 +114,4 @@ class HeardLine:
 
 
 def _forget(_: ToldExchange) -> None:
-    """Exchanges are told by their frames, and counted."""
+    """Exchanges are reported with their frames, and counted."""

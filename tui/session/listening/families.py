@@ -79,9 +79,9 @@ class Families:
         self._remembered = remembered or {}
         self._evidence: dict[int, _Evidence] = {}
         self._likely: dict[int, tuple[int, TakenFamily | None]] = {}
-        """By device, how much was known, and what it came to."""
+        """By device, how much was known, and the result."""
         self.identities: dict[int, DriveIdentity] = {}
-        """Drives that have said who they are, to whoever asked."""
+        """Drives that have identified themselves to any program."""
 
     def family(self, device: int) -> TakenFamily | None:
         """Return the present guess of a drive's family; None if nothing indicates one."""

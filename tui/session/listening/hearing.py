@@ -44,13 +44,13 @@ class Hearing:
         return data, self.clock.monotonic()
 
     def take(self, data: bytes, now: float) -> None:
-        """Tell what follows from what was read, or from a pause in which nothing came."""
+        """Report the conclusions from the bytes read, or from a pause without bytes."""
         found = self.listener.take(data, now) if data else self.listener.idle(now)
         for one in found:
             self._report(one)
 
     def end(self, now: float) -> None:
-        """Tell what is still open."""
+        """Report open requests."""
         for one in self.listener.end(now):
             self._report(one)
 

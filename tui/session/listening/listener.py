@@ -33,15 +33,15 @@ class ToldExchange:
 
     @property
     def profile(self) -> Profile | None:
-        """The profile that it is told by."""
+        """The profile that explains it."""
         return self.family.profile if self.family is not None else None
 
 
 class LineListener:
-    """Tells what others say on one line; `character` and `silence` are the line's, in seconds.
+    """Reports the traffic on one line; `character` and `silence` are the line's, in seconds.
 
-    Times are those of a monotonic clock. A character of 0 is that of a line whose pauses cannot
-    be told.
+    Times are those of a monotonic clock. A character of 0 is that of a line whose pauses cannot be
+    measured.
     """
 
     def __init__(

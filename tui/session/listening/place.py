@@ -30,8 +30,7 @@ class PlaceToListen:
 def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
     """The line that is meant, opened for a program of that name.
 
-    Raises NothingToHear for one that is no serial line, LinkSyntaxError, and those of
-    ListeningLine.
+    Raises NothingToHear unless it is a serial line, LinkSyntaxError, and those of ListeningLine.
     """
     if text.casefold().startswith(SIMULATED_PREFIX):
         with _simulated(text, program) as place:

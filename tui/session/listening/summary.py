@@ -51,7 +51,7 @@ class ListeningSummary:
     """Part of the time in which there were bytes on the line; None where that is not known."""
     drives: tuple[DriveSummary, ...]
     reports_silences: bool
-    """True if pauses between bytes could be told."""
+    """True if pauses between bytes could be measured."""
 
 
 def summary_of(listener: LineListener, now: float, timing: WireTiming) -> ListeningSummary:

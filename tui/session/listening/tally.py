@@ -30,7 +30,7 @@ DECIDING = frozenset(
 )
 """Quantities that decide what the motor does."""
 NOBODY_WAITS_SO_SHORT = 0.01
-"""Seconds in which no master gives up an answer and asks on: another one did."""
+"""Seconds in which no master gives up an answer and continues: another one did."""
 READS_KEPT = 500
 """Different reads of one drive that are counted one by one."""
 
@@ -87,7 +87,7 @@ class DriveTally:
     turnaround_least: float = float("inf")
     turnaround_most: float = 0.0
     fed: float | None = None
-    """When it was last asked and answered, which is what starts its timeout anew."""
+    """Time of its last request and answer, which restart its timeout."""
     longest_pause: float = 0.0
 
     @property
@@ -106,7 +106,7 @@ class DriveTally:
         return self.turnaround_sum / self.answered if self.answered else None
 
     def pause_until(self, now: float) -> float:
-        """The longest time for which nobody fed it, that of now included."""
+        """The longest time without a keep-alive read, including the present one;"""
         return max(self.longest_pause, now - self.fed if self.fed is not None else 0.0)
 
     def take(

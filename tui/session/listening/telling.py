@@ -27,7 +27,7 @@ def requested_names(reported: ToldExchange) -> list[str]:
 
 
 def exchange_text(reported: ToldExchange, families: Families) -> str:
-    """Device, function, and the values or what became of it; control characters as signs."""
+    """Device, function, and the values or the result; control characters as signs."""
     one = reported.exchange
     head = f"{one.device or 'all':>3} {function_name(one.function):<{FUNCTION_WIDTH}}"
     return plain(f"{head} {_what(reported, families)}".rstrip())

@@ -97,7 +97,7 @@ def values_of(
 ) -> list[HeardValue]:
     """Return the values that a request wrote and its reply contains; `raws` are raw values by code.
 
-    What was refused is no value, nor is what a drive did not confirm but a broadcast.
+    Refused values do not count, nor do those that a drive did not confirm, except of a broadcast.
     """
     if exchange.answer not in ("ok", "broadcast"):
         return []

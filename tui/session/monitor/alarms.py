@@ -73,8 +73,7 @@ class PresentFault:
 class LineAlarms:
     """Follows the faults of the drives of one line, in the order in which they came.
 
-    Belongs to one loop. What came and went is told to the log of events, and by `record` to the
-    journal.
+    Belongs to one loop. Changes are reported to the log of events, and by `record` to the journal.
     """
 
     def __init__(
@@ -90,7 +89,7 @@ class LineAlarms:
 
     @property
     def active(self) -> tuple[PresentFault, ...]:
-        """The faults of now, the first one first."""
+        """The present faults, the first one first."""
         return tuple(self._active.values())
 
     @property

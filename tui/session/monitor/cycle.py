@@ -1,4 +1,4 @@
-"""A cycle of a watched drive for who records it: good is what was read in that very cycle."""
+"""A cycle of a watched drive for a recorder: good is what was read in that very cycle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def as_read(profile: Profile, codes: Sequence[str], snapshot: Snapshot, since: f
     """The cycle with all codes in their order; what was not read after `since` is stale.
 
     `since` is when the cycle before ended (monotonic). What was never read is bad, and says why.
-    Its state is what those of now tell.
+    Its state follows from the present ones.
     """
     readings: dict[str, Reading] = {}
     for code in codes:

@@ -50,7 +50,7 @@ class LineHealth:
         return [("alarm", one.text) for one in self.troubles if one.kind not in before]
 
     def forget(self) -> None:
-        """Judge anew: the line is lost."""
+        """Judge again: the line is lost."""
         self.troubles, self._poor = (), frozenset()
 
     def _found(

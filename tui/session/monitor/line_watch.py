@@ -1,8 +1,8 @@
 """Looking after every drive found on a line, watched or not.
 
-Some drives watch the line and trip when it falls silent (communication timeout). The holder of
-the line reads them as long as this program is on it, at least three times in each timeout, before
-polls and before an operator's own requests. Other requests tell the state of the drives in a list.
+Some drives watch the line and trip when it falls silent (communication timeout). The holder of the
+line reads them as long as this program is on it, at least three times in each timeout, before polls
+and before an operator's own requests. Other requests show the state of the drives in a list.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ GLANCE = 3.0
 GLANCE_EACH = 0.15
 """Seconds of that for each drive of the line."""
 LEARN_AGAIN = 20.0
-"""Seconds after which a drive's timeout and reaction are read anew: they may be changed."""
+"""Seconds after which a drive's timeout and reaction are read again: they may be changed."""
 SHORTEST = 0.02
 
 
@@ -90,12 +90,12 @@ class LineWatch:
         return replace(watch, active=watch.acts and begun)
 
     def _runs_by_the_line(self, kept: _Kept) -> bool:
-        """Return True if the motor runs by somebody's command over the line, whoever gave it."""
+        """Return True if the motor runs by a command over the line, from any master."""
         state, _ = self._last_seen(kept)
         return state is not None and state.motion == "running" and not state.local
 
     def left_alone(self) -> dict[int, TimeoutWatch]:
-        """Drives that act on their communication timeout once nobody asks them, at rest too."""
+        """Drives that react to their communication timeout when polling stops, at rest too."""
         found = {device: self.watch(device) for device in self._kept}
         return {
             device: watch
@@ -112,7 +112,7 @@ class LineWatch:
         ]
 
     def under_command(self) -> list[DriveSession]:
-        """Drives that were commanded from here and whose motors do not surely stand."""
+        """Drives that this program commanded and whose motors are not surely at standstill."""
         return [
             kept.session
             for kept in self._kept.values()

@@ -38,7 +38,7 @@ RESET_NEAR = frozenset({"fault", "starting", "unknown"})
 FORGOTTEN_AFTER = 3
 """Failed cycles in a row after which another drive may answer."""
 RESTART_AFTER = 1.0
-"""Seconds after which a monitor that failed by an error of its own begins anew."""
+"""Seconds after which a monitor that failed by an internal error restarts."""
 RATE_OVER = 6
 """Cycles over which the rate is measured."""
 
@@ -59,7 +59,7 @@ class Monitor:
         self.device = session.device
         self.profile = session.profile
         self.period = 0.5
-        """Target cycle time in seconds; read anew at each."""
+        """Target cycle time in seconds; read again at each."""
         self.held_back: Callable[[], str] = lambda: ""
         """Asked before each cycle, in the line's thread: why the drive must not be asked now."""
         self.freely: Callable[[], bool] = lambda: True
@@ -130,14 +130,14 @@ class Monitor:
         )
 
     def stop(self) -> None:
-        """Stop watching; an exchange in flight ends by itself."""
+        """Stop watching; an exchange in flight ends without help."""
         if self._worker is not None:
             self._worker.cancel()
             self._worker = None
         self._notes.end()
 
     async def _keep_watching(self, rates: Rates) -> None:
-        """Watch for good: an error that nobody foresaw is told, and watching begins anew."""
+        """Watch for good: an unforeseen error is reported, and watching restarts."""
         while True:
             try:
                 await self._watch(rates)

@@ -23,7 +23,7 @@ class Rates:
     with the slow ones."""
     slow: tuple[str, ...] = ()
     key: tuple[str, ...] = ()
-    """Those of the fast ones that tell the state."""
+    """Those of the fast ones that show the state."""
 
     @property
     def seldom(self) -> tuple[str, ...]:
@@ -58,7 +58,7 @@ def rates_of(profile: Profile) -> Rates:
 
 
 def monitoring_codes(profile: Profile) -> list[str]:
-    """Codes of a profile's monitoring set with the words that tell its state and fault."""
+    """Codes of a profile's monitoring set with the words that show its state and fault."""
     codes = [value.parameter for value in profile.data.monitoring.values]
     codes += watched_codes(profile)
     if profile.data.faults.parameter:

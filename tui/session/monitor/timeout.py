@@ -17,7 +17,7 @@ from ..reading import Reading
 from ..timeout_report import Timeout, TimeoutWatch
 
 TOLD_SHARE = 0.5
-"""Share of its timeout after which a drive that was not heard is told of."""
+"""Share of its timeout after which a silent drive is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ async def timeouts_of_ports(
 ) -> list[Reading]:
     """The timeout of each port of a drive; a port that it does not have may meet silence.
 
-    Raises the line's errors, NoAnswer only where the drive does not tell its state either.
+    Raises the line's errors, NoAnswer only if the drive does not report its state either.
     """
     found: list[Reading] = []
     silent: NoAnswer | None = None
@@ -110,7 +110,7 @@ async def timeouts_of_ports(
 
 
 def _related_words(session: DriveSession, rules: CommunicationFault) -> list[str]:
-    """Codes of what tells the reaction, and whether the watch has begun."""
+    """Codes of the words that show the reaction, and whether the watch has begun."""
     codes = [rules.reaction] if rules.reaction else []
     if rules.needs_write and not session.reported_by_line:
         codes += [chart.command for chart in session.profile.data.charts if chart.command]
@@ -128,8 +128,8 @@ def timeout_now(session: DriveSession) -> Timeout:
 def has_begun(session: DriveSession) -> bool:
     """Return True if a drive watches the line now, as far as is known.
 
-    Some do so once a command or reference was written to them by anybody: the command word that
-    the drive holds tells it, and what was written from here.
+    Some do so once a command or reference was written to them by any master: the command word that
+    the drive holds shows it, and this program's own writes.
     """
     rules = session.profile.data.communication_fault
     if rules is None or not rules.needs_write or session.reported_by_line:

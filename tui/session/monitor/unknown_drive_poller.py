@@ -1,6 +1,6 @@
 """Drives that answered and of which nothing is known: kept alive, as any may watch the line.
 
-What they do when they are asked no more is in no profile, so they are taken for the strictest.
+Their reaction to lost polling is in no profile, so the strictest is assumed.
 """
 
 from __future__ import annotations

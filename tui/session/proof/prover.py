@@ -65,7 +65,7 @@ def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) ->
 
 @dataclass(slots=True)
 class Prover:
-    """One proof of one drive; `tell` is told how far it is."""
+    """One proof of one drive; The callback gets the progress."""
 
     session: DriveSession
     journal: Journal

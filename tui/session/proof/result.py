@@ -10,7 +10,7 @@ from tui.drive.profile.schema import Reaction
 from .silences import Bracket
 
 UNNAMED_FAULT = "a fault"
-"""One of which the drive tells no code."""
+"""One whose code the drive does not report."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Read plans of one drive, made anew when what they count with has changed."""
+"""Read plans of one drive, made again when their costs have changed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class KeptPlans:
         return len(self._kept)
 
     def clear(self) -> None:
-        """Make all of them anew."""
+        """Make all of them again."""
         self._kept.clear()
 
     def plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:

@@ -17,7 +17,7 @@ from tui.drive.values import word_count
 from ..drive import DriveSession
 
 UNKNOWN_TIMEOUT = 2.0
-"""Seconds that a communication timeout is taken for which a drive refuses to tell."""
+"""Seconds assumed for a communication timeout that a drive refuses to report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class PresenceRead:
 def presence_read(profile: Profile) -> PresenceRead | None:
     """The request that is answered by whichever drive of the family; None where none is known.
 
-    Where a word that a drive does not have meets silence, two neighbors of the monitoring set:
-    their reply is longer than one that may yet come to such a word, and taken for none.
+    For a drive that ignores words it lacks, two neighbors of the monitoring set: their reply is
+    longer than one that may yet come for such a word, and is not mistaken for it.
     """
     pair = _neighbors(profile) if meets_silence(profile) else None
     if pair is not None:

@@ -1,8 +1,8 @@
 """Evidence from a block's or scanner's words on the parameter of each place.
 
-What an indirect block brings since its drive's last reset cannot be read. It is told by its words:
-a place brings a parameter when nothing else that the block can bring has fitted, and this one has.
-What was told once of a chosen parameter stays true until the drive is reset.
+What an indirect block brings since its drive's last reset cannot be read. It is identified by its
+words: a place holds a parameter when nothing else that the block can return has fitted, and this
+one has. Facts once known about a chosen parameter stay true until the drive is reset.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ class SlotEvidence:
     """The raw values of each parameter, read directly."""
 
     def begin(self) -> None:
-        """Forget what led to no proof; how a value trembled long ago says nothing of now."""
+        """Forget what led to no proof; how a value varied long ago shows nothing about the
+        present."""
         self._off.clear()
         self._seen.clear()
 

@@ -80,7 +80,7 @@ class Reader:
         return {code: decoding.decode(found[code]) for code in wanted}
 
     def _note_state(self, codes: Iterable[str]) -> None:
-        """Tell the session when the motor was seen at rest."""
+        """Notify the session when the motor was seen at rest."""
         status = {chart.status for chart in self.profile.data.charts}
         image = self.session.image
         for code in status.intersection(codes):
@@ -105,7 +105,7 @@ class Reader:
         return planned_reads(self._plans.plan(sure, self.in_force), self._plans.plan(unsure))
 
     def forget(self) -> None:
-        """Read scales and refused parameters anew: another drive may answer now."""
+        """Read scales and refused parameters again: another drive may answer now."""
         self.session.image.distrust()
         self.session.byte_order.forget()
         self._plans.clear()
@@ -118,7 +118,7 @@ class Reader:
 
     @property
     def in_force(self) -> dict[str, int]:
-        """Raw values by slot of what surely stands in each place of a block or scanner now."""
+        """Raw values by slot that each place of a block or scanner surely holds now."""
         return self._slots.in_force()
 
     async def learn_slots(self) -> None:

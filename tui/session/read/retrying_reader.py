@@ -95,12 +95,12 @@ class RetryingReader:
         return found
 
     async def ask_raws(self, codes: Iterable[str]) -> dict[str, int]:
-        """The raw values of those that the drive tells."""
+        """The raw values of those that the drive reports."""
         readings = await self.ask(codes)
         return {code: one.raw for code, one in readings.items() if one.raw is not None}
 
     async def ask_state(self) -> StateKind:
-        """The kind of the drive's state now, for whoever needs a motor at rest."""
+        """The kind of the drive's present state, for callers that need a motor at rest."""
         profile = self.session.profile
         codes = [*watched_codes(profile), profile.data.faults.parameter]
         state = drive_state(profile, await self.ask(code for code in codes if code))

@@ -1,9 +1,9 @@
 """Contents of a drive's indirect block or scanner, as far as they are certain.
 
-A scanner's slots count as soon as they are written: they are read, and read again after each
-use (the read plan sees to that). An indirect block's slots count from the drive's next reset
-on, so what they hold now may not be what the block brings: the block is compared, a few
-parameters at a time, with direct reads of everything that could stand in it.
+A scanner's slots count as soon as they are written: they are read, and read again after each use
+(the read plan sees to that). An indirect block's slots apply from the drive's next reset on, so
+their present contents may not be what the block returns: the block is compared, a few parameters at
+a time, with direct reads of every possible parameter.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Slots:
     _doubted: float = 0.0
 
     def in_force(self) -> dict[str, int]:
-        """Raw values by slot of what surely stands in each place now."""
+        """Raw values by slot that each place surely holds now."""
         awake = self.clock.monotonic() - self._heard <= ASLEEP
         return self._known | self._in_force if awake else dict(self._known)
 

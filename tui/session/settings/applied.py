@@ -55,7 +55,7 @@ class Applied:
     after_reset: tuple[str, ...] = ()
     """Codes whose new value is in force only once the drive was reset."""
     unsaved: tuple[str, ...] = ()
-    """Codes whose new value is lost at power-off until the drive is told to save."""
+    """Codes whose new value is lost at power-off until the drive is ordered to save."""
     stopped: str = ""
     """Why the rest was not tried; empty where all were."""
     stamp: int = 0

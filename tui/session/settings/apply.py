@@ -1,7 +1,7 @@
 """Applying staged edits to a drive: each looked at before, written once, read back, recorded.
 
 A value that somebody else changed meanwhile is not overwritten; what could not be written stays
-staged. Nothing is printed: a screen or a command tells what the results say.
+staged. Nothing is printed: a screen or a command shows the results.
 """
 
 from __future__ import annotations
@@ -235,7 +235,7 @@ class _Work:
         )
 
     async def _after_a_lost_answer(self, edit: Edit, error: LineError) -> Result:
-        """A write is sent once; what became of it is found by reading.
+        """A write is sent once; the result is found by reading.
 
         A line may go on at once: where the program ended that owned it, another one takes it over.
         """

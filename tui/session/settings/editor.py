@@ -218,7 +218,7 @@ class Editor:
         stamp: int | None,
         given_up: Callable[[], str] | None = None,
     ) -> None:
-        """Do it as work on the drive; what speaks against it is told."""
+        """Do it as work on the drive; objections are reported."""
         queue = self.session.work
         if queue.busy:
             self._say("Another command is still being carried out.", OutcomeKind.REFUSED)

@@ -42,7 +42,7 @@ async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit
 async def factory_reset(
     session: DriveSession, journal: Journal, permit: Permit, *, confirmed: Collection[str] = ()
 ) -> str:
-    """Recall the factory settings and look what became of them; returns what was done.
+    """Recall the factory settings and read the result; returns what was done.
 
     Raises MemoryRefused (wrong state, order not known, or its word unverified and not among
     `confirmed`), DeviceException with what the drive's refusal means, and the line's other errors.

@@ -24,7 +24,7 @@ class Marks:
     """The last edited first."""
 
     def toggled(self, code: str) -> Marks:
-        """With a favourite more, or less."""
+        """With one more favorite, or one less."""
         if code in self.favourites:
             return replace(self, favourites=tuple(c for c in self.favourites if c != code))
         return replace(self, favourites=(*self.favourites, code))
@@ -52,7 +52,7 @@ def _texts(found: object) -> tuple[str, ...]:
 
 
 def save_marks(profile_id: str, marks: Marks) -> None:
-    """Keep them; a folder that cannot be written is no error."""
+    """Keep them; a folder that cannot be written is not an error."""
     with suppress(OSError):
         store_json(_file(profile_id), asdict(marks))
 

@@ -1,7 +1,7 @@
 """Restoring a parameter set to a drive: planned against the drive, written, planned again.
 
-What is done is known by reading the drive, never from a file: an interrupted restoring is
-resumed by starting it again. A mark in the state folder only tells that one was interrupted.
+What is done is known by reading the drive, never from a file: an interrupted restoring is resumed
+by starting it again. A mark in the state folder only shows that one was interrupted.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Restored:
     after_reset: tuple[str, ...]
     unsaved: tuple[str, ...]
     stopped: str
-    """Why it ended early; empty where it came to its end."""
+    """Why it ended early; empty if it finished."""
     unseen: str = ""
     """Why the drive could not be looked at again after writing; empty where it was."""
 

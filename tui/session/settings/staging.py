@@ -46,7 +46,7 @@ class Staging:
         }
 
     def stage(self, code: str, typed: str) -> str:
-        """Stage what was typed; returns what should be told at once. Raises ValueRefused."""
+        """Stage what was typed; returns what should be shown at once. Raises ValueRefused."""
         edits = self.edits.stage(self.session.profile, code, typed, self._raws, self._lacking)
         return self._staged(code, edits)
 
@@ -103,7 +103,7 @@ class Staging:
     def take_left(self, left: Sequence[Edit]) -> None:
         """Keep the edits that a write has left; an unchanged value only while its scale waits.
 
-        Kept, it would become one by itself once somebody sets that parameter otherwise.
+        Kept, it would become one silently once another program sets that parameter otherwise.
         """
         changing = {edit.code for edit in self.edits}
         waits = {edit.code for edit in left if edit.code in changing}

@@ -80,7 +80,7 @@ class WatchedValues:
         )
 
     def start(self) -> None:
-        """Begin to read, all of it anew."""
+        """Begin to read, all of it again."""
         self.stop()
         self._requested = {}
         self._reader = self.session.line.spawn(self._read, f"editor {self.session.device}")

@@ -120,7 +120,7 @@ class Writer:
         unsaved.note_write(parameter.code, before, now)
 
     def complete_later(self, entry: Entry, parameter: Parameter, check: int = 0xFFFFFFFF) -> None:
-        """Put into the journal what a write came to whose answer was lost, once that is read.
+        """Record in the journal the result of a write whose answer was lost, once that is read.
 
         It counts as taken where the bits of `check` are those that were written; with 0 a drive
         may change the word as it likes.
@@ -145,14 +145,14 @@ class Writer:
         )
 
     async def _read_scale(self, parameter: Parameter) -> None:
-        """See what the parameter's scale and unit follow, so that the journal tells units."""
+        """Read what the parameter's scale and unit follow, so that the journal shows units."""
         image = self.session.image
         known = {*image.trusted, *image.lacking}
         if unknown := [code for code in depends_on(parameter) if code not in known]:
             await Reader(self.session).read(unknown)
 
     async def _held_word(self, parameter: Parameter) -> int:
-        """The word that a field stands in, read now: its other bits must stay."""
+        """The word that contains a field, read now: its other bits must stay."""
         reply = await self.session.line.read(
             self.session.device, parameter.address, 1, priority=Priority.OPERATOR_WRITE
         )

@@ -1,7 +1,7 @@
 """When a drive may be asked by who only looks on, for hours, without a person before it.
 
-Each request feeds the drive's communication timeout: asked on, the motor of a commander that has
-died would run for ever.
+Each request keeps the drive's communication timeout from running out: kept polled, the motor of a
+commander that has died would run for ever.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 COMMANDER_SILENT = "Not asked: whoever started its motor gives no sign of life."
 UNKNOWN_TIMEOUT_ACTED = 60.0
-"""Seconds of silence after which a drive has acted that does not tell its timeout."""
+"""Seconds of silence after which a drive has reacted that does not report its timeout."""
 GRACE_SHARE = 0.25
-"""Share of its timeout for which a drive is asked on after the last sign of its commander."""
+"""Share of its timeout for which a drive is kept polled after the last heartbeat of its
+commander."""
 ACTED_AFTER = 1.0
 """Seconds beyond its timeout after which a drive has begun to act."""
 
@@ -30,10 +31,10 @@ ACTED_AFTER = 1.0
 class Bystander:
     """Looks on at one drive, and keeps no motor running whose commander has died.
 
-    `sign` tells when whoever started its motor was last heard (monotonic), or None where nobody
-    is known to have. The drive is asked once for each such sign, and for a quarter of its
-    timeout after it, until its motor was seen to stand; one that was silent for longer than its
-    timeout has acted: it is looked at once.
+    `sign` is the time of the last heartbeat of the program that started its motor (monotonic), or
+    None if there was none. The drive is polled once for each such heartbeat, and for a quarter of
+    its timeout after it, until its motor was seen at standstill; one that was silent for longer
+    than its timeout has acted: it is looked at once.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class Bystander:
         now: Callable[[], float] = REAL_CLOCK.monotonic,
     ) -> None:
         self.orphan = False
-        """True if a program that has ended started the motor, and nobody has seen it stand."""
+        """True if a program that has ended started the motor, and it was not seen at standstill."""
         self.waits = False
         """True if the drive was left alone when it was to be asked last."""
         self._session = session
@@ -80,7 +81,7 @@ class Bystander:
         return self._silence() > timeout + ACTED_AFTER
 
     def _stands(self, since: float) -> bool:
-        """Return True if it stood when it was last looked at, and was told nothing since."""
+        """Return True if it was at standstill at the last check, and got no command since."""
         seen = self._latest()
         if seen is None or seen.error or seen.time < since:
             return False

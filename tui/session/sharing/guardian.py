@@ -1,6 +1,6 @@
 """Stops the motors of a program that is gone; at work in whichever program owns the line.
 
-The records of starts tell which motors they are. A recorder goes on asking a drive, so its own
+The records of starts show which motors they are. A recorder goes on asking a drive, so its own
 timeout would never stop a motor whose commander died.
 """
 
@@ -241,7 +241,7 @@ class Guardian:
         return self._starts.all_found(text, absent) or self._starts.all_found(self._key, absent)
 
     async def _until_ended(self, session: DriveSession) -> None:
-        """Take the record away once the motor stands; one that does not stop keeps it."""
+        """Take the record away once the motor is at standstill; one that does not stop keeps it."""
         device = session.device
         while True:
             await self._clock.sleep(LOOK_INTERVAL)

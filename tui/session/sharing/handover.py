@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from ..starts.keeper import StartKeeper
 
 ANSWER_WITHIN = 15.0
-"""Seconds after which a question that nobody answers is a no, or a yes where the motor stands."""
+"""Seconds after which an unanswered question means no, or yes if the motor is at standstill."""
 TAKEN_WITHIN, TAKEN_LOOK = 5.0, 0.1
 """Seconds in which a program puts a motor on record that it was given, and between two looks."""
 SEEN_WITHIN = 2.0
-"""Seconds in which a motor must have been seen to stand."""
+"""Seconds in which a motor must have been seen at standstill."""
 SURELY_STANDING = ("stopped", "ready", "blocked")
-"""States in which a motor surely stands; a tripped one may coast."""
+"""States in which a motor surely is at standstill; a tripped one may coast."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ class Handover:
     # Asked here
 
     def ask_for(self, device: int) -> None:
-        """Ask whoever commands a drive to leave it."""
+        """Request the drive from its commander."""
         other = self._line.facts.commander(device)
         if other is None:
             self._say(device, "Nobody else commands this drive: a arms it.")
@@ -134,7 +134,7 @@ class Handover:
             self._decide(request.device, request.program)
 
     def answer(self, request: DriveRequest, *, yes: bool) -> None:
-        """A person's answer to a question; one that is over is told so."""
+        """A person's answer to a question; the end of one is reported."""
         if self.requests.get(request.device) is request:
             self._forget(request.device)
             self._reply(request.device, request.program, yes=yes)
@@ -193,7 +193,7 @@ class Handover:
         self._events.add("stop", text, device or None)
 
     def _changed(self) -> None:
-        """Tell who came to the line, who left it, and who commands what."""
+        """Report arrivals, departures, and commanders on the line."""
         facts = self._line.facts
         names = {one.id: one.text for one in facts.others}
         for id, text in names.items():

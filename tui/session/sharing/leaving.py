@@ -15,8 +15,8 @@ OTHERS_ASK = "Other programs on the line ask"
 def left_to_others(session: DriveSession, *, on_purpose: bool) -> str:
     """Return the reaction of other programs to a motor that is left; empty if none.
 
-    `on_purpose`: it is put on record as left running. Otherwise a motor that was started here is
-    stopped by whoever owns the line then, as Guardian does it.
+    `on_purpose`: it is put on record as left running. Otherwise the owner of the line stops a motor
+    that was started here, by its Guardian.
     """
     others, starts = session.line.facts.others, session.starts
     if not others:

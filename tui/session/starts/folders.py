@@ -61,7 +61,7 @@ class StartFolders:
 
     @staticmethod
     def _shared() -> tuple[StartFiles, ...]:
-        """That of the group, looked for anew: a service makes its folder when it starts."""
+        """That of the group, found again: a service makes its folder when it starts."""
         folder = group_folder()
         if os.name != "posix" or not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
             return ()

@@ -146,7 +146,7 @@ class StartKeeper:
             self._starts.note_stop(session.line_text, session.device)
 
     def holds(self, device: int) -> bool:
-        """Return True if a motor that was started here is not yet known to stand."""
+        """Return True if a motor that was started here is not yet known to be at standstill."""
         return device in self._begun
 
     def stopped_by_others(self, device: int) -> bool:

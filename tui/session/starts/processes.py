@@ -26,7 +26,7 @@ class Processes:
     def boot_id(self) -> str:
         """Return an id of this run of the computer; empty if it is not known.
 
-        Without it a program's start still tells them apart.
+        Without it a program's start still distinguishes them.
         """
         try:
             return (self._proc / "sys/kernel/random/boot_id").read_text(encoding="ascii").strip()

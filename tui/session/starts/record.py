@@ -1,4 +1,4 @@
-"""A motor's start as it is kept, and what it lets a later program tell of the motor."""
+"""A motor's start as it is kept, and what a later program can report about the motor."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class StartRecord:
     boot_id: str
     pid: int
     started: str
-    """When the program itself was started, as `Processes.started` tells it."""
+    """When the program itself was started, from `Processes.started`."""
     program: str
     """`panel`, `run` and the like."""
     left_running: bool
@@ -59,7 +59,7 @@ class StartRecord:
 
     @property
     def begun(self) -> datetime | None:
-        """When the start was ordered, in the zone of here; None if the text is no time."""
+        """When the start was ordered, in the zone of here; None if the text is not a time."""
         try:
             return datetime.fromisoformat(self.wall).astimezone()
         except (ValueError, OverflowError):

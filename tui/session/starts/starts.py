@@ -145,7 +145,7 @@ class Starts:
                 self._sent[line, device] = self._clock.monotonic()
 
     def end(self, line: str, device: int, seen: float | None = None) -> None:
-        """The motor stands: its record goes. Returns at once and never raises.
+        """The motor is at standstill: remove its record. Returns at once and never raises.
 
         `seen` is the monotonic time at which standstill was read, now unless given. One that was
         read before the run frame went out is the rest before the start, and changes nothing.

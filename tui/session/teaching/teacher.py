@@ -60,7 +60,7 @@ class Teacher:
         return self._known.looks.get(code, ())
 
     def recall(self) -> None:
-        """Use what was taught before; what cannot be read is told in `trouble`. Reads a file."""
+        """Use what was taught before; unreadable files are reported in `trouble`. Reads a file."""
         with self._lock:
             try:
                 self._known, self.trouble = load_taught(self._drive()), ""
@@ -70,7 +70,7 @@ class Teacher:
             self._use()
 
     async def look(self, code: str, text: str, unit: str = "") -> Lesson:
-        """Read a word now, beside what the drive's display shows, as typed; keep what that tells.
+        """Read a word now, beside what the drive's display shows, as typed; keep the result.
 
         Raises ValueRefused where nothing can be taught or was typed, and the line's errors.
         """
@@ -83,7 +83,7 @@ class Teacher:
         return await asyncio.to_thread(self.take, code, reading.raw, *shown)
 
     def take(self, code: str, raw: int, shown: Decimal, unit: str) -> Lesson:
-        """One look more at a parameter; keeps what it comes to."""
+        """One look more at a parameter; keeps the result."""
         with self._lock:
             before = self._latest().looks.get(code, ())
             lesson = learn(code, before, DisplayLook(raw & 0xFFFF, shown, unit))
@@ -154,7 +154,7 @@ class Teacher:
         self.session.learn(with_taught(self.family, self._taught_scales(), self._known.reference))
 
     def _taught_scales(self) -> dict[str, TaughtScale]:
-        """The scales that the kept looks tell."""
+        """The scales in the kept readings."""
         found = {code: taught_by(looks) for code, looks in self._known.looks.items()}
         return {code: scale for code, scale in found.items() if scale is not None}
 

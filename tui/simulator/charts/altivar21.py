@@ -131,7 +131,8 @@ class Altivar21Chart:
     def reset_fault(self) -> None:
         """Clear the fault if its cause is gone; words in RAM go back to their first values.
 
-        With them go the priority bits: closed terminals command until the line takes over anew.
+        The priority bits are cleared with them: closed terminals command until the line takes
+        control again.
         """
         fault = self._body.fault
         if fault is not None and not fault.persists:

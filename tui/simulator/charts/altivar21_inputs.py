@@ -68,6 +68,6 @@ class Altivar21Inputs:
 
     @property
     def hz(self) -> float:
-        """The analogue reference, in Hz."""
+        """The analog reference, in Hz."""
         name = "VIB" if self._body.setting("FMOD", 1) == VIB_REFERENCE else "VIA"
         return ANALOGUE_HZ * self._body.terminals.level(name)

@@ -30,7 +30,7 @@ DRIVECOM_REACHED_HZ = 0.1
 
 
 class DrivecomChart:
-    """The chart of one drive: who commands it, in which state it is, what its motor is told."""
+    """The chart of one drive: its commander, its state, its motor's command."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -46,7 +46,7 @@ class DrivecomChart:
     # Orders from outside
 
     def power_up(self) -> None:
-        """Start the chart: disabled, or enabled by itself below access level L3."""
+        """Start the chart: disabled, or enabled automatically below access level L3."""
         self._command.clear()
         self._channels.power_up()
         self._wiring.renew()
@@ -175,7 +175,7 @@ class DrivecomChart:
         self._command.let_go()
 
     def reset_fault(self) -> None:
-        """Leave Fault if its cause is gone; the line must command anew, closed inputs run on."""
+        """Leave Fault if its cause is gone; the line must command again, closed inputs run on."""
         fault = self._body.fault
         if self._machine.state is DrivecomState.FAULT and fault and not fault.persists:
             self._body.fault = None

@@ -12,7 +12,7 @@ FULL_ACCESS = 2
 
 
 class DrivecomChannels:
-    """Looks at settings, inputs and command bits, and tells which channels are in force."""
+    """Reads settings, inputs and command bits, and shows which channels are in force."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -47,6 +47,6 @@ class DrivecomChannels:
 
     @property
     def low_access(self) -> bool:
-        """True if LAC is below L3: the drive is enabled by itself (ATV31/312)."""
+        """True if LAC is below L3: the drive enables itself (ATV31/312)."""
         levels = self._body.traits.access_levels
         return levels and self._body.setting("LAC", FULL_ACCESS) < FULL_ACCESS

@@ -26,7 +26,7 @@ class DrivecomMachine:
         """Kind of stop in the fault reaction, or on leaving operation."""
 
     def start(self, *, enabled: bool) -> None:
-        """Begin anew: disabled, or enabled by itself."""
+        """Restart: disabled, or enabled automatically."""
         self.state = DrivecomState.ENABLED if enabled else DrivecomState.DISABLED
         self.leaving = False
 

@@ -46,7 +46,7 @@ class DrivecomReference:
         return 0.0
 
     def wire(self, channels: ChannelsInForce, hz: float) -> None:
-        """Put the analogue input of a channel to what gives this reference in Hz."""
+        """Put the analog input of a channel to the value for this reference in Hz."""
         low, high = self.limits()
         part = (hz - low) / (high - low) if high > low else 0.0
         self._body.terminals.apply(f"AI{channels.input}", part)

@@ -55,8 +55,7 @@ def extended_command(body: Body) -> int:
 def locked(body: Body, *, stands: bool) -> bool:
     """Return True if the drive must not supply the motor.
 
-    CMI bit 15 locks at once; bit 13 keeps a motor that stands at rest (ATV31/312: reserved on
-    the ATV71).
+    CMI bit 15 locks at once; bit 13 keeps a motor at rest (ATV31/312: reserved on the ATV71).
     """
     cmi = extended_command(body)
     at_rest = body.traits.access_levels and cmi & CMI_STANDSTILL

@@ -31,9 +31,9 @@ BIT_PARAMETERS: Mapping[int, str] = {
 UNLOCKED, FORWARD, JOG, BACKWARD, CHANGE_WAY, RUN, RESET = (1 << b for b in (0, 1, 2, 3, 4, 5, 13))
 RUNNING_ORDERS = FORWARD | JOG | BACKWARD | RUN
 DEFAULT_HZ = 30.0
-"""Analogue reference of a drive whose inputs nobody has set, in Hz."""
+"""Analog reference of a drive whose inputs were not set, in Hz."""
 LEROY_FULL_HZ = 50.0
-"""Full scale of the analogue reference, in Hz; the manual gives none."""
+"""Full scale of the analog reference, in Hz; the manual gives none."""
 JOG_HZ = 5.0
 LEROY_REACHED_HZ = 0.1
 MAINS_LOSS_BIT = 14
@@ -64,7 +64,7 @@ class LeroySomerChart:
         self.refer(hz)
 
     def refer(self, hz: float) -> None:
-        """Change the analogue reference at the terminals, in Hz."""
+        """Change the analog reference at the terminals, in Hz."""
         self._body.terminals.apply("AI1", abs(hz) / LEROY_FULL_HZ)
 
     def halt(self) -> None:

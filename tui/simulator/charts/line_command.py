@@ -55,7 +55,7 @@ class LineCommand:
         self._body.show_raw("command_word", self.word)
 
     def adopt(self) -> None:
-        """Go by the word that stands there, now that the line commands."""
+        """Follow the present word, now that the line commands."""
         self.word = self._body.raw("command_word") & 0xFFFF
         if self.is_io:
             self.io = read_io_command(IoCommand(), self.word, 0, self._wiring)

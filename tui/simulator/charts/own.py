@@ -1,7 +1,7 @@
 """The chart of a drive of any make, played from its profile alone.
 
-Its states are shown by words of its own, its orders and transitions are followed as they stand
-there. What no profile tells is plain: two-wire terminals RUN and REV, a reference AI1, a ramp.
+Its states are shown by words of its own, its commands and transitions are followed as written.
+Everything absent from a profile is plain: two-wire terminals RUN and REV, a reference AI1, a ramp.
 """
 
 from __future__ import annotations

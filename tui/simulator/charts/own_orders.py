@@ -12,7 +12,7 @@ Raws = Callable[[], Mapping[str, int]]
 
 
 class OwnOrders:
-    """Follows the words that the line writes, and tells what they complete.
+    """Follows the words that the line writes, and shows what they complete.
 
     Bits of options stay out of every comparison; an order of several words is complete with the
     last of them, begun in a state in which it may be given.

@@ -1,4 +1,4 @@
-"""The reference of a drive of any make: the word that the line wrote last, or an analogue input."""
+"""The reference of a drive of any make: the word that the line wrote last, or an analog input."""
 
 from __future__ import annotations
 
@@ -91,5 +91,5 @@ class OwnReference:
             self._body.registers.put(words[0], round(hz / one))
 
     def wire(self, hz: float) -> None:
-        """Put the analogue input to what gives this reference in Hz."""
+        """Put the analog input to the value for this reference in Hz."""
         self._body.terminals.apply("AI1", hz / self._full)

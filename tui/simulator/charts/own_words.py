@@ -38,6 +38,6 @@ def state_of_kind(chart: Chart, *kinds: StateKind) -> State | None:
 
 
 def with_bit(chart: Chart, word: int, bit: int, *, on: bool) -> int:
-    """A status word with a bit of its own meaning, unless that would tell another state."""
+    """A status word with a bit of its own meaning, unless that would show another state."""
     marked = word | 1 << bit if on else word & ~(1 << bit)
     return marked if state_of(chart, marked) is state_of(chart, word) else word

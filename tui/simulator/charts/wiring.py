@@ -75,7 +75,7 @@ class TerminalWiring:
         return f"LI{raw - 128}" if 129 <= raw <= 142 else "LI2"
 
     def stop(self) -> Stop | None:
-        """A stop by an input that must be closed to run (NST, FST), whoever commands."""
+        """A stop by an input that must be closed to run (NST, FST), whatever commands."""
         for code, way in ((FREEWHEEL_INPUT, Stop.FREEWHEEL), (FAST_INPUT, Stop.FAST)):
             raw = self._body.setting(code, 0)
             if 129 <= raw <= 142 and not self._body.terminals.closed(f"LI{raw - 128}"):

@@ -1,4 +1,4 @@
-"""The words by which a drive tells its model, from the reference it identifies itself with."""
+"""The words that show a drive's model, from the reference it identifies itself with."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The terminals of a simulated drive: logic inputs that stay as they are, analogue inputs.
+"""The terminals of a simulated drive: logic inputs that keep their state, analog inputs.
 
-A contact that is closed stays closed, through a trip, a reset and a loss of the supply. An
-analogue input is kept as a part of its full scale, 0..1, whatever it is wired to.
+A contact that is closed stays closed, through a trip, a reset and a loss of the supply. An analog
+input is kept as a part of its full scale, 0..1, with any wiring.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..rules import ChartKind
 
 FULL_VOLTS, FULL_MILLIAMPERES = 10.0, 20.0
 SHORT_LIST = 3
-"""Names of inputs that are told one by one."""
+"""Names of inputs that are shown one by one."""
 _LEVEL = re.compile(r"(\d+(?:\.\d+)?)\s*(v|ma|%)?", re.IGNORECASE)
 _OPEN, _CLOSED = frozenset({"0", "off", "open"}), frozenset({"1", "on", "closed"})
 
@@ -65,7 +65,7 @@ class Terminals:
         return name in self._closed
 
     def level(self, name: str) -> float:
-        """An analogue input as a part of its full scale, 0..1."""
+        """An analog input as a part of its full scale, 0..1."""
         return self._levels.get(name, 0.0)
 
     def close(self, name: str, closed: bool = True) -> None:
@@ -73,7 +73,7 @@ class Terminals:
         (self._closed.add if closed else self._closed.discard)(name)
 
     def apply(self, name: str, level: float) -> None:
-        """Put an analogue input to a part of its full scale; what lies beyond is cut."""
+        """Put an analog input to a part of its full scale; what lies beyond is cut."""
         self._levels[name] = min(max(level, 0.0), 1.0)
 
     def set(self, name: str, text: str) -> str:

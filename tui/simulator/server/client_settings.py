@@ -37,7 +37,7 @@ class ClientSettings:
 
 
 def settings_of_terminal(handle: int) -> ClientSettings:
-    """Baud and stop bits that stand on a pseudo-terminal; the kernel keeps no parity there."""
+    """Baud and stop bits of a pseudo-terminal; the kernel keeps no parity there."""
     import termios
 
     with contextlib.suppress(termios.error):
@@ -51,7 +51,7 @@ def settings_of_terminal(handle: int) -> ClientSettings:
 def set_up_terminal(handle: int, timing: LineTiming) -> bool:
     """Put a pseudo-terminal to a line's baud and stop bits, so that who sets nothing hears it.
 
-    False where the system has no such baud: then nothing can be told from what stands there.
+    False if the system has no such baud: then its settings show nothing.
     """
     import termios
 

@@ -80,11 +80,11 @@ class _Outbox:
 class RtuConversation:
     """Modbus RTU on one medium.
 
-    In real time a frame ends with 3.5 characters of silence, and what comes sooner belongs to
-    it: two requests without that silence between them are one blob that no drive understands.
-    `client` tells what the other side is set to. A `paced` medium (a real port) spends the time
-    of its characters itself. Without real time
-    a frame ends as soon as it has the length it announces, or after a short silence.
+    In real time a frame ends with 3.5 characters of silence, and what comes sooner belongs to it:
+    two requests without that silence between them are one blob that no drive understands. `client`
+    holds the settings of the other side. A `paced` medium (a real port) spends the time of its
+    characters itself. Without real time a frame ends as soon as it has the length it announces, or
+    after a short silence.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class TcpConversation:
         self._buffer = b""
         self._outbox = _Outbox()
         self.broken = False
-        """True once the client sent something that is no Modbus TCP."""
+        """True once the client sent bytes that are not Modbus TCP."""
 
     def feed(self, data: bytes, now: float) -> None:
         """Take bytes that have just come in."""

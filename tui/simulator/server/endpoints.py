@@ -100,7 +100,7 @@ class PtyEndpoint(Endpoint):
         self._master = self._slave = -1
         self._pipe = (-1, -1)
         self._seen = False
-        """True if what is set on the terminal can be told."""
+        """True if the terminal's settings are known."""
         self.path = ""
         """Path of the link to the slave side; it stays the same however often it is plugged in."""
 

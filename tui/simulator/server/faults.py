@@ -1,4 +1,4 @@
-"""Line faults on demand: what becomes of a reply on its way. Seeded, so they can be repeated."""
+"""Line faults on demand: changes of a reply on its way. Seeded, so they can be repeated."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class PollingMaster:
         self._period = period
         self._polls = 0
         self.due: float | None = 0.0 if period and line.drives else None
-        """When it asks next, on a monotonic clock."""
+        """Time of its next request, on a monotonic clock."""
 
     def talk(self, now: float) -> list[tuple[float, bytes]]:
         """Its request that is due and the reply to it: delays in s, and bytes."""

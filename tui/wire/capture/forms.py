@@ -91,7 +91,7 @@ class ModbusTcpForm:
         return Packet(_ip(connection, head + pdu, request=request), comment)
 
     def noise_packet(self, data: bytes) -> Packet | None:
-        """None: the next packet tells of it."""
+        """None: the next packet contains it."""
         self._noise += data
         return None
 

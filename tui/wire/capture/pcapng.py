@@ -14,7 +14,7 @@ BYTE_ORDER = 0x1A2B3C4D
 LINK_IPV4 = 228
 """Packets that begin with the header of IPv4."""
 LINK_USER_0 = 147
-"""Packets of a form that the reader is told."""
+"""Packets of a form known to the reader."""
 COMMENT, INTERFACE_NAME, PROGRAM, RESOLUTION = 1, 2, 4, 9
 """Numbers of options; PROGRAM is one of a section, the next two of an interface."""
 NANOSECONDS = bytes([9])

@@ -1,6 +1,6 @@
 """Length of a frame from its first bytes, once as a request and once as a reply. Pure functions.
 
-Whoever listens does not know which of both it is, and a pause between frames is no measure: an
+A listener does not know which of both it is, and a pause between frames is not a measure: an
 adapter hands over what it has collected.
 """
 
@@ -14,7 +14,7 @@ IDENTIFICATION, IDENTIFICATION_KIND = 43, 14
 _CHECKSUM = 2
 _REQUESTS = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
 _COUNTED_REQUESTS = {15: 6, 16: 6, 23: 10}
-"""By function, the place of the byte that counts what stands behind it."""
+"""By function, the place of the byte that counts the bytes after it."""
 _REPLIES = {5: 8, 6: 8, 7: 5, 8: 8, 11: 8, 15: 8, 16: 8, 22: 10}
 _COUNTED_REPLIES = {1: 2, 2: 2, 3: 2, 4: 2, 12: 2, 17: 2, 23: 2}
 _OBJECTS_FROM = 8

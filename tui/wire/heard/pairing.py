@@ -1,7 +1,7 @@
 """Frames that were heard, matched: which reply belongs to which request. No clock, no port.
 
-On a serial line a request and its reply may be the same bytes, and nobody says who has sent them:
-what stands here goes by who was asked last, and how long ago.
+On a serial line a request and its reply may be the same bytes, without a sign of the sender: here
+it follows from the last request, and its age.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ECHOED = {15: 5, 16: 5}
 
 @dataclass(frozen=True, slots=True)
 class HeardExchange:
-    """A request with what became of it; requests and replies without device and checksum."""
+    """A request with its result; requests and replies without device and checksum."""
 
     time: float
     """When the request began, of the listener's clock; of an unasked reply when that began."""
@@ -56,7 +56,7 @@ class _Asked:
 
 
 class Pairing:
-    """Takes frames in their order, gives exchanges as soon as it is known what became of each."""
+    """Takes frames in their order, gives exchanges as soon as the result of each is known."""
 
     def __init__(self) -> None:
         self._requested: _Asked | None = None
@@ -151,7 +151,7 @@ class Pairing:
 def _exchange(
     frame: HeardFrame, answer: HeardAnswer, noise: bytes = b"", waited: float | None = None
 ) -> HeardExchange:
-    """An exchange that came to no reply."""
+    """An exchange without a reply."""
     return HeardExchange(
         frame.begun, frame.device, frame.function, answer, frame.pdu, noise=noise, waited=waited
     )

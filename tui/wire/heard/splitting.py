@@ -29,7 +29,7 @@ class HeardFrame:
     pause: float | None = None
     """Silence before it; None where it came in one reading with what was before."""
     gap: float = 0.0
-    """The longest silence between two of its bytes, as far as readings tell."""
+    """The longest silence between two of its bytes, as far as readings show."""
 
     @property
     def device(self) -> int:
@@ -71,8 +71,8 @@ class _Chunk:
 class FrameSplitter:
     """Takes readings of a line, gives frames; `character` is what a byte takes, in seconds.
 
-    With a `character` of 0 all bytes of a reading count as of one moment. `reply_due` tells of a
-    device and a function whether a reply is due, by the frames that were given until then.
+    With a `character` of 0 all bytes of a reading count as of one moment. `reply_due` says for a
+    device and a function whether a reply is due, by the frames until then.
     """
 
     def __init__(
@@ -159,8 +159,8 @@ class FrameSplitter:
         return next((at for at in starts if whole_length(self._data[at:])), 0)
 
     def _frame_of_its_own(self) -> bool:
-        """Return True if a frame lies between a silence and the last byte: it is no part of
-        another."""
+        """Return True if a frame lies between a silence and the last byte: it belongs to no
+        other."""
         at = 0
         for chunk in self._chunks:
             if chunk.apart and at and whole_length(self._data[at:]) == len(self._data) - at:

@@ -128,7 +128,7 @@ def factory_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def start_up(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A parameter stands in one step of the first commissioning."""
+    """A parameter belongs to one step of the first commissioning."""
     seen: dict[str, str] = {}
     for index, step in enumerate(data.start_up):
         for code in step.parameters:

@@ -1,4 +1,4 @@
-"""Rules for each parameter by itself, and for what must stand once."""
+"""Rules for each parameter alone, and for what must be unique."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..toml_lines import TomlPath
 
 
 def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Codes, quantities, ids and raw codes that stand twice."""
+    """Codes, quantities, ids and raw codes that occur twice."""
     yield from _twice(
         ((("parameters", n, "code"), p.code) for n, p in enumerate(data.parameters)),
         "code {} is already that of a parameter above; each needs its own.",

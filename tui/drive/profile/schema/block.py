@@ -24,7 +24,7 @@ class Block(Table, frozen=True, kw_only=True):
     min_words: ReadCount = 1
     max_words: ReadCount
     slots: list[str]
-    """Parameters that select what stands in each place, in order."""
+    """Parameters that select the contents of each place, in order."""
     values: list[str] = []
     """Parameters that carry the values, where they are parameters of their own."""
     selects_by: Literal["choice", "address"]

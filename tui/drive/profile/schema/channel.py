@@ -1,4 +1,4 @@
-"""Which words tell who commands the drive and who gives its reference now."""
+"""Words that show who commands the drive and what gives its reference now."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .base import Confidence, Table, When, WordAddress
 
 
 class ChannelRow(Table, frozen=True, kw_only=True):
-    """A word that tells the channel in force, where its conditions hold."""
+    """A word that shows the channel in force, if its conditions hold."""
 
     parameter: str
     when: list[When] = []
     """Conditions under which the row counts; all must hold."""
     mask: WordAddress = 0xFFFF
-    """Bits that tell it, before the shift."""
+    """Bits that show it, before the shift."""
     shift: Annotated[int, Meta(ge=0, le=15)] = 0
     line: list[int] = []
     """Values, behind mask and shift, with which the channel is this line."""
@@ -41,9 +41,9 @@ class Channels(Table, frozen=True, kw_only=True):
     counts."""
 
     command: list[ChannelRow] = []
-    """Words that tell who commands."""
+    """Words that show who commands."""
     reference: list[ChannelRow] = []
-    """Words that tell who gives the reference."""
+    """Words that show what gives the reference."""
     switches: list[ChannelSwitch] = []
     """Parameters by which another channel can come into force."""
     remedy: str = ""

@@ -30,13 +30,13 @@ class Transition(Table, frozen=True, kw_only=True):
     source: Identifier
     target: Identifier
     command: RawWord | None = None
-    """Command word that makes it; absent where the drive goes by itself."""
+    """Command word that makes it; absent if the drive does so on its own."""
     edge_bit: BitNumber | None = None
     name: str = ""
 
 
 class DirectionBit(Table, frozen=True, kw_only=True):
-    """A status bit that tells the direction of rotation."""
+    """A status bit that shows the direction of rotation."""
 
     parameter: str
     bit: BitNumber
@@ -52,7 +52,7 @@ class StatusBit(Table, frozen=True, kw_only=True):
 
 
 class ChannelBits(Table, frozen=True, kw_only=True):
-    """Some bits of a word that tell who commands the drive."""
+    """Some bits of a word that show who commands the drive."""
 
     parameter: str
     shift: Annotated[int, Meta(ge=0, le=15)]
@@ -137,7 +137,7 @@ class CommandOption(Table, frozen=True, kw_only=True):
 
 
 class Chart(Table, frozen=True, kw_only=True):
-    """A state chart: how the status word tells the state, and how commands change it."""
+    """A state chart: how the status word shows the state, and how commands change it."""
 
     id: Identifier
     name: str
@@ -145,7 +145,7 @@ class Chart(Table, frozen=True, kw_only=True):
     """Behavior of a simulated drive beyond its states and commands."""
     runs_in: Identifier | None = None
     """The running state to which a start leads through the transitions, a command at a time;
-    without it the words of an order are written as they stand."""
+    without it the words of a command are written unchanged."""
     when: When | None = None
     """Condition; absent: always, or if no other applies."""
     status: str

@@ -67,7 +67,7 @@ class FaultHelp(Hint, frozen=True, kw_only=True):
     raw: RawWord | None = None
     """The fault, as among the profile's codes; absent: any trip of a family without numbers."""
     code: str = ""
-    """Its code, for who reads the file; it must be that of the profile."""
+    """Its code, for readers of the file; it must be that of the profile."""
     name: str = ""
     """Name of the fault if `raw` is absent."""
     reset: ResetWay | None = None

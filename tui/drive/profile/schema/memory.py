@@ -18,7 +18,7 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     at_rest_mask: RawWord = 0
     """Bits of the extended status word that must be 0 before."""
     keeps_value: bool = False
-    """True where the word keeps the value that was written: it does not tell when it is done."""
+    """True if the word keeps the written value: it does not show when it is done."""
     done: When | None = None
     """Sign that it is done, if the word itself does not show it."""
     groups: str = ""

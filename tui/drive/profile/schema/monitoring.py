@@ -87,7 +87,7 @@ class Faults(Table, frozen=True, kw_only=True):
     help_file: Identifier | None = None
     """Name of that file, without .toml, where it is not the profile's id."""
     reset_ready: StatusBit | None = None
-    """The bit by which the drive tells that a reset can work now."""
+    """The bit by which the drive shows that a reset can work now."""
     after_reset: list[AfterReset] = []
     """The effect of a reset, one sentence per command channel."""
     inputs: InputBits | None = None

@@ -8,7 +8,7 @@ from .base import Confidence, Table
 
 
 class StartUpStep(Table, frozen=True, kw_only=True):
-    """One step of a first commissioning; the steps stand in their order.
+    """One step of a first commissioning; the steps are in their order.
 
     Their parameters, in this order, are the group Simply start of the editor.
     """

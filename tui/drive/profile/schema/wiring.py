@@ -21,7 +21,7 @@ class Opening(Table, frozen=True, kw_only=True):
     """Waiting time, everything switched off, before the drive is opened or plugged."""
 
     minutes: Annotated[int, Meta(ge=1)] | None = None
-    """Absent where no document at hand tells it."""
+    """Absent if no available document states it."""
     below_volts: Annotated[int, Meta(ge=1)] | None = None
     """Voltage of the DC bus, measured, below which it counts as discharged."""
     note: str = ""
@@ -30,7 +30,7 @@ class Opening(Table, frozen=True, kw_only=True):
 
 
 class Lamp(Table, frozen=True, kw_only=True):
-    """A lamp or a sign of the display, and what it tells."""
+    """A lamp or a sign of the display, and its meaning."""
 
     name: str
     tells: str
