@@ -240,7 +240,7 @@ async def test_probe_of_silent_device_waits_for_no_back_off() -> None:
                     await line.identify(
                         THERE, priority=Priority.BACKGROUND, within=0.01, function=17
                     )
-            with pytest.raises(NoAnswer, match="It is asked again in"):
+            with pytest.raises(NoAnswer, match="Retrying in"):
                 await line.read(THERE, 100, priority=Priority.POLL)
             assert (await line.read(THERE, 100, priority=Priority.POLL, within=5.0)).words
             assert line.counters.timeouts == 0

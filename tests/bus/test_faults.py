@@ -370,7 +370,7 @@ async def test_poll_of_a_known_drive_survives_two_lost_replies(open_line: OpenLi
         peer.script = silent
         with pytest.raises(NoAnswer):
             await line.read(1, 10, 2)
-        with pytest.raises(NoAnswer, match="It is asked again in"):
+        with pytest.raises(NoAnswer, match="Retrying in"):
             await line.read(1, 10, 2)
         assert len(peer.requests) == 7
 
@@ -423,7 +423,7 @@ async def test_write_is_sent_once(broken: str, values: list[int], open_line: Ope
         await asyncio.sleep(0.6)
         assert len(peer.requests) == 1
         if broken == "lost":
-            assert "read the register back" in str(caught.value)
+            assert "Read the register before retrying" in str(caught.value)
 
 
 async def test_plain_client_keeps_no_silence() -> None:

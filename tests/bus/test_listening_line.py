@@ -161,5 +161,5 @@ def test_invalid_port_is_reported_as_invalid_not_busy(tmp_path: Path) -> None:
             assert not seen.holder
             assert not seen.others
             line = ListeningLine(SerialLink(path, 19200, "8E1"), None, ME)
-            with pytest.raises(PortRefused, match="it is no serial port"):
+            with pytest.raises(PortRefused, match="it is not a serial port"):
                 line.__enter__()

@@ -93,7 +93,7 @@ def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> 
         ),
         (
             PortSeen(PORT_PATH, permitted=False, user="ann"),
-            "no group of users may. `drivepanel why /dev/ttyUSB0` tells what to do.",
+            "no group of users may. `drivepanel why /dev/ttyUSB0` shows what to do.",
         ),
     ],
 )

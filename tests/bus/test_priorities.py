@@ -154,7 +154,7 @@ async def test_dead_drive_costs_one_time_out_a_back_off_period(open_line: OpenLi
         assert len(peer.requested(1)) == 20
         assert caught.value.retry_in is not None
         assert 0 < caught.value.retry_in <= 60.0
-        assert "asked again in" in str(caught.value)
+        assert "Retrying in" in str(caught.value)
         state = line.device_state(DEAD)
         assert state.answers is False
         assert state.failures == 1

@@ -91,8 +91,8 @@ def test_json_is_one_document_after_writing_too(line: str) -> None:
         (("factory",), 5, "Not armed"),
         (("set", "NMA9=LCR", "--arm"), 5, "no slot"),
         (("set", "NCA3=ETA", "--arm"), 5, "can only be read"),
-        (("set", "NCA3=CMD", "--arm"), 5, "NCA1 already"),
-        (("set", "NCA3=CMD", "--dry-run"), 5, "NCA1 already"),
+        (("set", "NCA3=CMD", "--arm"), 5, "already in NCA1"),
+        (("set", "NCA3=CMD", "--dry-run"), 5, "already in NCA1"),
         (("set", "NMA3=LCR", "--arm", "--read-only"), 5, "read-only"),
         (("set", "NMA3=NOPE", "--arm"), 2, "no parameter"),
         (("set", "NMA3", "--arm"), 2, "SLOT=CODE"),
@@ -134,9 +134,7 @@ def test_write_cut_by_signal_is_reported_by_slot(
     monkeypatch.setattr("tui.cli.shared.signals.cancelled_by_signal", lambda _: came)
     fail_write(monkeypatch, "NMA4", asyncio.CancelledError())
     output = refused(143, line, "set", "NMA3=LCR", "NMA4=OTR", "NMA5=THD", "--arm", "-d", "2")
-    assert (
-        "Slots written and read back: NMA3. NMA4 may have been written too: look at it." in output
-    )
+    assert "Slots written and verified: NMA3. NMA4 may have been written too: look at it." in output
 
 
 def test_a_line_that_is_lost_meanwhile_is_no_refusal(

@@ -45,7 +45,7 @@ def test_lost_answers_end_with_1_and_are_reported() -> None:
 
 def test_a_drive_without_counters_is_compared_with_nothing() -> None:
     done = ended(0, "counters", "sim:atv312", "--frames", "3")
-    assert "tells no counters of its own" in done.stdout
+    assert "reports no counters of its own" in done.stdout
 
 
 def test_the_drives_counters_are_reset_armed_only_and_where_it_has_them() -> None:

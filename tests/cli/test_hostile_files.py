@@ -44,8 +44,8 @@ def text(content: str | bytes) -> Callable[[Path], None]:
 
 
 FILES: dict[str, tuple[Callable[[Path], None], str]] = {
-    "pipe": (pipe, "no regular file"),
-    "zeros": (zeros, "no regular file"),
+    "pipe": (pipe, "not a regular file"),
+    "zeros": (zeros, "not a regular file"),
     "folder": (folder, "s a directory"),
     "loop": (loop, "symbolic links"),
     "long": (long, "longer than 2000 kB"),

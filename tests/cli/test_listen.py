@@ -242,7 +242,7 @@ def test_nobody_talks() -> None:
     ours, theirs = os.openpty()
     try:
         text = run(0, "listen", os.ttyname(theirs), "--for", "0.3")
-        assert "Nothing was heard" in text
+        assert "Nothing was received" in text
     finally:
         os.close(ours)
         os.close(theirs)

@@ -92,7 +92,7 @@ REFUSED = {
     "run above a limit": Refused(
         "atv71", (*RUN, "--reference", "90Hz"), "above HSP", sets={"HSP": 500}
     ),
-    "run, no number": Refused("atv71", (*RUN, "--reference", "fast"), "is no reference"),
+    "run, no number": Refused("atv71", (*RUN, "--reference", "fast"), "is not a reference"),
     "run, scale not known": Refused(
         MIXER, (*RUN, "--reference", "20Hz"), "its scale follows MODE", sets={"MODE": 9}
     ),

@@ -61,7 +61,9 @@ def test_back_up_write_compare_restore(line: str, tmp_path: Path) -> None:
     assert "| yes | ACC |" in run(1, "compare", file, line, "-d", "2", "--format", "markdown")
     assert "2 to write" in run(0, "restore", line, file, "-d", "2", "--dry-run")
     run(1, "compare", file, line, "-d", "2")
-    assert "2 written and read back, 0 not." in run(0, "restore", line, file, "-d", "2", "--arm")
+    assert "Wrote 2, all verified; 0 not written." in run(
+        0, "restore", line, file, "-d", "2", "--arm"
+    )
     run(0, "compare", file, line, "-d", "2")
 
 
@@ -97,7 +99,7 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
             process.send_signal(signal.SIGKILL)
             process.communicate(timeout=PATIENCE)
         reported = run(0, "restore", line, file, "--arm")
-        assert "did not come to its end" in reported
+        assert "did not finish" in reported
         run(0, "compare", file, line)
         assert "did not come" not in run(0, "restore", line, file, "--arm")
 
@@ -235,7 +237,7 @@ def test_a_set_does_not_round_in_silence(line: str, tmp_path: Path) -> None:
     reported = run(0, "restore", line, file, "-d", "2", "--arm")
     assert "3.55 s is held as 3.6 s. Use --round to write it anyway" in reported
     assert "3.56 s is held as 3.6 s" in reported
-    assert "1 written and read back" in reported
+    assert "Wrote 1, all verified" in reported
     assert "write  ACC" in run(0, "restore", line, file, "-d", "2", "--dry-run", "--round")
 
 
@@ -296,7 +298,7 @@ WRITES_REFUSED_HERE = [
     (("RFR=5", "--arm"), "only be read"),
     (("CMD=6", "--arm"), "is a command"),
     (("BIR=1", "--arm"), "unverified"),
-    (("FRY=1", "--arm"), "not written from here"),
+    (("FRY=1", "--arm"), "never written by Drive Panel"),
     (("ACC=5", "--arm", "--read-only"), "read-only"),
 ]
 
@@ -393,11 +395,13 @@ def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
         reported = run(0, "restore", line, file, "-d", "1", "-d", "2", "--arm")
         assert "Device 1:" in reported
         assert (
-            reported.index("0 written") < reported.index("Device 2:") < reported.index("2 written")
+            reported.index("Nothing written")
+            < reported.index("Device 2:")
+            < reported.index("Wrote 2")
         )
         assert "equal" in run(0, "restore", line, file, "-d", "2", "--dry-run")
         # a drive that is not there keeps the set from no other
         run(0, "write", line, "ACC=3", "-d", "2", "--arm")
         result = invoked("restore", line, file, "-d", "9", "-d", "2", "--arm")
         assert result.exit_code == 3
-        assert "1 written" in result.output
+        assert "Wrote 1" in result.output

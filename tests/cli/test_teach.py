@@ -108,7 +108,7 @@ def test_forgetting(line: str) -> None:
         (2, ("1.21", "5", "--forget"), "Either"),
         (5, ("10.40", "3"), "no scale to teach"),
         (5, ("15.07", "3"), "nothing is to be taught"),
-        (5, ("1.21", "fast"), "no number of a display"),
+        (5, ("1.21", "fast"), "not a number of a display"),
         (5, ("5.01", "--reference"), "1.21 may"),
         (5, ("1.21", "--reference"), "not taught yet"),
     ],

@@ -47,10 +47,10 @@ def test_nobody_answers_and_the_family_says_what_to_look_at() -> None:
         text = run(3, "why", peer.path, "-d", "2", "-p", "atv71")
         assert {request[1] for request in peer.requests} <= {3, 43}
     first, head, *steps = text.splitlines()
-    assert first == "Nobody answers at address 2: not one byte came back."
+    assert first == "No device answers at address 2: not one byte came back."
     assert head == "Next steps:"
     assert steps[0] == (
-        "  - Address: ADD. At OFF (0) it answers nobody, and so it leaves the factory."
+        "  - Address: ADD. At OFF (0) it does not answer, and so it leaves the factory."
     )
 
 

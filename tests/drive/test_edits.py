@@ -267,7 +267,7 @@ def test_a_lost_line_is_never_made_to_go_unnoticed(family: str) -> None:
     profile = library.load(family)
     watch = profile.data.communication_fault
     assert watch is not None
-    with pytest.raises(ValueRefused, match="not written from here"):
+    with pytest.raises(ValueRefused, match="never written by Drive Panel"):
         Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 1})
     # what the drive holds already is no edit
     assert len(Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 0})) == 0

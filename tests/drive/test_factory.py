@@ -110,7 +110,7 @@ def test_the_limit_itself_is_taken(typed: str) -> None:
 def test_a_limit_of_a_sister_family_says_so() -> None:
     held = {"INV": 48, "ITH": 48}
     edits = Edits().stage(ATV71, "ITH", "0.5 A", held)
-    assert "no document of this family tells" in edit_problems(ATV71, edits, held)["ITH"]
+    assert "no document of this family states" in edit_problems(ATV71, edits, held)["ITH"]
     limits = limits_in_force(ATV71, ATV71["ITH"], held)
     assert limits is not None
     assert limits.text == "0.9 .. 7.2 A ? (INV)"

@@ -72,7 +72,7 @@ WARNED = [
     ("atv21", "With F803 = 0 the drive does not notice a dead line"),
     *((family, "Behind a gateway") for family in FAMILIES),
     ("atv71", "leaves the factory at OFF"),
-    ("atv21", "can be set to 0: the drive then answers nobody"),
+    ("atv21", "can be set to 0: the drive then does not answer"),
     *((family, "digit 0 (10, 20, 100 to 110) call a group") for family in LEROY),
 ]
 

@@ -50,7 +50,7 @@ def test_slow_settings_follow_all_likely_ones(
 
 
 def test_names_in_a_sentence() -> None:
-    assert names_text([]) == "nobody"
+    assert names_text([]) == "none"
     assert names_text(["300"]) == "300"
     assert names_text(["300", "600", "1200"]) == "300, 600 and 1200"
 

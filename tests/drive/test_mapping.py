@@ -151,7 +151,7 @@ def test_targets_a_slot_cannot_have(family: str, direction: str, typed: str, say
 def test_twice_is_wrong_in_outputs_and_a_waste_in_inputs() -> None:
     (wrong,) = assignment_problems(ATV71, made("atv71", "write", ["CMD", "CMD"]))
     assert wrong.refuses
-    assert "NCA1 already" in wrong.text
+    assert "already in NCA1" in wrong.text
     (waste,) = assignment_problems(ATV71, made("atv71", "read", ["ETA", "ETA"]))
     assert not waste.refuses
 
@@ -315,13 +315,13 @@ GOOD = dump_blocks(ATV21, [factory(ATV21, block("atv21", "read"))])
         ('F876 = "none"', 'F876 = "FA00"', 7, "not in the list"),
         ('F876 = "none"', "F876 = 12", 7, "none of the 11 choices"),
         ('F876 = "none"', "F876 = 1.5", 7, "neither a code nor a number"),
-        ('F876 = "none"', 'F999 = "none"', 7, "no slot"),
+        ('F876 = "none"', 'F999 = "none"', 7, "not a slot"),
         ('F876 = "none"\n', "", 5, "F876 is missing"),
         ("[read]", "[red]", 5, "no block"),
         ('"atv21"', '"atv71"', 3, "the drive is 'atv21'"),
         ("format = 1", "format = 2", 2, "format 2"),
         ("slots = 5", "slots = 6", 13, "6 slots"),
-        ("[end]", "[end", 12, "this is no assignment"),
+        ("[end]", "[end", 12, "not an assignment"),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(old: str, new: str, line: int, says: str) -> None:

@@ -113,14 +113,14 @@ FAULTS = [
     ("raw = 30", "raw = 70000", "ACC", "does not fit uint16"),
     ("raw = 30", "raw = 3.0", "ACC", "whole number"),
     ("raw = 30", "raw = true", "ACC", "whole number"),
-    ("raw = 30", "row = 30", "ACC", "'row' is no field"),
+    ("raw = 30", "row = 30", "ACC", "'row' is not a field"),
     ('raw = 30, value = "3.0 s"', 'value = "soon"', "ACC", "'soon'"),
     ('raw = 30, value = "3.0 s", ', "", "ACC", "neither raw nor value"),
     ('value = "3.0 s"', "value = true", "ACC", "text or a number"),
-    ('value = "3.0 s"', 'value = "3.0 s', "ACC", "no parameter set"),
+    ('value = "3.0 s"', 'value = "3.0 s', "ACC", "not a parameter set"),
     ("format = 1", "format = 9", "[set]", "format 9"),
-    ('profile = "atv71"', "profile = 5", "[set]", "no parameter set"),
-    ("parameters = 6", "parameters = 7", "[set]", "tells of 7 parameters, and 6"),
+    ('profile = "atv71"', "profile = 5", "[set]", "not a parameter set"),
+    ("parameters = 6", "parameters = 7", "[set]", "states 7 parameters, and 6"),
 ]
 
 
@@ -141,7 +141,7 @@ def test_a_fault_is_reported_with_its_line(
 def test_a_parameter_named_twice() -> None:
     line = next(row for row in small().splitlines() if row.startswith("ACC = "))
     doubled = small().replace("[end]", f'[parameters."Another"]\n{line}\n\n[end]')
-    with pytest.raises(SetError, match=r"set\.toml:\d+: ACC stands in line \d+ already"):
+    with pytest.raises(SetError, match=r"set\.toml:\d+: ACC is already in line \d+"):
         read(doubled)
 
 
@@ -165,7 +165,7 @@ def test_a_file_that_was_cut_short_between_two_lines_is_always_noticed() -> None
 
 @pytest.mark.parametrize("text", ["", "\x00\x01", "a = 1\n", "[profile]\nid = 'atv71'\n", "{}"])
 def test_foreign_files_are_refused(text: str) -> None:
-    with pytest.raises(SetError, match=r"set\.toml:\d+: this is no parameter set"):
+    with pytest.raises(SetError, match=r"set\.toml:\d+: not a parameter set"):
         read(text)
 
 

@@ -173,7 +173,7 @@ def test_a_negative_half_is_rounded_away_from_zero() -> None:
     ("typed", "words"),
     [("1000", "out of range, 0.1 s to 999.9 s"), ("0", "out of range"), ("fast", "not a number"),
      ("", "not a number"), ("nan", "not a number"), ("inf", "not a number"),
-     ("16#FFFFF", "does not fit"), ("16#XY", "no hexadecimal")],
+     ("16#FFFFF", "does not fit"), ("16#XY", "not a hexadecimal")],
 )  # fmt: skip
 def test_refusals_say_why(typed: str, words: str) -> None:
     p = parameter(unit="s", scale="0.1", min=1, max=9999)

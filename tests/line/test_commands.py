@@ -422,7 +422,7 @@ def test_enabled_motor_at_0_hz_is_not_stopped_exits_with_4() -> None:
         assert done.returncode == 4
         assert "stopped" not in done.stdout
         assert "Device 1, Altivar 71: NOT STOPPED" in done.stderr
-        assert "0 Hz and is still enabled" in done.stderr
+        assert "0 Hz and still enabled" in done.stderr
         assert "Stop it at the machine" in done.stderr
 
 

@@ -268,7 +268,7 @@ async def test_blocked_line_ends_writing_and_keeps_the_rest(end: str) -> None:
             if end == "a stop":
                 made.session.work.stop("F12")
             else:
-                made.session.arming.disarm("No key for a minute: no longer armed.")
+                made.session.arming.disarm("Disarmed: no key pressed for 60 s.")
 
         made.after_writes(1, ended)
         applied = await apply_edits(made.session, made.journal, edits, permit=permit)
@@ -276,7 +276,7 @@ async def test_blocked_line_ends_writing_and_keeps_the_rest(end: str) -> None:
             EditOutcome.DONE, EditOutcome.NOT_SENT, EditOutcome.NOT_SENT,
         ]  # fmt: skip
         assert {edit.code for edit in applied.left} == {r.edit.code for r in applied.results[1:]}
-        why = "a stop came after it (F12)" if end == "a stop" else "no longer armed"
+        why = "a stop came after it (F12)" if end == "a stop" else "Disarmed"
         assert why in applied.stopped
         assert why in applied.results[1].text
         assert "Not sent: " not in applied.results[2].text

@@ -203,8 +203,8 @@ async def test_arming_ends_by_itself() -> None:
         assert made.commander.armed_for is not None
         made.clock.advance(20)
         assert made.commander.armed_for is None
-        assert "No key" in made.session.arming.why_disarmed
-        with pytest.raises(OrderRefused, match="No key"):
+        assert "no key pressed" in made.session.arming.why_disarmed
+        with pytest.raises(OrderRefused, match="no key pressed"):
             made.commander.order("forward")
 
 
@@ -287,7 +287,7 @@ async def test_refusals(family: str, sets: dict[str, int], order: str, text: str
 @pytest.mark.parametrize(
     ("typed", "text"),
     [
-        ("fast", "is no reference"),
+        ("fast", "is not a reference"),
         ("-5", "not negative"),
         ("90Hz", "above HSP"),
         ("3Hz", "below LSP = 5"),

@@ -294,7 +294,7 @@ async def test_only_the_echo_comes_back(line: OpenedLine) -> None:
     with PtyPeer(silent, echo=True) as peer:
         found = await why(line(peer.path))
     assert found.rung == "echo"
-    assert "nobody answers at address 2" in found.text
+    assert "no device answers at address 2" in found.text
     with PtyPeer(honest, echo=True) as peer:
         assert (await why(line(peer.path))).well
 
@@ -360,7 +360,7 @@ async def test_silence(line: OpenedLine) -> None:
         opened = line(peer.path)
         found = await why(opened)
         assert found.rung == "silence"
-        assert found.text == "Nobody answers at address 2: not one byte came back."
+        assert found.text == "No device answers at address 2: not one byte came back."
         functions = {request[1] for request in peer.requests}
     assert functions <= {3, 43}
     neighbor = replace(found.sight, neighbors=(3, 4))
@@ -527,7 +527,7 @@ def steps_in_silence(family: str, device: int = 2) -> str:
 @pytest.mark.parametrize(
     ("family", "says"),
     [
-        ("atv71", "Address: ADD. At OFF (0) it answers nobody, and so it leaves the factory."),
+        ("atv71", "Address: ADD. At OFF (0) it does not answer, and so it leaves the factory."),
         ("atv71", "Keypad port: 8E1 only, whatever the other port has."),
         ("atv71", "Polarity: D0 is A or A', D(A), RD+/TD+, L+; D1 is B"),
         ("atv71", "Pins, RJ45, Modbus keypad port (front): 4 D1, 5 D0, 8 Common."),
@@ -536,7 +536,7 @@ def steps_in_silence(family: str, device: int = 2) -> str:
         ("atv312", "Polarity: D0 is A or A', D(A), RD+/TD+ or L+; D1 is B"),
         ("atv312", "Changed settings count after a power cycle."),
         ("atv31", "Pins, RJ45, seen from the socket: 4 D1, 5 D0, 8 Common."),
-        ("atv21", "Address: F802. At OFF (0) it answers nobody."),
+        ("atv21", "Address: F802. At OFF (0) it does not answer."),
         ("proxidrive", "leaves the factory with 19200 8N2"),
         ("proxidrive", "this line has 19200 8E1"),
         ("varmeca", "RX\\ and TX\\ are the inverted wires"),
@@ -564,7 +564,9 @@ def test_a_format_that_the_family_has_not() -> None:
 
 ASKED = Sight(LINK, 2, PROFILE, port=PortSeen(PORT))
 EXAMPLES = {
-    "other-master": replace(ASKED, overheard="Another master asks drives on this line. Address 2."),
+    "other-master": replace(
+        ASKED, overheard="Another master polls drives on this line. Address 2."
+    ),
     "wrong-protocol": replace(ASKED, works=Works("rtu-tcp:gateway:4001")),
     "other-unit": replace(ASKED, works=Works("tcp:gateway:502,unit=255", 255)),
     "behind": replace(ASKED, measure=Measure(requested=9, behind=3)),

@@ -61,7 +61,7 @@ async def test_find_edit_apply_undo(family: str) -> None:
         assert editor.values.raws[code] == before
         editor.staging.stage(code, "7.5 s")
         editor.apply()
-        assert "1 written and read back" in await written(made, editor)
+        assert "Wrote 1, all verified" in await written(made, editor)
         assert made.drive.raw(code) == editor.values.raws[code] == 75
         assert len(editor.staging.edits) == 0
         assert editor.marks.recent[0] == code
@@ -89,7 +89,7 @@ async def test_a_refused_edit_stays_staged_and_says_why() -> None:
         editor.staging.stage("HSP", "70")
         editor.apply()
         output = await written(made, editor)
-        assert output == "nothing written; 1 still staged: HSP"
+        assert output == "Nothing written; 1 still staged: HSP"
         assert "TFR" in editor.staging.results["HSP"].text
         assert editor.staging.edits.get("HSP") is not None
         assert made.drive.raw("HSP") == 500
@@ -109,14 +109,14 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         editor.staging.stage("TFR", "65")
         editor.staging.stage("ACC", "4")
         editor.apply()
-        assert "nothing written; 2 still staged" in await written(made, editor)
+        assert "Nothing written; 2 still staged" in await written(made, editor)
         # a person is asked before the rest is written
         assert editor.applied is not None
         assert editor.applied.waits == ("ACC",)
         assert made.drive.raw("ACC") == 30
         made.session.work.outcome = None
         editor.apply(editor.applied.waits)
-        assert "1 written and read back" in await written(made, editor)
+        assert "Wrote 1, all verified" in await written(made, editor)
         assert made.drive.raw("ACC") == 40
         assert "TFR" in editor.staging.edits
         assert made.drive.raw("TFR") == 600
@@ -134,7 +134,7 @@ async def test_foreign_change_is_noticed_and_not_overwritten() -> None:
         made.session.work.outcome = None
         editor.staging.accept_changes()
         editor.apply()
-        assert "1 written" in await written(made, editor)
+        assert "Wrote 1" in await written(made, editor)
         assert made.drive.raw("ACC") == 70
 
 
@@ -209,7 +209,7 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
         editor.staging.take_plan(await editor.plan())
         assert {edit.code for edit in editor.staging.edits} == {"ACC", "HSP"}
         editor.apply()
-        assert "2 written" in await written(made, editor)
+        assert "Wrote 2" in await written(made, editor)
         assert (made.drive.raw("ACC"), made.drive.raw("HSP")) == (30, 500)
 
 
@@ -226,13 +226,13 @@ async def test_equal_value_of_set_is_not_staged_by_later_change(tmp_path: Path) 
         await made.until(lambda: made.session.image.raws["ACC"] == 99)
         editor.staging.take_plan(await editor.plan())
         editor.apply()
-        assert "1 written" in await written(made, editor)
+        assert "Wrote 1" in await written(made, editor)
         made.drive.set("DEC", 77)  # at the keypad
         await made.until(lambda: made.session.image.raws["DEC"] == 77)
         editor.staging.stage("LSP", "2 Hz")
         made.session.work.outcome = None
         editor.apply()
-        assert "1 written" in await written(made, editor)
+        assert "Wrote 1" in await written(made, editor)
         assert list(editor.staging.edits) == []
         assert made.drive.raw("DEC") == 77
 
@@ -261,7 +261,7 @@ async def write(made: Bench, editor: Editor, code: str, text: str) -> None:
     editor.staging.stage(code, text)
     made.session.work.outcome = None
     editor.apply()
-    assert "1 written" in await written(made, editor)
+    assert "Wrote 1" in await written(made, editor)
 
 
 async def test_a_setting_written_back_to_its_saved_value_is_saved() -> None:

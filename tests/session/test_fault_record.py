@@ -81,7 +81,7 @@ async def test_the_record_as_a_text() -> None:
         )
         for part in ("E (17) Emergency stop", "| FE00 | Output frequency | 12.34 Hz |", "Run forw"):
             assert part in text
-        rows = text.partition("## Values")[2].partition("## Written")[0].splitlines()
+        rows = text.partition("## Values")[2].partition("## Writes by")[0].splitlines()
         assert len({row.count("|") for row in rows if row.startswith("|")}) == 1
         assert record_name(session, recorder.latest).endswith("-E.md")
 

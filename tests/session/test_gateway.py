@@ -342,7 +342,7 @@ async def test_a_client_that_is_gone_commands_nothing_and_all_are_reported(bench
     assert await made.write(LFR, 300) == 0
     made.gateway.gone(made.client)
     assert 1 not in made.line.facts.commanders
-    assert "10.0.0.9:5000, which commanded this drive, has gone" in output[0]
+    assert "10.0.0.9:5000, which commanded this drive, has disconnected" in output[0]
 
 
 async def test_a_command_of_a_client_that_is_gone_is_not_sent_and_its_stop_is(

@@ -331,7 +331,7 @@ async def test_asking_is_reported_there_and_the_answer_here(bench: Bench) -> Non
 async def test_asking_for_a_free_drive_says_so(bench: Bench) -> None:
     bench.handover.ask_for(1)
     assert bench.voice.output == []
-    assert "Nobody else commands this drive" in bench.reported[-1]
+    assert "No other program commands this drive" in bench.reported[-1]
 
 
 @pytest.mark.parametrize(("status", "adopted"), [(0x0637, 1), (0x0233, 0)])

@@ -229,7 +229,7 @@ def test_how_often_a_drive_is_requested() -> None:
 
 @pytest.mark.parametrize(
     ("pause", "reported"),
-    [(2.0, "TTO 3 s (as heard): fed, 0.9"), (4.0, "TTO 3 s (as heard): NOT FED")],
+    [(2.0, "TTO 3 s (as heard): fed, 0.9"), (4.0, "TTO 3 s (as heard): NOT POLLED")],
 )
 def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
     heard = Heard(named("atv71", "atv71")).say(COMMAND, COMMAND)
@@ -245,7 +245,7 @@ def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
 def test_a_pause_that_goes_on_counts_too() -> None:
     heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
     assert "factory setting; its own was not heard): fed" in heard.lines
-    assert "NOT FED" in heard.rest(11.0).lines
+    assert "NOT POLLED" in heard.rest(11.0).lines
 
 
 def test_a_time_out_that_begins_with_a_command_is_none_before() -> None:
@@ -256,7 +256,7 @@ def test_a_time_out_that_begins_with_a_command_is_none_before() -> None:
 def test_a_request_that_is_not_answered_feeds_nobody() -> None:
     heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
     cycle(heard, 6, READ, every=2.0)
-    assert "NOT FED" in heard.lines
+    assert "NOT POLLED" in heard.lines
 
 
 @pytest.mark.parametrize(("waited", "answers"), [(0.6, ["none"]), (0.2, [])])
@@ -337,7 +337,7 @@ def test_reads_that_are_seldom_are_no_part_of_the_cycle() -> None:
 
 
 def test_nothing_and_noise_are_reported() -> None:
-    assert "Nothing was heard" in Heard().rest().lines
+    assert "Nothing was received" in Heard().rest().lines
     noise = Heard().say(b"\xff\x00\xff").rest()
     assert "3 bytes and no frame: are baud and format those of the line?" in noise.lines
     both = Heard().say(READ, WORDS, b"\xff\x00\xff").rest()

@@ -64,7 +64,7 @@ async def write(here: Bench, plan: Assignment, **how: object) -> str:
 
 
 def disarmed(here: Bench) -> None:
-    here.session.arming.disarm("No key for a minute: no longer armed.")
+    here.session.arming.disarm("Disarmed: no key pressed for 60 s.")
 
 
 def stopped(here: Bench) -> None:
@@ -330,7 +330,7 @@ async def test_nothing_is_written_while_the_motor_turns(family: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ended", "says"), [(disarmed, "no longer armed"), (stopped, "a stop came after it")]
+    ("ended", "says"), [(disarmed, "Disarmed"), (stopped, "a stop came after it")]
 )
 async def test_nothing_is_written_once_the_drive_is_disarmed_or_stopped(
     ended: Callable[[Bench], None], says: str
@@ -348,7 +348,7 @@ async def test_foreign_slot_change_is_not_overwritten() -> None:
         seen = await Mapper(here.session).slots(block(here, "read"))
         here.drive.set("NMA4", 9001)
         with pytest.raises(
-            AssignmentRefused, match=r"NMA4 was changed meanwhile.*unused is now ACC"
+            AssignmentRefused, match=r"NMA4 was changed in the meantime.*unused is now ACC"
         ):
             await write(here, plan_of(here, "read", ["LCR"]), expected=seen)
         assert here.writes() == []
@@ -365,7 +365,7 @@ async def test_somebody_else_between_two_slots() -> None:
             return done
 
         here.session.line.write = disturbed  # type: ignore[method-assign]
-        with pytest.raises(AssignmentRefused, match="NMA4 was changed meanwhile"):
+        with pytest.raises(AssignmentRefused, match="NMA4 was changed in the meantime"):
             await write(here, plan)
         assert here.drive.raw("NMA4") == 9001
 
@@ -417,7 +417,7 @@ async def test_a_read_only_line_writes_nothing() -> None:
 async def test_impossible_mapping_is_refused_before_any_request() -> None:
     with bench("atv71") as here:
         outputs = block(here, "write")
-        with pytest.raises(AssignmentRefused, match="NCA1 already"):
+        with pytest.raises(AssignmentRefused, match="already in NCA1"):
             await write(here, plan_of(here, "write", ["CMD", "CMD"]))
         with pytest.raises(AssignmentRefused, match="no parameter"):
             await write(here, empty(outputs).with_raw(0, 3199))

@@ -330,7 +330,7 @@ async def test_a_drive_that_is_found_again_keeps_what_is_known_of_it() -> None:
         await until(lambda: here.fleet.line_watch.under_command() == [here.session])
         named = DriveSession(here.line, 1, library.load("atv312"))
         assert here.fleet.take(named) is here.console, "leaving has to ask"
-        assert "It runs by a command from here" in here.fleet.events.events[-1].text
+        assert "It runs by a command of this panel" in here.fleet.events.events[-1].text
 
 
 async def test_a_drive_that_is_named_otherwise_is_another_one() -> None:

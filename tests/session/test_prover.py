@@ -188,7 +188,7 @@ async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards
     while not task.done():
         await asyncio.sleep(0)
         if drive.facts.paused:
-            with pytest.raises(RequestRefused, match="being proved"):
+            with pytest.raises(RequestRefused, match="being tested"):
                 await drive.read(1, STATUS)
             refused += 1
     assert refused

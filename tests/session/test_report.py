@@ -22,7 +22,7 @@ SECTIONS = [
     "## Indirect blocks and scanner",
     "## Loss of communication",
     "## Faults",
-    "## Written from here",
+    "## Writes by Drive Panel",
 ]
 
 
@@ -112,7 +112,7 @@ async def test_the_scanner_tells_what_it_brings() -> None:
         text = report_text(made.profile, upload.parameter_set(), [])
     assert f"| NMA1 | ETA {made.profile['ETA'].name} |" in text
     assert "| NMA2 | nothing |" in text
-    assert "None." in text.partition("## Written from here")[2]
+    assert "None." in text.partition("## Writes by Drive Panel")[2]
 
 
 async def test_damaged_lines_of_the_journal_are_left_out() -> None:
@@ -139,7 +139,7 @@ async def test_all_times_are_in_the_zone_in_which_the_drive_was_read() -> None:
     values = replace(values, head=replace(values.head, time="2026-11-22T08:00:00+01:00"))
     text = report_text(made.profile, values, entries)
     assert "- Read: 2026-11-22 08:00:00; times here are UTC+01:00" in text
-    written = text.partition("## Written from here")[2]
+    written = text.partition("## Writes by Drive Panel")[2]
     assert written.index("2026-10-25 01:30:00") < written.index("2026-10-25 02:30:00")
 
 
@@ -154,6 +154,6 @@ async def test_report_lists_a_trip_once_however_often_it_was_seen() -> None:
             for n in range(5)
         ]
         text = report_text(made.profile, upload.parameter_set(), entries)
-    rows = text.partition("## Trips seen from here")[2].partition("## ")[0].splitlines()
+    rows = text.partition("## Trips seen by Drive Panel")[2].partition("## ")[0].splitlines()
     (row,) = [row for row in rows if "OCF" in row]
     assert row.startswith("| not seen | 2026-03-01 ")

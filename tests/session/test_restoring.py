@@ -132,7 +132,7 @@ async def test_killed_half_way_and_resumed(family: str) -> None:
             await work
         left = await plan_for(made.session, values, made.profile, options)
         assert len(left.edits) > 0
-        assert "did not come to its end" in Mark.of(made.session).interrupted
+        assert "did not finish" in Mark.of(made.session).interrupted
         before = len(made.writes())
         done = await restored(made, values, options)
         assert done.complete

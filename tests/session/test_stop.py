@@ -165,7 +165,7 @@ async def test_a_drive_commanded_from_elsewhere_is_reported(start: Start, journa
     stopper.stop([DriveSession(line, 1, library.load("powerdrive"), clock=clock)])
     report = await ended(stopper, 1, clock)
     assert report.phase is Phase.FAILED
-    assert "commanded from elsewhere" in report.text
+    assert "commanded by another source" in report.text
 
 
 async def test_a_dead_drive_is_tried_again_and_reported_of(start: Start, journal: Journal) -> None:

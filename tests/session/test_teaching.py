@@ -138,7 +138,7 @@ async def test_scaled_value_is_not_taught() -> None:
 
 async def test_a_text_that_is_no_number_is_refused_before_the_drive_is_requested() -> None:
     line, teacher = drive()
-    with pytest.raises(ValueRefused, match="no number of a display"):
+    with pytest.raises(ValueRefused, match="not a number of a display"):
         await teacher.look("HZ", "fast")
     assert line.requested == []
 

@@ -262,9 +262,9 @@ async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(
     reported.put("a", 0.02)
     reported.put("b")
     await asyncio.sleep(0)
-    reported.arming.disarm("No key for a minute: no longer armed.")
+    reported.arming.disarm("Disarmed: no key pressed for 60 s.")
     assert await reported.idle() == ["a begun", "a done", "b given up"]
-    assert reported.outcome() == (OutcomeKind.REFUSED, "No key for a minute: no longer armed.")
+    assert reported.outcome() == (OutcomeKind.REFUSED, "Disarmed: no key pressed for 60 s.")
 
 
 async def test_a_task_that_needs_no_arming_is_done_without(reported: Notified) -> None:

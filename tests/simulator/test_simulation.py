@@ -65,7 +65,7 @@ def test_a_terminal_can_be_had_under_a_name(tmp_path: Path) -> None:
 def test_a_name_that_is_a_file_is_left_alone(tmp_path: Path) -> None:
     taken = tmp_path / "file"
     taken.write_text("mine")
-    with simulation() as running, pytest.raises(SimulatorError, match="is no link"):
+    with simulation() as running, pytest.raises(SimulatorError, match="is not a link"):
         running.serve_pty(str(taken))
     assert taken.read_text() == "mine"
 

@@ -133,7 +133,7 @@ async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
         made.drive().set("NMA1", 9001)
         await until(made.pilot, lambda: "ACC" in shown(made.app, "first"))
         await write(made)
-        await message(made, "NMA1 was changed meanwhile")
+        await message(made, "NMA1 was changed in the meantime")
         assert made.drive().raw("NMA1") == 9001
         # now that it was told, it may be overwritten
         await until(made.pilot, lambda: "→ ETA" in shown(made.app, "first"))
@@ -187,7 +187,7 @@ async def test_user_words_are_kept_for_the_drive() -> None:
         made.app.screen.query_one(Input).value = "ACC octal"
         await made.pilot.press("enter")
         fault = made.app.screen.query_one("#fault")
-        await until(made.pilot, lambda: "no format" in str(fault.render()))
+        await until(made.pilot, lambda: "not a format" in str(fault.render()))
 
 
 async def test_an_indirect_block_waits_for_a_reset() -> None:
@@ -232,7 +232,8 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         assert "cannot be read" in str(made.app.screen.query_one("#follows").render())
         await made.pilot.press("y")
-        await message(made, "Written: FA51 500")
+        events = made.app.events  # the newest may be that replies were lost while it was off
+        await until(made.pilot, lambda: any("Written: FA51 500" in e.text for e in events.events))
         assert made.drive().raw("FA51") == 500
 
 

@@ -208,9 +208,9 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 async def test_no_message_says_that_an_armed_drive_is_not() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("r")
-        await made.message("Not armed: a arms this drive.")
+        await made.message("Not armed. Press a to arm this drive.")
         await made.armed()
-        await made.message("Armed now")
+        await made.message("Armed for 60 s")
         assert "Not armed" not in shown(made.app, "said")
 
 
@@ -260,7 +260,7 @@ async def test_nothing_is_commanded_before_arming() -> None:
             made.app.events.add("told", f"{key} is next")
             await until(made.pilot, lambda: "is next" in output(made.app))
             await made.pilot.press(key)
-            await made.message("a arms this drive")
+            await made.message("Press a to arm this drive")
         assert made.drive().raw("CMD") == 0
         assert made.drive().raw("LFR") == 0
         assert writes(made.app) == []

@@ -183,6 +183,6 @@ def test_a_motor_that_runs_from_here_is_not_taken_for_another_family() -> None:
     assert fleet.line_watch.under_command() == [console.session]
     event = fleet.events.newest
     assert event is not None
-    assert "It runs by a command from here: it stays" in event.text
+    assert "It runs by a command of this panel: it stays" in event.text
     console.session.commanded_at = None
     assert fleet.take(other).session is other

@@ -131,7 +131,7 @@ async def test_counters_of_the_open_drive_on_both_sides() -> None:
         await made.pilot.press("tab", "tab")
         await made.until(lambda: "Counters of drive 1" in made.shown("frames"))
         await made.until(lambda: "function 8" in made.shown("frames"))
-        await made.until(lambda: "each was sent from here and answered" in made.shown("frames"))
+        await made.until(lambda: "this program sent each" in made.shown("frames"))
         screen = made.app.screen
         assert isinstance(screen, FramesScreen)
         watch = screen.console.counters
@@ -171,7 +171,7 @@ async def test_the_drives_own_counters_are_reset_after_a_question_only() -> None
             await made.pilot.press("Z")
             await made.until(lambda: isinstance(made.app.screen, Confirm))
             if ended:
-                screen.session.arming.disarm("No key for a minute: no longer armed.")
+                screen.session.arming.disarm("Disarmed: no key pressed for 60 s.")
             await made.pilot.press("y")
             output = "Counters not reset: " if ended else "counters are reset"
             await made.until(lambda output=output: output in made.shown("said"))  # type: ignore[misc]

@@ -84,7 +84,7 @@ async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
             # there is no stop, and that is said
             assert "no stop here" in shown(app, "keys")
             await pilot.press("space")
-            await until(pilot, lambda: "No stop goes out" in output(app))
+            await until(pilot, lambda: "gets no stop" in output(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
             assert not app.hearing
@@ -142,7 +142,7 @@ async def test_another_master_on_opening_is_offered_to_be_listened_to() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             talk(peer)
-            await until(pilot, lambda: "Another master asks" in output(app))
+            await until(pilot, lambda: "Another master polls" in output(app))
             await until(pilot, lambda: "H listens to it" in shown(app, "message"))
             await pilot.press("H")
             await heard(app, pilot, peer)
@@ -237,7 +237,7 @@ def test_why_the_panel_may_not_fall_silent() -> None:
     network = fleet_of(Watch(), found, link=TcpLink("192.168.0.10"))
     assert why_not_hear(network).startswith("Over a network")
     running = why_not_hear(fleet_of(Watch(commanded=[session]), found))
-    assert "runs by a command from here. Stop it first." in running
+    assert "runs by a command of this panel. Stop it first." in running
     assert "was not read" in why_not_hear(fleet_of(Watch(not_read=[session]), found))
     unknown = why_not_hear(fleet_of(Watch(), found, FoundDrive(nameless)))
     assert "device 9" in unknown

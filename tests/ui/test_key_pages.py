@@ -80,7 +80,7 @@ def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:
     written = page.read_text("utf-8")
     assert written.startswith("A\n<!-- keys of frames -->\n\n| key |")
     assert written.endswith("<!-- end of keys -->\nB\n")
-    assert "| h | Hold the list still, or let it run. |" in written
+    assert "| h | Pause or resume the list. |" in written
     assert "Old." not in written
 
 

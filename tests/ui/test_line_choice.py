@@ -96,7 +96,7 @@ async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips(
         assert chosen.text == NAMED
         for _ in range(3):
             await pilot.press("enter")
-        await until(pilot, lambda: "drives are searched for" in shown(app, "said"))
+        await until(pilot, lambda: "being scanned" in shown(app, "said"))
         assert app.screen is app.connection
         await until(pilot, lambda: app.connection.drives.option_count == 1)
         # the cursor went to the drive: Enter watches it

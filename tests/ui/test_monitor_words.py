@@ -43,7 +43,7 @@ TURNING_ROUND = {**fakes.RUNNING, "FRH": -500, "ETA": 0x0237}
         (AT_ZERO, None, "enabled, at 0 Hz"),
         (fakes.READY, None, "a arms, r runs"),
         (fakes.READY, 50.0, "r runs it"),
-        (AT_TERMINALS, 50.0, "no command from here"),
+        (AT_TERMINALS, 50.0, "no command given"),
         (NO_SUPPLY, 50.0, "not ready"),
         (fakes.FAULT, None, " FAULT ObF "),
     ],
@@ -128,7 +128,7 @@ def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
             control = Control(hindrance=found)
             view = replace(view_of(profile, {}), control=control)
             shown = " ".join(line.plain.strip() for line in notice_lines(view, 80))
-            assert shown == f"No effect from here: {found.sentence}"
+            assert shown == f"No effect: {found.sentence}"
             assert len(notice_lines(view, 80)) <= NOTICE_ROWS
             line = RunLine("forward", "30", "Hz", 0.0, 0)
             reported = f"{found.text} {_after_esc(found.way)}".strip()

@@ -102,10 +102,10 @@ async def test_unexpected_answer_tries_no_other_setting_unasked() -> None:
             assert "No drive answered" not in output(app)
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
-            assert "Device 2: what it does when it is asked no more" in dialog(app)
+            assert "Device 2: its reaction when polling stops" in dialog(app)
             await pilot.press("y")
             await until(
-                pilot, lambda: "Somebody answers, and not clearly, at 19200 8N2" in output(app)
+                pilot, lambda: "A device answers, but not clearly, at 19200 8N2" in output(app)
             )
 
 
@@ -114,7 +114,7 @@ async def test_possible_drives_are_named_before_first_request() -> None:
         app = DrivePanelApp(start=f"{peer.path},19200,8E1")
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: "Altivar 21 (F803), and" in shown(app, "message"))
-            assert "asked on while the line is open" in advice(app)
+            assert "polled while the line is open" in advice(app)
             assert peer.requests == []
             await until(pilot, lambda: " left" in shown(app, "search"))
             assert " s left." in advice(app)
@@ -133,7 +133,7 @@ async def test_drives_are_still_polled_while_the_person_decides_known_or_not() -
             await until(pilot, lambda: set(app.connection.found) == {1, 2})
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
-            assert "Device 2: what it does when it is asked no more is not" in dialog(app)
+            assert "Device 2: its reaction when polling stops is not" in dialog(app)
             before = len(peer.requests)
             for device in (1, 2):
                 await until(pilot, lambda: _requested(peer, device, before) >= 2)  # noqa: B023

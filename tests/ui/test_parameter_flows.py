@@ -118,7 +118,7 @@ async def test_find_edit_write_and_read_back() -> None:
         await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
-        await message(made, "1 written and read back")
+        await message(made, "Wrote 1, all verified")
         assert made.drive().raw("ACC") == 75
         await until(made.pilot, lambda: "1 not saved" in shown(made.app, "status"))
         assert "was 3.0 s" in shown(made.app, "table")
@@ -165,13 +165,15 @@ async def test_reports_on_edits_are_true_while_motor_runs() -> None:
         await made.pilot.press("3")
         await until(made.pilot, lambda: promise in lines(made))
         await find(made, "TFR")
-        await stage(made, "70", "TFR → 70.0 Hz: 2 staged. TFR waits until the motor stands.")
+        await stage(
+            made, "70", "TFR → 70.0 Hz: 2 staged. TFR waits until the motor is at standstill."
+        )
         await find(made, "DEC")
-        await stage(made, "5", "DEC → 5.0 s: 3 staged. TFR waits until the motor stands.")
+        await stage(made, "5", "DEC → 5.0 s: 3 staged. TFR waits until the motor is at standstill.")
         await made.pilot.press("W")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
-        await message(made, "1 written and read back; 2 still staged: ACC, TFR")
+        await message(made, "Wrote 1, all verified; 2 still staged: ACC, TFR")
         await until(made.pilot, lambda: "Now 5.0 s, was 3.0 s." in shown(made.app, "detail"))
         await made.pilot.press("u")
         await message(made, "TFR is no longer staged; 1 is staged now.")
@@ -326,7 +328,7 @@ async def test_back_up_change_compare_stage_and_write(
         await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
-        await message(made, "2 written and read back")
+        await message(made, "Wrote 2, all verified")
         assert (made.drive().raw("ACC"), made.drive().raw("HSP")) == (30, 500)
 
 
@@ -420,7 +422,7 @@ async def test_behind_a_failure_the_rest_needs_confirmation(key: str) -> None:
         await until(made.pilot, lambda: "Write 2 parameters?" in question(made))
         await made.pilot.press("y")
         await until(made.pilot, lambda: isinstance(made.app.screen, RestQuestion))
-        await until(made.pilot, lambda: "Write the other parameter all the same?" in question(made))
+        await until(made.pilot, lambda: "Write the other parameter anyway?" in question(made))
         assert made.drive().raw("ACC") == 30
         await made.pilot.press(key)
         await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
@@ -473,7 +475,7 @@ async def test_files_tell_their_drive_and_what_differs(
         assert "1 differs" in reported["own.toml"]
         assert "Altivar 71" in reported["alien.toml"]
         assert "other family" in reported["alien.toml"]
-        assert "is no set" in reported["none.toml"]
+        assert "not a set" in reported["none.toml"]
         assert writes(made.app) == []
 
 

@@ -120,7 +120,7 @@ def refused(editor: Editor) -> None:
         " Stop the motor and write again."
     )
     editor.staging.results = {"HSP": Result(edit, EditOutcome.DRIVE_REFUSED, text, 500)}
-    say(editor, OutcomeKind.REFUSED, "2 written and read back; 1 still staged: HSP")
+    say(editor, OutcomeKind.REFUSED, "Wrote 2, all verified; 1 still staged: HSP")
 
 
 def failed(editor: Editor) -> Applied:
@@ -175,7 +175,7 @@ def done(editor: Editor) -> None:
     for code in ("ACC", "DEC"):
         editor.session.unsaved_settings.note_write(code, 30, 35)
     editor.waits_for_reset = {"ADD"}
-    say(editor, OutcomeKind.DONE, "3 written and read back")
+    say(editor, OutcomeKind.DONE, "Wrote 3, all verified")
 
 
 def compared(editor: Editor) -> None:

@@ -196,7 +196,7 @@ async def test_enter_is_no_yes_where_something_is_lost_and_that_is_reported() ->
         assert str(hint.render()).startswith("y writes")
         await pilot.press("enter", "enter", "w", "s")
         assert requested.answers == []
-        assert str(hint.render()).startswith("Enter is no answer here")
+        assert str(hint.render()).startswith("Press y or Esc")
         assert "y writes" in str(hint.render())
     assert str(Confirm("", "", yes="goes", no="stays", loses=False)._keys).startswith("y or Enter")
 

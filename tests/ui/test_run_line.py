@@ -260,7 +260,7 @@ async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_th
     async with bench("atv71") as made:
         made.drive().set("FR1", 1)  # a terminal gives command and reference
         await made.armed()
-        await made.message("No effect from here", "not commanded by Modbus", "6 opens Control")
+        await made.message("No effect", "not commanded by Modbus", "6 opens Control")
         await made.pilot.press("r", "2", "0")
         await made.message("No effect: The drive", "Esc, then 6 opens Control")
         before = writes(made.app)

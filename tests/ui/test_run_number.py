@@ -84,7 +84,7 @@ def test_a_reference_past_the_limit_is_reported_and_not_given() -> None:
     right = RunLine("forward", "45", "Hz", 0.0, 0).checked(profile, readings)
     assert right.fault == ""
     empty = RunLine("forward", "", "Hz", 0.0, 0).checked(profile, readings)
-    assert "no reference" in empty.fault
+    assert "not a reference" in empty.fault
 
 
 def test_the_proposal_is_the_last_reference_given_else_the_drives_own() -> None:

@@ -88,7 +88,7 @@ async def test_other_addresses_are_typed_in_place_and_remembered_for_the_line() 
         await until(pilot, lambda: app.connection.drives.has_focus)
         await pilot.press("c", "1", "3", "-", "enter")
         field = app.connection.query_one("#addresses", Input)
-        await until(pilot, lambda: "is no list of addresses" in output(app)[-1])
+        await until(pilot, lambda: "is not a list of addresses" in output(app)[-1])
         assert field.has_focus
         await pilot.press("1", "4", "enter")
         await until(pilot, lambda: set(app.connection.found) == {1, 14})

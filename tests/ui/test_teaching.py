@@ -74,7 +74,7 @@ async def test_invalid_display_number_is_reported_in_question() -> None:
         await made.pilot.pause(0.4)
         await made.pilot.press("enter")
         fault = made.app.screen.query_one("#fault")
-        await until(made.pilot, lambda: "no number of a display" in str(fault.render()))
+        await until(made.pilot, lambda: "not a number of a display" in str(fault.render()))
         await made.pilot.press("escape")
 
 

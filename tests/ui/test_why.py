@@ -60,12 +60,12 @@ async def test_on_line_it_is_requested_by_the_address_and_the_profile_of_the_for
         await pilot.press("escape")
         app.connection.form._fields["profile"].value = "atv71"
         app.connection.form._fields["addresses"].value = "7-9"
-        text = await reported(app, pilot, "Nobody answers at address 7")
+        text = await reported(app, pilot, "No device answers at address 7")
         assert "Address: ADD. At OFF (0)" in text
         assert "Address 7 on" in shown(app, "asked")
         assert {request[1] for request in nobody.requests} <= {3, 43}
         # it is kept among the messages, and asked anew by the same key
-        assert "Nobody answers at address 7" in app.events.events[-1].text
+        assert "No device answers at address 7" in app.events.events[-1].text
         await pilot.press("N")
         await until(pilot, lambda: len(app.events.events) > 1)
         await pilot.press("escape")
@@ -128,7 +128,7 @@ def test_picture(snap_compare: Callable[..., bool], size: tuple[int, int]) -> No
     async def requested(pilot: Pilot[None]) -> None:
         await pilot.pause()
         app.push_screen(WhyScreen("Why no answer? Address 2 on /dev/ttyUSB0 19200 8E1", found))
-        await until(pilot, lambda: "Nobody answers" in shown(app, "reasons"))
+        await until(pilot, lambda: "No device answers" in shown(app, "reasons"))
         app.events = EventLog()
         assert isinstance(app.screen, WhyScreen)
         app.screen.draw_frame(app.frame_now())

@@ -17,8 +17,8 @@ from tui.wire.overheard import overheard_request
         (frame(4, bytes.fromhex("06 2135 0006")), "write of register 8501"),
         (write_frame(4, 8501, [6, 30]), "write of register 8501 on, 2 words"),
         (read_write_frame(4, 3201, 2, 8501, [6]), "function 23"),
-        (frame(4, bytes.fromhex("2B 0E 01 00")), "who it is (function 43)"),
-        (frame(4, bytes([17])), "who it is (function 17)"),
+        (frame(4, bytes.fromhex("2B 0E 01 00")), "its identity (function 43)"),
+        (frame(4, bytes([17])), "its identity (function 17)"),
     ],
 )
 def test_requests(data: bytes, text: str) -> None:

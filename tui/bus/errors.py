@@ -9,7 +9,7 @@ class LineError(Exception):
     """Something about a line is wrong; the text says what happened and what to do next."""
 
 
-UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
+UNKNOWN_FATE = " The write may or may not have taken effect. Read the register before retrying."
 """Ends the text of an error after a write that may have been taken."""
 
 
@@ -136,7 +136,7 @@ class NoAnswer(ExchangeError):
         self.detail = detail
         text = detail or f"Device {device} did not answer ({_request_text(function, address)})."
         if retry_in is not None:
-            text += f" It is asked again in {retry_in:.1f} s."
+            text += f" Retrying in {retry_in:.1f} s."
         super().__init__(device, function, address, text)
 
 

@@ -152,7 +152,7 @@ def _addresses(data: ProfileData) -> Iterator[PageRow]:
     left = "OFF" if off else str(known.factory)
     yield PageRow("Its own", f"{known.first} to {known.last}; leaves the factory with {left}")
     if known.off is not None:
-        yield PageRow("Off", f"{known.off}: the drive answers nobody", "", True)
+        yield PageRow("Off", f"{known.off}: the drive does not answer", "", True)
     if known.zero_digit_is_group:
         text = "an address with a digit 0 (10, 20, 100) calls a group of drives"
         yield PageRow("Groups", text, "", True)

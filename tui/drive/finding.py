@@ -127,7 +127,7 @@ def families_at(profiles: Iterable[Profile], settings: Iterable[LineSetting]) ->
 
 def names_text(names: Sequence[str]) -> str:
     """Names in a sentence: one, or several with `and` before the last."""
-    *first, last = names or ("nobody",)
+    *first, last = names or ("none",)
     return f"{', '.join(first)} and {last}" if first else last
 
 
@@ -180,6 +180,6 @@ def watching_text(families: Sequence[WatchingFamily]) -> str:
         return ""
     parts = [part for part in (sure, f"and perhaps {likely}" if likely else "") if part]
     return (
-        f"From the first request on these watch the line, and act on their communication timeout"
-        f" when they are asked no more: {', '.join(parts)}."
+        f"These watch the line from the first request, and react to their communication timeout"
+        f" when polling stops: {', '.join(parts)}."
     )

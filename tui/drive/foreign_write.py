@@ -194,7 +194,7 @@ def setting_refusal(profile: Profile, found: ForeignWord, allowed: Collection[st
     """
     for one in found.parameters:
         if one.forbidden:
-            return f"{one.code} is not written from here: {one.forbidden}"
+            return f"{one.code} is never written by Drive Panel: {one.forbidden}"
         if one.code in allowed:
             continue
         if ALL not in allowed:

@@ -20,7 +20,7 @@ def why_not_taught(family: Profile, code: str) -> str:
     """Why a parameter's scale cannot be taught, by the profile of its family; empty if it can."""
     parameter = family[code]
     if parameter.access == "w" or parameter.bits or word_count(parameter) != 1:
-        return f"{code} is no number of one word: it has no scale to teach."
+        return f"{code} is not a number of one word: it has no scale to teach."
     if family.names(parameter) and is_enumeration(parameter):
         return f"{code} has names for its values: it has no scale to teach."
     if not is_raw(family, parameter):

@@ -115,7 +115,7 @@ def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
     typed = text.strip().replace("\N{MINUS SIGN}", "-")
     match = _TYPED.fullmatch(typed)
     if match is None:
-        raise ValueRefused(f"{text!r} is no number of a display. Write it like 50.3 or -12 A.")
+        raise ValueRefused(f"{text!r} is not a number of a display. Write it like 50.3 or -12 A.")
     beside = match[3] or ""
     if beside and unit and unit_named(beside) != unit_named(unit):
         raise ValueRefused(f"Either {beside} or {unit}: type one unit.")
@@ -135,7 +135,7 @@ def unit_named(text: str) -> str:
         return known
     if folded == "raw" or not _UNIT.fullmatch(typed):
         usual = ", ".join(UNITS[:6])
-        raise ValueRefused(f"{typed!r} is no unit. Usual are {usual}.")
+        raise ValueRefused(f"{typed!r} is not a unit. Usual units are {usual}.")
     return typed
 
 
@@ -188,7 +188,7 @@ def _contradiction(
         why = f"no usual scale gives {look.shown:f} for raw {look.word}"
     else:
         why = f"no usual scale fits {' and '.join(one.text for one in (*before[-2:], look))}"
-    check = "Was it the same parameter, and did the value stand still?"
+    check = "Was it the same parameter, and was the value steady?"
     if known is not None:
         text = f"{code} is no longer taught ({known.text} before): {why}. It is shown raw. {check}"
         return Lesson(LessonKind.ENDED, kept, text)
@@ -230,8 +230,8 @@ def _unit_of(looks: Iterable[DisplayLook]) -> str | None:
 def _sign_text(scale: TaughtScale) -> str:
     if scale.signed is None:
         return (
-            " Whether it can be negative is open: from raw 32768 on it is shown raw until a look"
-            " there tells."
+            " Whether it can be negative is unknown: from raw 32768 on it is shown raw until a look"
+            " there shows it."
         )
     return " It has a sign." if scale.signed else " It has no sign."
 

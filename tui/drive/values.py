@@ -235,7 +235,7 @@ def _doubt(parameter: Parameter) -> str:
     """No document of the family states the limits, and only the row itself is sure."""
     grounds = parameter.limit_grounds
     weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
-    return " (limits that no document of this family tells)" if weak else ""
+    return " (limits that no document of this family states)" if weak else ""
 
 
 def _scale_source(parameter: Parameter) -> str:
@@ -251,7 +251,7 @@ def _hexadecimal(parameter: Parameter, typed: str) -> int:
     try:
         word = int(typed[3:] if typed.startswith("16#") else typed[2:], 16)
     except ValueError:
-        raise ValueRefused(f"{parameter.code}: {typed!r} is no hexadecimal word.") from None
+        raise ValueRefused(f"{parameter.code}: {typed!r} is not a hexadecimal word.") from None
     if not 0 <= word < 1 << (16 * word_count(parameter)):
         raise ValueRefused(f"{parameter.code}: {typed} does not fit {parameter.type}.")
     low, high = type_range(parameter)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 NO_STOP_HERE = (
-    "No stop goes out to a line that is only listened to: its master stops it. Esc ends listening."
+    "A monitored line gets no stop: its master stops the motor. Press Esc to end listening."
 )
 NOBODY_TO_STOP = "Nothing was stopped: no drive is known here."
 UNREACHED = (

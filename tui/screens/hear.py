@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from .app_port import Panel
 
 LISTENS_ALREADY = "The panel listens already; Esc ends that."
-NO_LINE = "No line is meant yet: choose one on Line, then H listens to it."
+NO_LINE = "No line is chosen. Choose one on Line, then press H to monitor it."
 CLOSES = (
-    "The panel asks these drives no more: the port is opened for reading only, and nothing is sent"
+    "The panel stops polling these drives: the port is opened for reading only, and nothing is sent"
     " until you end it, no stop either. Another master has to be there that asks and stops them."
 )
-CLOSE_FIRST = "To leave it alone all the same, close the line first: Ctrl+P, close."
+CLOSE_FIRST = "To stop polling it anyway, close the line first: Ctrl+P, close."
 
 
 def why_not_hear(fleet: Fleet) -> str:
@@ -32,24 +32,24 @@ def why_not_hear(fleet: Fleet) -> str:
 
     line, watch = fleet.line, fleet.line_watch
     if not isinstance(line.link, SerialLink):
-        return "Over a network nobody hears what others say; this list is all that goes over it."
+        return "Over a network other masters cannot be monitored; this list shows all its traffic."
     if others := line.facts.others:
         who = ", ".join(one.text for one in others)
         return f"Not listened to: {who} uses the line too, and a port like that has no other user."
     if running := watch.under_command():
         who = "; ".join(names_of([one]) for one in running)
-        return f"Not listened to: {who} runs by a command from here. Stop it first."
+        return f"Not monitored: {who} runs by a command of this panel. Stop it first."
     if acting := watch.left_alone():
         reported = next(one for one in fleet.sessions if one.device in acting)
         text = left_alone_text(reported, watch=acting[reported.device])
         return f"Not listened to, as the panel feeds drives. {text} {CLOSE_FIRST}"
     if unread := watch.unread():
         who = names_of([unread[0]])
-        return f"Not listened to yet: what {who} does when it is asked no more was not read."
+        return f"Not monitored yet: the reaction of {who} when polling stops was not read."
     unknown = [device for device, one in fleet.found.items() if one.console is None]
     if unknown:
         return (
-            f"Not listened to: what device {unknown[0]} does when it is asked no more is not known."
+            f"Not monitored: the reaction of device {unknown[0]} when polling stops is not known."
             f" {CLOSE_FIRST}"
         )
     return ""

@@ -45,7 +45,7 @@ class Leaving(Panel):
             return
         if self._requested in self.screen_stack:
             return
-        self._requested = self._question(self.fleets, "Leave the panel?", yes="leaves", no="stays")
+        self._requested = self._question(self.fleets, "Leave the panel?", yes="leave", no="stay")
         if self._requested is None:
             self.exit()
         else:
@@ -111,11 +111,11 @@ class Leaving(Panel):
             if one.device not in reported
         ]
         found += [
-            f"Device {device}: what it does when it is asked no more is not known."
+            f"Device {device}: its reaction when polling stops is not known."
             for device, one in fleet.found.items()
             if one.console is None
         ]
-        head = "Once nobody asks them any more, drives act on their timeout, at rest too:"
+        head = "When polling stops, these drives react to their timeout, even at standstill:"
         return [head, *found] if found else []
 
     def _leave_motors(self, choice: LeaveChoice | None) -> None:

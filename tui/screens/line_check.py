@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
     from .dialogs.confirm import Confirm
 
-QUESTION = "Is this the line that is meant?"
+QUESTION = "Is this the right line?"
 FOLLOWS = (
-    "Until that is said the line is read-only: values are shown and stops go out, nothing else is"
-    " written to its drives."
+    "Until you confirm, the line is read-only: values are shown, and only stops are written to"
+    " its drives."
 )
 AS_IT_WAS = "There is nothing to accept: the line is as it was."
 

@@ -25,13 +25,13 @@ def ask_why(app: Panel) -> None:
     intended = getattr(app.screen, "why_target_now", None)
     target: WhyTarget | None = intended() if intended is not None else _open_drive(app)
     if target is None:
-        app.tell("No drive is meant yet: choose a line, or a drive, on Line.")
+        app.tell("No drive is chosen. Choose a line, or a drive, on Line.")
         return
     if target.opened is None:
         try:
             parse_link(target.text)
         except LinkSyntaxError:
-            app.tell("This line is not open: Enter opens it, then N tells what does not answer.")
+            app.tell("This line is not open. Press Enter to open it, then N to diagnose.")
             return
     from .dialogs.why import WhyScreen
 

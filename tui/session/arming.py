@@ -18,7 +18,7 @@ class NotArmed(OrderRefused):
     """A write or command to a drive that is not armed."""
 
     def __init__(self, why: str = "") -> None:
-        super().__init__(why or "Not armed: a arms this drive.")
+        super().__init__(why or "Not armed. Press a to arm this drive.")
 
 
 class CommandedElsewhere(OrderRefused):
@@ -97,7 +97,7 @@ class Arming:
         if until is None:
             return None
         if until <= self._clock.monotonic():
-            self.disarm("No key for a minute: no longer armed.")
+            self.disarm("Disarmed: no key pressed for 60 s.")
             return None
         if self._line.state.status is not LineStatus.CONNECTED:
             self.disarm("The line was lost: no longer armed.")
@@ -122,7 +122,7 @@ class Arming:
 
     def refusal(self) -> str:
         """Why nothing may be written now; empty where it may."""
-        return "" if self.armed else self._why or "Not armed: a arms this drive."
+        return "" if self.armed else self._why or "Not armed. Press a to arm this drive."
 
 
 def _finite(seconds: float) -> float | None:

@@ -171,7 +171,8 @@ class Fleet:
             return False
         names = before.profile.name, session.profile.name
         reported = (
-            f"It runs by a command from here: it stays {names[0]}. Stop it, then name {names[1]}."
+            f"It runs by a command of this panel: it stays {names[0]}."
+            f" Stop it, then name {names[1]}."
         )
         self.events.add("refused", reported, session.device)
         return True

@@ -273,7 +273,7 @@ class Journal:
             if self._on_trouble is not None:
                 self._on_trouble(self.trouble)
         except Exception:
-            log.exception("whoever was to be told of the journal")
+            log.exception("a listener of the journal failed")
 
     def _trouble_with(self, entry: Entry) -> str:
         """Write an entry; what went wrong, or nothing."""

@@ -76,7 +76,7 @@ class _Report:
             "",
             f"- Read: {_when(head.time, self.zone)}; times here are {self._zone_text()}",
             f"- Profile: {self.profile.id}, version {head.profile_version}; panel {head.panel}",
-            *(known or ["- The drive does not say who it is."]),
+            *(known or ["- The drive does not identify itself."]),
             f"- Parameters: {len(self.values.raws)} read, {len(self.values.absent)} not",
         ]
 
@@ -103,7 +103,7 @@ class _Report:
             "## Settings changed from the factory",
             "",
             f"The factory settings of {known} parameters are known; ? marks those that no document"
-            " of this family tells. Before: the first old value in the journal.",
+            " of this family states. Before: the first old value in the journal.",
             "",
             *_table(("code", "name", "factory", "now", "before"), rows),
         ]
@@ -222,7 +222,7 @@ class _Report:
             for one in trips_of(self.trips)[-ENTRIES_SHOWN:]
         ]
         head = ("tripped at", "seen since", "fault", "name", "reset seen at")
-        return ["## Trips seen from here", "", *_table(head, rows)] if rows else []
+        return ["## Trips seen by Drive Panel", "", *_table(head, rows)] if rows else []
 
     def journal(self) -> list[str]:
         """Return the writes to this drive from this computer."""
@@ -231,7 +231,7 @@ class _Report:
         rows = [(_when(e.time, self.zone), e.code, e.old, e.new, e.answer, e.why) for e in last]
         head = ("time", "code", "old", "new", "answer", "why")
         earlier = [f"{left} earlier ones are in the journal.", ""] if left else []
-        return ["## Written from here", "", *earlier, *_table(head, rows)]
+        return ["## Writes by Drive Panel", "", *earlier, *_table(head, rows)]
 
     def text(self, code: str) -> str:
         """A parameter's value as a person reads it."""

@@ -49,7 +49,7 @@ class LineTiming:
         """Refuse a format or a baud that no serial port has."""
         if not _FORMAT.fullmatch(self.format):
             raise SimulatorError(
-                f"{self.format!r} is no character format; write it like 8E1, 8O1, 8N1 or 8N2."
+                f"{self.format!r} is not a character format; write it like 8E1, 8O1, 8N1 or 8N2."
             )
         if self.baud < 1:
             raise SimulatorError(f"A line of {self.baud} baud carries nothing; 19200 is usual.")

@@ -31,7 +31,7 @@ class OverheardRequest(NamedTuple):
         if self.function in WRITES:
             return f"write of {WRITES[self.function]} {self.register}{several}"
         if self.function in (IDENTIFY, REPORT_ID):
-            return f"who it is (function {self.function})"
+            return f"its identity (function {self.function})"
         return f"function {self.function}"
 
 

@@ -165,7 +165,10 @@ class TcpGateway:
                 head = await reader.take(HEADER.size)
                 transaction, protocol, length, unit = HEADER.unpack(head)
                 if protocol != 0 or not 2 <= length <= LONGEST_PDU + 1:
-                    log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
+                    log.warning(
+                        "%s sends bytes that are not Modbus TCP; its connection is closed",
+                        client.peer,
+                    )
                     return
                 pdu = await reader.take(length - 1)
                 talk.requested = asyncio.get_running_loop().time()

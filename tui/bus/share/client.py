@@ -50,7 +50,7 @@ log = logging.getLogger(__name__)
 
 LEAVE_WITHIN = 1.0
 """Seconds that a program which leaves waits for the port to be closed."""
-STOP_UNHEARD = ("a stop while nobody owned the line", "a stop while this program stood still")
+STOP_UNHEARD = ("a stop while the line had no owner", "a stop while this program stood still")
 STOOD_STILL = "This program stood still and was taken for gone: it commands nothing any more."
 
 

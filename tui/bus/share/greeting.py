@@ -255,7 +255,7 @@ class Listening:
     def _renew_lock(self) -> None:
         with suppress(OSError):
             if self._lock.renew() and self._path is not None:
-                log.error("the lock of the line was taken away, and is made anew")
+                log.error("the lock of the line was removed, and is made again")
                 self._tell()
 
     def _tell(self) -> None:

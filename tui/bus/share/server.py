@@ -158,7 +158,7 @@ class ShareServer:
         ids = [one.id for one in facts.programs]
         if unheard := facts.stops.learn_greeting(client.program.id, message.stops, ids):
             # given while nobody owned the line
-            self._hear_stops(unheard, "a stop while nobody owned the line", client.program)
+            self._hear_stops(unheard, "a stop while the line had no owner", client.program)
         self._holder.moved(arrived=True)
         self._tell_facts()
         self._tell_line(client)

@@ -215,7 +215,7 @@ def port_error(
     if number in DENIED:
         return PortRefused(path, _who_may(path))
     if _is_no_port(path):
-        return PortRefused(path, "it is no serial port. `drivepanel ports` lists those.")
+        return PortRefused(path, "it is not a serial port. `drivepanel ports` lists those.")
     if number is None or number == errno.EINVAL:
         return PortRefused(path, f"it does not take {baud} baud {format_}.")
     return PortRefused(path, f"{os.strerror(number)}.")
@@ -229,7 +229,7 @@ def _who_may(path: str) -> str:
     user, group = seen.user, seen.group
     if not group:
         return (
-            f"{user} may not use it, and no group of users may. `drivepanel why {path}` tells what"
+            f"{user} may not use it, and no group of users may. `drivepanel why {path}` shows what"
             " to do."
         )
     if seen.in_group:

@@ -214,7 +214,7 @@ def _cut_short(sent: dict[str, bool]) -> str:
     held = ", ".join(slot for slot, taken in sent.items() if taken) or "none"
     open_yet = ", ".join(slot for slot, taken in sent.items() if not taken)
     rest = f" {open_yet} may have been written too: look at it." if open_yet else ""
-    return f"Slots written and read back: {held}.{rest}"
+    return f"Slots written and verified: {held}.{rest}"
 
 
 def _judged(

@@ -160,7 +160,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     await _until(lambda: work.outcome is not before or not work.busy_for(commander))
     outcome = work.outcome if work.outcome is not before else None
     if outcome is None:
-        raise Failure("The command was not sent: a newer one took its place.", REFUSED_HERE)
+        raise Failure("Not sent: superseded by a newer command.", REFUSED_HERE)
     if outcome.kind is OutcomeKind.REFUSED:
         raise Failure(outcome.text + _way_on(outcome.error), _status(outcome.error))
     return outcome

@@ -224,7 +224,8 @@ async def _restore(
             messages.tell(await save_to_eeprom(session, journal, permit))
         say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
-        messages.tell(f"{written} written and read back, {len(done.left)} not.")
+        done_text = f"Wrote {written}, all verified" if written else "Nothing written"
+        messages.tell(f"{done_text}; {len(done.left)} not written.")
         if done.unseen:
             messages.complain(f"Not all of it was seen again: {done.unseen}")
         if not done.complete:

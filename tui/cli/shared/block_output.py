@@ -18,7 +18,8 @@ HEADINGS = ("Slot", "Mapped to", "Name", "Number", "Wire address", "Brings", "Di
 COLUMNS_LEFT_OUT = ("Wire address", "Number", "Name")
 """Columns that a narrow terminal goes without, in this order."""
 AFTER_RESET = (
-    "What counts since the last reset cannot be read: it is told by comparison with direct reads."
+    "The mapping in force since the last reset cannot be read."
+    " Comparison with direct reads shows it."
 )
 
 

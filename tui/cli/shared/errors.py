@@ -176,7 +176,7 @@ def reported(command: Callable[P, R]) -> Callable[P, R]:
                 from tui.session.logs import log_file
 
                 raise Failure(
-                    f"An error of drivepanel itself: {type(error).__name__}: {error}\n"
+                    f"Internal error: {type(error).__name__}: {error}\n"
                     f"The details are in {log_file()}.",
                     OWN_ERROR,
                 ) from error

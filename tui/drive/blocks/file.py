@@ -82,7 +82,7 @@ def _assignment(
 ) -> Assignment:
     for slot in table:
         if slot not in block.slots:
-            text = f"{slot!r} is no slot of {block.name.lower()}: {', '.join(block.slots)}."
+            text = f"{slot!r} is not a slot of {block.name.lower()}: {', '.join(block.slots)}."
             raise _fault(file, lines, block.id, slot, text)
     missing = [slot for slot in block.slots if slot not in table]
     if missing:
@@ -104,7 +104,7 @@ def _raw(profile: Profile, block: Block, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise MappingError(f"{value!r} is neither a code nor a number.")
     if not 0 <= value <= 0xFFFF:
-        raise MappingError(f"{value} is no word: 0 to 65535.")
+        raise MappingError(f"{value} is not a word. Use 0 to 65535.")
     if (
         value != UNUSED
         and block.selects_by == "choice"
@@ -122,7 +122,7 @@ def _check_head(
 ) -> None:
     head = tables.get(HEAD)
     if not isinstance(head, dict) or "format" not in head:
-        raise MappingError(f"{file}:1: this is no assignment: [{HEAD}] with format is missing.")
+        raise MappingError(f"{file}:1: not an assignment: [{HEAD}] with format is missing.")
     if head["format"] != BLOCK_FILE_FORMAT:
         text = f"this assignment has format {head['format']};"
         text += f" this panel reads format {BLOCK_FILE_FORMAT}."
@@ -147,14 +147,14 @@ def _check_end(
             f"{file}:{last}: the file is cut short: its [{END_OF_BLOCKS}] is missing."
         )
     if end.get("slots") != count:
-        reported = f"[{END_OF_BLOCKS}] tells {end.get('slots')} slots, the file has {count}."
+        reported = f"[{END_OF_BLOCKS}] states {end.get('slots')} slots, the file has {count}."
         raise _fault(file, lines, END_OF_BLOCKS, "slots", reported)
 
 
 def _syntax(text: str, file: str, error: Exception) -> MappingError:
     match = _AT.search(str(error))
     line = int(match[1]) if match and match[1] else text.count("\n") + 1
-    return MappingError(f"{file}:{line}: this is no assignment: {_AT.sub('', str(error)).strip()}.")
+    return MappingError(f"{file}:{line}: not an assignment: {_AT.sub('', str(error)).strip()}.")
 
 
 def _fault(

@@ -36,7 +36,7 @@ def assignment_problems(
         found += _slot_problems(profile, plan.block, slot, raw, unreadable)
         if raw in seen:
             name = describe(profile, plan.block, raw)
-            text = f"{slot}: {name} stands in {seen[raw]} already."
+            text = f"{slot}: {name} is already in {seen[raw]}."
             found.append(Problem(slot, text, _writes_block(plan.block)))
         seen.setdefault(raw, slot)
     return found + _shape_problems(plan)
@@ -85,7 +85,7 @@ def _shape_problems(plan: Assignment) -> list[Problem]:
         )
         found.append(Problem(holes[0], text))
     elif holes:
-        text = f"{holes[0]} is unused: what stands behind it is not read through the block here."
+        text = f"{holes[0]} is unused: slots after it are not read through the block here."
         found.append(Problem(holes[0], text, refuses=False))
     if length < block.min_words:
         done = "written" if _writes_block(block) else "read"
@@ -105,11 +105,11 @@ def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
     if parameter.address == UNUSED:
         return f"{code} has the address 0, which is that of an unused slot."
     if block.direction == "read" and parameter.access == "w":
-        return f"{code} can only be written; it cannot stand in {block.name.lower()}."
+        return f"{code} can only be written; it cannot be in {block.name.lower()}."
     if block.direction == "write" and parameter.access == "r":
-        return f"{code} can only be read; it cannot stand in {block.name.lower()}."
+        return f"{code} can only be read; it cannot be in {block.name.lower()}."
     if block.direction == "write" and parameter.forbidden:
-        return f"{code} is not written from here: {parameter.forbidden}"
+        return f"{code} is never written by Drive Panel: {parameter.forbidden}"
     own = {c for b in profile.data.blocks for c in (*b.slots, *b.values)}
     if block.selects_by == "address" and code in own:
         return f"{code} belongs to the scanner itself."

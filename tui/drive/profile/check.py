@@ -38,7 +38,7 @@ def checked_data(path: Path, packaged: Path) -> ProfileData:
     if faults or data is None:
         lines = [str(fault) for fault in faults[:TOLD]]
         if len(faults) > TOLD:
-            lines.append(f"... and {len(faults) - TOLD} more faults; profiles --check tells all.")
+            lines.append(f"... and {len(faults) - TOLD} more faults; profiles --check lists all.")
         raise ProfileError("\n".join(lines))
     return data
 

@@ -39,7 +39,7 @@ def new_profile_text(
     if rows is not None:
         text = f"{_until_rows(text)}\n" + "\n".join(_row_text(row) for row in rows)
     return _PREFIXES.sub(
-        '# beginnings of the reference that the drive tells, such as ["NEW12"]\n'
+        '# beginnings of the reference that the drive reports, such as ["NEW12"]\n'
         "reference_prefixes = []",
         text,
         count=1,

@@ -127,7 +127,7 @@ def parsed(source: SourceText) -> dict[str, Any]:
 def _shared_file(own: SourceText, path: Path, packaged: Path, name: object) -> Path:
     place = f"{own.file}:{own.lines.get(('profile', 'rows_from'), 1)}"
     if not isinstance(name, str) or PurePosixPath(name).is_absolute() or ".." in Path(name).parts:
-        raise ProfileError(f"{place}: rows_from: {name!r} is no file beside the profile.")
+        raise ProfileError(f"{place}: rows_from: {name!r} is not a file beside the profile.")
     for folder in (path.parent, packaged):
         if (found := folder / name).is_file():
             return found

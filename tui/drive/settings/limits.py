@@ -100,7 +100,7 @@ def _past_multiples(
         held = shown(profile, parameter, after[code], after).display
         reported = f"{code} = {held} would be {side} {limit:f} {parameter.unit}".rstrip()
         sure = limits_are_sure(parameter)
-        doubt = "" if sure else ", a limit that no document of this family tells"
+        doubt = "" if sure else ", a limit that no document of this family states"
         yield code if code in edits else of.parameter, f"{reported} ({formula_of(of)}{doubt})."
 
 

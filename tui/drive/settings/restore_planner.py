@@ -209,7 +209,7 @@ class _Planner:
         if self.same_rating is False and not options.rating and rated(parameter):
             return "rating", "it belongs to another rating or model"
         if code not in self.held.raws:
-            return "absent", self.held.absent.get(code, "this drive does not tell it")
+            return "absent", self.held.absent.get(code, "this drive does not report it")
         return None
 
     def settle(self) -> None:

@@ -46,7 +46,9 @@ def write_file(
     data = content.encode("utf-8") if isinstance(content, str) else content
     mode = PRIVATE_FILE_MODE if private else USUAL_FILE_MODE
     if not force and path.exists():
-        raise FileThere(f"{path} is there already. Use another name, or --force to replace it.")
+        raise FileThere(
+            f"{path} already exists. Choose another name, or use --force to replace it."
+        )
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
@@ -72,7 +74,7 @@ def _put(part: Path, path: Path, *, force: bool) -> None:
         os.link(part, path)
     except FileExistsError as error:
         raise FileThere(
-            f"{path} is there already. Use another name, or --force to replace it."
+            f"{path} already exists. Choose another name, or use --force to replace it."
         ) from error
     except (OSError, NotImplementedError):
         # a file system without links; the name was free when it was looked at

@@ -89,7 +89,7 @@ def _tables(text: str, fault: _Fault) -> dict[str, Any]:
         line = int(match[1]) if match and match[1] else text.count("\n") + 1
         what = _AT.sub("", str(error)).strip()
         cut = " The file seems to be cut short here." if at_end else ""
-        raise fault(line, f"this is no parameter set: {what}.{cut}") from error
+        raise fault(line, f"not a parameter set: {what}.{cut}") from error
 
 
 def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def _head(tables: Mapping[str, Any], text: str, fault: _Fault) -> SetHead:
     line = _line_of(text, SET_HEADER)
     if "format" not in head or not isinstance(head.get("profile"), str):
         raise fault(
-            line, f"this is no parameter set: [{SET_HEADER}] with format and profile is missing."
+            line, f"not a parameter set: [{SET_HEADER}] with format and profile is missing."
         )
     if head["format"] != SET_FORMAT:
         raise fault(
@@ -133,7 +133,7 @@ def _check_whole(tables: Mapping[str, Any], text: str, count: int, fault: _Fault
         if reported != count:
             raise fault(
                 _line_of(text, name),
-                f"[{name}] tells of {reported} parameters, and {count} are here. If lines were"
+                f"[{name}] states {reported} parameters, and {count} are here. If lines were"
                 " taken"
                 f" out on purpose, write parameters = {count} in [{SET_HEADER}] and in"
                 f" [{END_OF_SET}].",
@@ -150,11 +150,11 @@ def _entries(tables: Mapping[str, Any], text: str, fault: _Fault) -> list[_Entry
     found: dict[str, _Entry] = {}
     for group, members in _table(tables, "parameters").items():
         if not isinstance(members, dict):
-            raise fault(1, f"parameters.{group} is no table of parameters.")
+            raise fault(1, f"parameters.{group} is not a table of parameters.")
         for code, fields in members.items():
             line = lines.get((group, code), 1)
             if code in found:
-                raise fault(line, f"{code} stands in line {found[code].line} already.")
+                raise fault(line, f"{code} is already in line {found[code].line}.")
             found[code] = _entry(code, line, fields, fault)
     return list(found.values())
 
@@ -188,10 +188,10 @@ def _unquoted(key: str) -> str:
 def _entry(code: str, line: int, fields: Any, fault: _Fault) -> _Entry:
     example = f'{code} = {{ raw = 30, value = "3.0 s" }}'
     if not isinstance(fields, dict):
-        raise fault(line, f"{code} is no parameter; write it like {example}.")
+        raise fault(line, f"{code} is not a parameter; write it like {example}.")
     strange = sorted(set(fields) - _FIELDS)
     if strange:
-        raise fault(line, f"{code}: {strange[0]!r} is no field here; write it like {example}.")
+        raise fault(line, f"{code}: {strange[0]!r} is not a field here; write it like {example}.")
     raw, value = fields.get("raw"), fields.get("value")
     if raw is not None and (not isinstance(raw, int) or isinstance(raw, bool)):
         raise fault(line, f"{code}: raw must be a whole number, not {raw!r}.")

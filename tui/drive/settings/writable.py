@@ -94,7 +94,9 @@ def write_refusal(
     """
     code = parameter.code
     if parameter.forbidden:
-        return Refusal("forbidden", f"{code} is not written from here: {parameter.forbidden}")
+        return Refusal(
+            "forbidden", f"{code} is never written by Drive Panel: {parameter.forbidden}"
+        )
     if parameter.access == "r":
         return Refusal("read-only", f"{code} can only be read.")
     if is_order(profile, parameter):
@@ -170,8 +172,9 @@ def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
     if not any(r.never_set and r.raw == raw for r in watch.reactions):
         return ""
     return (
-        f"{parameter.code} = {raw} is not written from here: a motor would run on when the line is"
-        " lost, and nobody would know. Set it at the keypad, if it must be."
+        f"{parameter.code} = {raw} is never written by Drive Panel: a motor would run on when the"
+        " line is"
+        " lost, unnoticed. If it must be set, use the keypad."
     )
 
 

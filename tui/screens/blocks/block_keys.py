@@ -69,7 +69,7 @@ class BlockKeys(ArmingKeys):
 
             question = "Write through the outputs?"
             work = partial(block_editor.exchange, agreed)
-            self._ask(question, agreed.follows, "writes, read back", "writes nothing", work)
+            self._ask(question, agreed.follows, "write, read back", "write nothing", work)
 
         requested = Ask(
             "Write through the outputs", wrong, about=about, takes="goes on to a question"

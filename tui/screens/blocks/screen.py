@@ -233,7 +233,7 @@ class BlocksScreen(BlockKeys):
         if not self._require_armed():
             return
 
-        yes, no = "writes, each slot read back", "writes nothing"
+        yes, no = "write, each slot read back", "write nothing"
         slots = "1 slot" if proposals.count == 1 else f"{proposals.count} slots"
         self._ask(
             f"Write {slots}?",

@@ -193,7 +193,7 @@ def _force_text(slot: Slot) -> str:
     if slot.force is Force.PENDING:
         brings = f"; until then it brings {slot.brings}" if slot.brings else ""
         return f"Pending: it counts after the drive's next reset or switch-on{brings}."
-    return "Configured; whether it counts already cannot be read nor told by values of now."
+    return "Configured. Whether it is in force cannot be read, nor seen from the present values."
 
 
 def cost_lines(

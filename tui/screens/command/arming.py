@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ..dialogs.confirm import Confirm
     from ..dialogs.now import MotorsNow
 
-NOT_ARMED = "Not armed: a arms this drive."
-ARMED_AFTER_ALL = "Armed now; each key makes it a minute again."
+NOT_ARMED = "Not armed. Press a to arm this drive."
+ARMED_AFTER_ALL = "Armed for 60 s. Each key press restarts the 60 s."
 """Replaces the message that it is not, which would then be untrue."""
 
 
@@ -136,7 +136,7 @@ class ArmingKeys(PanelScreen):
             fleet.handover.ask_for(device)
 
         self._ask(
-            f"Ask for drive {device}?",
+            f"Request drive {device}?",
             f"It is commanded by {other.text}. The question is answered there; without an answer"
             " it is a no while the motor runs.",
             "asks",
@@ -157,10 +157,10 @@ class ArmingKeys(PanelScreen):
 
         self._ask(
             f"Give drive {device} away?",
-            f"{request.program.text} asks to command it. Its motor goes on as it is; from then on"
-            " it is commanded there.",
-            "gives it",
-            "keeps it",
+            f"{request.program.text} requests it. Its motor continues unchanged; from then on"
+            " that program commands it.",
+            "give it",
+            "keep it",
             give,
             refused=lambda: fleet.handover.answer(request, yes=False),
         )

@@ -22,7 +22,7 @@ SHOWN_REFUSED = 20.0
 
 STOPS_THAT_ASK = {
     "freewheel": (
-        "Let the motor coast?",
+        "Coast to a stop?",
         "The output is switched off: nothing brakes the motor, and a hoist falls.",
         "lets it coast",
     ),
@@ -107,7 +107,7 @@ class OrderKeys(TeachKeys):
             return
         follows = f"The cause must be gone. {reset_follows(profile, raws, {})}"
         work = partial(self.commander.order, "reset")
-        question = self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
+        question = self._ask("Reset the fault?", follows, "reset it", "leave it", work)
 
         async def look_at_inputs() -> None:
             try:
@@ -128,7 +128,7 @@ class OrderKeys(TeachKeys):
                 " the drive must be locked."
             )
             work = partial(self.commander.order, "take-control")
-            self._ask("Take the control?", follows, "takes it", "leaves it", work)
+            self._ask("Take the control?", follows, "take it", "leave it", work)
 
     def action_step_reference(self, steps: int) -> None:
         """Raise or lower the reference by so many Hz; arrows that came at once are one step."""
@@ -140,11 +140,11 @@ class OrderKeys(TeachKeys):
         """Give the control back, after saying what may start then."""
         if self._require_armed():
             follows = (
-                "This is no stop. Command and reference go back to the terminals or the keypad:"
-                " a run command that waits there starts the motor."
+                "This does not stop the motor. Command and reference go back to the terminals or"
+                " the keypad: a run command active there starts it."
             )
             work = partial(self.commander.order, "hand-back")
-            self._ask("Give the control back?", follows, "gives it back", "keeps it", work)
+            self._ask("Give the control back?", follows, "give it back", "keep it", work)
 
     def action_stop_as(self, id: OrderId) -> None:
         """Stop the drive in another way than on its ramp; needs no arming."""
@@ -156,11 +156,11 @@ class OrderKeys(TeachKeys):
         charts = self.session.profile.data.charts
         if not any(order.id == id for chart in charts for order in chart.orders):
             name = {"freewheel": "let the motor coast", "dc-braking": "brake by direct current"}
-            self._refuse(f"{self.session.profile.name} cannot be told to {name[id]} from here.")
+            self._refuse(f"{self.session.profile.name} has no command to {name[id]}.")
             return
         question, follows, yes = STOPS_THAT_ASK[id]
         stop = partial(self.app.stop_drive, self.console, id)
-        self._ask(question, follows, yes, "does not", lambda _stamp: stop())
+        self._ask(question, follows, yes, "cancel", lambda _stamp: stop())
 
     def action_teach(self) -> None:
         """Choose a raw value of this screen, and say what the drive's display shows for it."""

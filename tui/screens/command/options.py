@@ -20,7 +20,7 @@ from ..dialogs.question import KeyQuestion, hint
 if TYPE_CHECKING:
     from ..dialogs.now import MotorsNow
 
-OPTION_HINT = hint(("Up, Down", "choose"), ("y", "writes it"), ("Esc or q", "writes nothing"))
+OPTION_HINT = hint(("Up, Down", "choose"), ("y", "write it"), ("Esc or q", "write nothing"))
 
 
 class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
@@ -55,7 +55,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
 
     def on_option_list_option_selected(self) -> None:
         """Enter writes nothing: say which key does."""
-        reported = Text("Enter is no answer here.   ", ALARM)
+        reported = Text("Press y or Esc.   ", ALARM)
         self.tell_keys(reported.append_text(OPTION_HINT))
 
     def action_yes(self) -> None:

@@ -89,7 +89,7 @@ class TeachKeys(ArmingKeys):
 
         follows = reference_asks(self.session.family, code)
         question = f"Give the reference by {code}?"
-        self._ask(question, follows, "gives it so", "does not", confirm, by_itself=by_itself)
+        self._ask(question, follows, "use it", "cancel", confirm, by_itself=by_itself)
 
     def ask_no_reference(self, code: str) -> None:
         """Ask whether a taught parameter shall take the reference no longer."""
@@ -102,7 +102,7 @@ class TeachKeys(ArmingKeys):
             self.run_worker(self._settle(drop))
 
         follows = "Commands to run no longer choose it. The drive keeps what it holds."
-        self._ask(f"No reference by {code} any more?", follows, "ends it", "keeps it", confirmed)
+        self._ask(f"No reference by {code} any more?", follows, "end it", "keep it", confirmed)
 
     async def _settle(self, change: Callable[[], str]) -> None:
         """Make a change that waits for the disk, and report its result."""
@@ -190,4 +190,4 @@ def _known(console: DriveConsole, code: str) -> str:
     if looks:
         seen = ", ".join(look.text for look in looks)
         return f"{now}Seen before: {seen}. Look at another value."
-    return f"{now}Two looks at different values tell what a count is."
+    return f"{now}Two readings at different values show what a count is."

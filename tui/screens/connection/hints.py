@@ -15,7 +15,7 @@ HINTS: tuple[tuple[type[Exception], str], ...] = (
     (line.LineLost, "Check cable, gateway and network; press Enter to try again."),
     (line.LineError, "Press Enter to try again, or choose another line."),
     (drive.UnknownProfile, "Clear or correct the profile, then s."),
-    (drive.ProfileError, "Mend the file; drivepanel profiles --check tells every fault."),
+    (drive.ProfileError, "Fix the file. `drivepanel profiles --check` lists all errors."),
 )
 
 

@@ -45,7 +45,7 @@ class LineKeys(Scanning):
 
         about = "\n".join(line_forms())
         dialog = Ask(
-            "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="opens it"
+            "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="open it"
         )
         self.app.push_screen(dialog, typed)
 
@@ -81,7 +81,7 @@ class LineKeys(Scanning):
         asks = here is not None or self.scanning
         always = f"{self._what_is_here()} It is closed, and {text} is opened." if asks else ""
         question = "Close the line for another?"
-        if await self.app.may_let_go(question, yes="closes it", no="keeps it", always=always):
+        if await self.app.may_let_go(question, yes="close it", no="keep it", always=always):
             # drives may have answered while that was asked
             self._open_next(text, device, beside=here is None and bool(self.found))
 
@@ -148,7 +148,7 @@ class LineKeys(Scanning):
     def _tell_open(self) -> None:
         """Enter on the line that is open looks for its drives, unless that goes on."""
         if self.scanning:
-            self.app.tell("This line is open; drives are searched for. Esc ends that.")
+            self.app.tell("This line is open and being scanned. Press Esc to end the scan.")
         else:
             self.action_scan()
 
@@ -220,7 +220,7 @@ class LineKeys(Scanning):
     @work(exclusive=True, group="line", exit_on_error=False)
     async def action_disconnect(self) -> None:
         """Close the line; where that trips a running drive, only after saying so."""
-        if not await self.app.may_let_go("Close the line?", yes="closes it", no="keeps it"):
+        if not await self.app.may_let_go("Close the line?", yes="close it", no="keep it"):
             return
         self.forget_drives()
         await self.app.disconnect()

@@ -59,7 +59,7 @@ class OtherSettings(LineKeys):
         if not answered:
             return ""
         who = addresses_text(sorted(answered))
-        return f"Something answered at {who}: what it does when it is asked no more is not known."
+        return f"Something answered at {who}: its reaction when polling stops is not known."
 
     def _port(self) -> SerialLink | None:
         """The port that is open for the panel alone; else it is said why nothing is tried."""
@@ -123,7 +123,7 @@ class OtherSettings(LineKeys):
             if setting.slow and not any(one.slow for one in settings[: number - 1]):
                 self._tell_slow((setting, *later), costs)
             self.later = costs.seconds(one for one in later if setting.slow or not one.slow)
-            self.advise(f"Drives are searched for at {far}.", "Esc ends it.")
+            self.advise(f"Scanning at {far}.", "Press Esc to end it.")
             try:
                 self.app.opening.begin(text, get_current_worker())
                 try:
@@ -161,7 +161,7 @@ class OtherSettings(LineKeys):
         answer = (
             "Drives answer"
             if self.found.keys() - self.unclear
-            else "Somebody answers, and not clearly,"
+            else "A device answers, but not clearly,"
         )
         self.say(f"{answer} at {setting}.", "The line stays there.")
         remember_line(remembered_text(text))

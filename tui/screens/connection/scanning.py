@@ -130,7 +130,7 @@ class Scanning(LineView):
             return False
         if not isinstance(link, SerialLink) or opened.line.facts.others:
             return False  # nobody else is heard there, or programs of ours are
-        self.advise("Listening for another master.", "Then drives are searched for.")
+        self.advise("Listening for another master.", "Then the line is scanned.")
         text = (await other_masters.listen_first(opened.line, other_masters.LISTEN)).text
         if text:
             self.say(text, "Nothing was sent. H listens to it; s looks again.", ALARM_KIND)
@@ -138,7 +138,9 @@ class Scanning(LineView):
 
     def tell_search(self) -> None:
         """Show the search until the first drive answers."""
-        self.advise("Drives are searched for.", "Each appears here as it answers; Esc ends it.")
+        self.advise(
+            "Scanning for drives.", "Each appears here as it answers. Press Esc to end the scan."
+        )
 
     def sum_up(self, devices: Sequence[int]) -> None:
         """Show the result of a finished search."""
@@ -149,7 +151,8 @@ class Scanning(LineView):
         if not self.found:
             self.say(
                 f"No drive answered at address {addresses_text(devices)}, asked twice.",
-                "N says why; c changes the addresses, s searches again, Ctrl+P at other baud"
+                "Press N to diagnose, c to change the addresses, s to scan again; Ctrl+P for other"
+                " baud"
                 " rates.",
                 ALARM_KIND,
             )
@@ -257,7 +260,7 @@ class Scanning(LineView):
         stopped = self.scanning
         self.end_search()
         if stopped:
-            self.say("The search is ended.", "s searches again.")
+            self.say("The scan has ended.", "Press s to scan again.")
             self.look()
 
     def end_search(self) -> None:
@@ -284,7 +287,7 @@ def _families() -> str:
     from tui.session.connect.strangers import known_profiles
 
     text = watching_text(watching_families(known_profiles()))
-    return f"{text} What is found is asked on while the line is open." if text else ""
+    return f"{text} Drives found are polled while the line is open." if text else ""
 
 
 def _named(line: str, device: int) -> str | None:

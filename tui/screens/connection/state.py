@@ -276,9 +276,9 @@ class LineView(PanelScreen):
         lost = opened.line.state.status.value == "lost"
         if lost:
             reason = f"LINE LOST: {opened.line.state.reason}"
-            self.advise(reason, "It is tried again by itself; then s searches.", ALARM_KIND)
+            self.advise(reason, "Reconnecting automatically. Then press s to scan.", ALARM_KIND)
         elif self._was_lost and self._connected():
-            self.advise("The line is there again.", "s searches for drives.")
+            self.advise("The line is back.", "Press s to scan.")
         self._was_lost = lost or (self._was_lost and not self._connected())
 
     def _connected(self) -> bool:

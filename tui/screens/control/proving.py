@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
 
 HOW_IT_IS_PROVED = (
-    "Nobody asks the drive for longer and longer, around its timeout, until it reacts: then it is"
+    "Polling pauses for longer and longer, around its timeout, until the drive reacts: then it is"
     " in a fault, which x on Monitor resets. It takes about {seconds:.0f} s."
 )
 PROOF_ON_THE_RUN = (
-    "THE MOTOR TURNS: it does what is set, and may coast; a hoist falls. A stop goes out when the"
-    " proof ends, and at any stop key. "
+    "THE MOTOR TURNS: it does what is set, and may coast; a hoist falls. A stop is sent when the"
+    " test ends, and at any stop key. "
 )
 TIMEOUTS_A_PROOF_TAKES = 4.6
 """Timeouts that a proof takes where the drive reacts as set."""
@@ -87,20 +87,20 @@ def ask_to_prove(
     ask(
         f"Prove the communication loss of drive {session.device}?",
         (PROOF_ON_THE_RUN if turning else "") + how,
-        "proves it",
-        "leaves it",
+        "test it",
+        "leave it",
         partial(work, turning=turning),
     )
 
 
 def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: bool) -> None:
     """Hand the proof to the drive's queue of work. Raises OrderRefused."""
-    session, working = console.session, "Proof of communication loss: nobody asks the drive."
+    session, working = console.session, "Communication loss test: polling is paused."
 
     async def carry_out(permit: Permit) -> str:
         def tell(text: str) -> None:
             # in the place of what is told of the work, which stands before all that was said
-            session.work.tell(OutcomeKind.WORKING, f"Proof: {text} Nobody asks the drive.")
+            session.work.tell(OutcomeKind.WORKING, f"Test: {text} Polling is paused.")
 
         prover = Prover(session, console.journal, permit, turning, tell)
         try:

@@ -170,5 +170,5 @@ class ControlSourceScreen(OrderKeys):
             )
             work = partial(self.commander.configure, self._chosen)
             name = self._chosen.name
-            self._ask(f"{name}?", follows, "writes", "leaves all as it is", work)
+            self._ask(f"{name}?", follows, "write", "change nothing", work)
         self.look()

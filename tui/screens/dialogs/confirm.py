@@ -83,5 +83,5 @@ class Confirm(KeyQuestion[bool]):
         if not self._loses:
             self.answer(True)
             return
-        reported = Text("Enter is no answer here.   ", ALARM)
+        reported = Text("Press y or Esc.   ", ALARM)
         self.tell_keys(reported.append_text(self._keys))

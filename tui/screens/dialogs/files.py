@@ -12,7 +12,7 @@ def fault_of_new(name: str) -> str:
     if not name.isprintable():
         return "A name has no control characters."
     try:
-        return f"{name} is there already." if Path(name).expanduser().exists() else ""
+        return f"{name} already exists." if Path(name).expanduser().exists() else ""
     except OSError as error:  # too long, or below a folder that may not be looked into
         return f"No file can be made there: {error.strerror or error}."
     except RuntimeError:

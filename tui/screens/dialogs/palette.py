@@ -99,10 +99,8 @@ class Palette(Question[FoundAction | None]):
         keys = [("Up, Down", "choose")] if self._found else []
         if at is not None:
             found = self._found[at]
-            keys.append(
-                ("Enter", "does it" if found.here else f"goes to {found.screen.capitalize()}")
-            )
-        self.tell_keys(hint(*keys, ("Esc", "does nothing")))
+            keys.append(("Enter", "do it" if found.here else f"go to {found.screen.capitalize()}"))
+        self.tell_keys(hint(*keys, ("Esc", "cancel")))
 
     def on_input_submitted(self) -> None:
         """Take the one that is marked; where none is, nothing is chosen."""

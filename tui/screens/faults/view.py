@@ -54,7 +54,9 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
             rule("Before the trip", width),
             Text(" No trip was seen since this drive is watched.", FAINT),
         ]
-    title = f"Before the trip: {len(record.moments)} cycles, {len(record.writes)} writes from here"
+    title = (
+        f"Before the trip: {len(record.moments)} cycles, {len(record.writes)} writes by Drive Panel"
+    )
     head = Text(f" {'s':>{FAULT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)
     for heading in record.headings[: _columns(width)]:
         head.append(f"{heading[: RECORD_VALUE_WIDTH - 1]:>{RECORD_VALUE_WIDTH}}", FAINT)

@@ -16,7 +16,7 @@ COUNTERS_EVERY, COUNTERS_SELDOM = 3.0, 10.0
 """Seconds between two looks at the drive's own counters, and on a slow link."""
 RESETS_NOTHING_ELSE = (
     "Function 8, sub-function 0A: by the manual it sets the counters of the drive's exchanges to 0"
-    " and nothing else. The motor goes on as it does. Whoever else compares them begins anew."
+    " and nothing else. The motor continues unchanged. Other programs that compare them restart."
 )
 
 
@@ -82,7 +82,7 @@ class CounterKeys(PanelScreen):
             self.app.tell(f"The drive's own counters cannot be reset: {why}.")
             return
         if not self.session.arming.armed:
-            self.app.tell("Not armed: a on Monitor arms this drive.")
+            self.app.tell("Not armed. Press a on Monitor to arm this drive.")
             return
         from ..dialogs.confirm import Confirm
         from ..dialogs.now import MotorsNow
@@ -101,7 +101,7 @@ class CounterKeys(PanelScreen):
             f"Reset the counters of drive {device}?",
             RESETS_NOTHING_ELSE,
             yes="resets them",
-            no="leaves them",
+            no="leave them",
             loses=True,
             now=MotorsNow(self.app, [self.session]),
         )

@@ -221,7 +221,7 @@ class FrameListScreen(PanelScreen):
         """Those of the filter, or of what is looked for."""
         if self._asking == "find":
             return ("Enter", "older one"), ("Esc", "ends")
-        return ("Enter", "keeps it"), ("Esc", "all frames")
+        return ("Enter", "keep it"), ("Esc", "all frames")
 
     def _end_asking(self) -> None:
         self._asking = ""

@@ -12,7 +12,7 @@ MOST_ROWS = 6
 """Rows of one sentence at most."""
 OF_A_DRIVE, HANGING = 3, 5
 """Columns before a sentence about a drive, and before the rest of it."""
-WARNINGS = ("NOT FED", "ANSWERED TWICE", "A SECOND MASTER", "no answer", "damaged", "Broken")
+WARNINGS = ("NOT POLLED", "ANSWERED TWICE", "A SECOND MASTER", "no answer", "damaged", "Broken")
 """Words of a sentence to be emphasized."""
 
 

@@ -21,7 +21,7 @@ from .table import screen_actions
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
     ("▶", "green", "the motor runs"),
-    ("□", "white", "it stands; STANDBY: the next command from here runs it"),
+    ("□", "white", "it is at standstill; STANDBY: the next command of this panel runs it"),
     ("▼", "cyan", "a stop is on its way"),
     ("■", "red", "a drive is in fault; on Line: another one than that of the strip"),
     ("?", "amber", "state not known, or (behind a name) not confirmed by a manual"),

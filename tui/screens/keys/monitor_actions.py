@@ -12,7 +12,7 @@ REFER = "Give a reference in Hz or rpm: opens a line, Enter gives it."
 OPTIONS = "Choose a ramp, preset speed, motor or output; armed, asks."
 QUICK = "Quick stop at once, where the drive has one, else its ramp stop; needs no arming."
 EMERGENCY = "Emergency stop at once, else the quick stop, else the ramp stop; needs no arming."
-COAST = "Let the motor coast; asks, needs no arming. A coasting hoist falls."
+COAST = "Coast to a stop; asks first, needs no arming. A hoist load falls."
 BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
 TAKE = "Take the control from the terminals, where a drive has that; armed, locked only, asks."
 HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
@@ -70,5 +70,5 @@ WATCH_ACTIONS = on(
     ("leave", "escape", "", "Go back to Line."),
     ("change_rate(1)", "", "", "Poll twice as fast."),
     ("change_rate(-1)", "", "", "Poll half as fast."),
-    ("rating", "", "", "Tell the rated current of a drive that gives its current in %."),
+    ("rating", "", "", "Enter the rated current of a drive that gives its current in %."),
 )

@@ -26,7 +26,7 @@ PARAMETER_ACTIONS = on(
     ("group(-1)", "shift+tab,left", "", "The group before."),
     ("step_value(-1)", "-", "", "Stage one step less."),
     ("undo_this", "delete", "", "Take the edit under the cursor back."),
-    ("favourite", "*", "", "Mark as a favourite, or no more."),
+    ("favorite", "*", "", "Mark or unmark as a favorite."),
     ("confirm", "y", "", KEEP),
     ("stage_set", "i", "", "Stage what the file compared with has otherwise."),
     ("report", "", "", "Write a report on this drive (Markdown)."),

@@ -34,7 +34,7 @@ from .parameter_actions import PARAMETER_ACTIONS
 
 app_action = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
-STOP = "Stop the drive on its ramp, wherever a space is no text; without an open drive, all."
+STOP = "Stop the drive on its ramp, except while typing text; without an open drive, stop all."
 STOP_ANYWHERE = "Stop the drive on its ramp, also while text is typed."
 STOP_ALL = "Stop every drive of the line on its ramp, from any screen."
 ARM = "Arm this drive for a minute, or for a minute more."
@@ -60,7 +60,7 @@ OPEN = "Open a file: compare with it and stage what it has otherwise, or propose
 FIND = "Find a parameter by code, name, address or value, from anywhere."
 WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
 SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks."
-WHY = "Why no answer? Tell what fails at a drive that is silent, and what to look at next."
+WHY = "Why no answer? Diagnose a silent drive, and show the next step."
 HEAR = "Listen to a line on which another master asks; the panel sends nothing there, asks."
 ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
 BUNDLE = "Bundle for a colleague: all about the line in one file."
@@ -115,7 +115,7 @@ ACTIONS: tuple[Action, ...] = (
     *WATCH_ACTIONS,
     *on(
         (FRAMES, LISTENING),
-        ("hold", "h", "hold", "Hold the list still, or let it run."),
+        ("hold", "h", "hold", "Pause or resume the list."),
         ("other_page", "tab", "page", "Codes and values, bytes, or what was counted."),
         ("only", "O", "only", "Only some frames: 2 read error; of a drive, a function, errors."),
         ("find_frame", "j", "", "Find frames by drive, function, error, or what they say."),
@@ -128,9 +128,9 @@ ACTIONS: tuple[Action, ...] = (
         (FRAMES,),
         ("reset_counters", "C", "", "Count from now on; what others see stays."),
         ("reset_drive_counters", "Z", "", "Set the drive's own counters to 0; armed, asks."),
-        ("leave", "escape", "back", "Out of the filter, then back to Monitor."),
+        ("leave", "escape", "back", "Clear the filter, then return to Monitor."),
     ),
-    *on((LISTENING,), ("leave", "escape", "end", "Out of the filter, then end listening.")),
+    *on((LISTENING,), ("leave", "escape", "end", "Clear the filter, then end listening.")),
     *on(
         (MESSAGES,),
         ("scroll(-1)", "up", "", "Newer messages."),
@@ -165,7 +165,7 @@ ACTIONS: tuple[Action, ...] = (
     app_action("help", "?,f1", "help", "Show every key."),
     app_action("bundle", "", "", BUNDLE),
     app_action("accept_line", "", "", ACCEPT),
-    app_action("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
+    app_action("redraw", "ctrl+l", "", "Draw the screen again if it is garbled."),
     app_action("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),
 )
 

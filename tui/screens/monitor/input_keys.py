@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from .run_keys import RunKeys
 
-NOT_SIMULATED = "Inputs are set at the terminals; from here only those of a simulated drive."
-LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analogue 5V, 12mA, 50%."
+NOT_SIMULATED = "Inputs are set at the terminals; this panel sets only those of a simulated drive."
+LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analog 5V, 12mA, 50%."
 
 
 class InputKeys(RunKeys):

@@ -244,6 +244,6 @@ def fault_of_rating(text: str) -> str:
     try:
         number = Decimal(text.strip().replace(",", "."))
     except InvalidOperation:
-        return f"{text!r} is no number. Write it like 9.1."
+        return f"{text!r} is not a number. Write it like 9.1."
     fits = number.is_finite() and 0 < number < 10000
     return "" if fits else "A rated current is between 0 and 10 000 A."

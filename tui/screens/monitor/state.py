@@ -111,13 +111,13 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
     hindrance = view.control.hindrance
     if view.stands_by and hindrance is None:
         if why := "read-only: runs nothing" if view.read_only else view.control.barred:
-            return Text("stands by", STRONG), [Text(line, FAINT) for line in wrapped(why, width, 2)]
+            return Text("standby", STRONG), [Text(line, FAINT) for line in wrapped(why, width, 2)]
         armed = view.control.armed_for is not None
         return Text("r runs it" if armed else "a arms, r runs", STRONG), []
     if hindrance is None:
         return Text(state.headline, STRONG), []
     if hindrance.by_channel:
-        return Text("no command from here", STRONG), []
+        return Text("no command given", STRONG), []
     return Text("not ready", STRONG), [
         Text(line, PLAIN) for line in wrapped(hindrance.text, width, 2)
     ]

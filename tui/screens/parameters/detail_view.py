@@ -159,7 +159,9 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
     if code in editor.staging.changed_elsewhere:
         before = text_of(editor, parameter, editor.staging.changed_elsewhere[code])
-        message = f"Changed by somebody else: it was {before}. Delete drops your edit, y keeps it."
+        message = (
+            f"Changed by another program: it was {before}. Delete drops your edit, y keeps it."
+        )
         return Text(message, ALARM)
     if result is not None and not result.done:
         return Text(result.text, ALARM)

@@ -50,7 +50,7 @@ class Results(KeyQuestion[bool | None]):
             yield Plain(results_head(self._applied), id="question")
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
-            keys = [("Enter or Esc", "closes")]
+            keys = [("Enter or Esc", "close")]
             if self._applied.unsaved:
                 keys.append(("S", "saves to EEPROM, asks"))
             if self._applied.written and not self._staged:
@@ -79,11 +79,11 @@ class RestQuestion(KeyQuestion[bool]):
         one = count == 1
         with Vertical(id="dialog"):
             rest = "parameter" if one else f"{count} parameters"
-            yield Plain(f"Write the other {rest} all the same?", id="question")
+            yield Plain(f"Write the other {rest} anyway?", id="question")
             yield from self.now_lines()
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
-            keys = (("y", "writes it" if one else "writes them"), ("Esc or q", "writes no more"))
+            keys = (("y", "write it" if one else "write them"), ("Esc or q", "write no more"))
             yield Plain(hint(*keys), id="hint")
 
     def action_yes(self) -> None:
@@ -94,7 +94,7 @@ class RestQuestion(KeyQuestion[bool]):
 def results_head(applied: Applied) -> str:
     """Return how many were written, and how many were not."""
     done, failed = len(applied.written), len(applied.results) - len(applied.written)
-    head = f"{done} written and read back" if done else "Nothing written"
+    head = f"Wrote {done}, all verified" if done else "Nothing written"
     return f"{head}; {failed} not written, still staged" if failed else head
 
 

@@ -52,7 +52,7 @@ class SetKeys(ParameterKeys):
 
         about = (
             "Identity, line, changed settings, control source, reaction to a lost line, faults and"
-            " what was written from here (Markdown)."
+            " writes by Drive Panel (Markdown)."
         )
         self._ask_for_file("Report to", "md", about, text, [])
 
@@ -98,7 +98,7 @@ class SetKeys(ParameterKeys):
             self._refuse(f"No file: {error}")
         else:
             bad = len(upload.absent)
-            without = f"; {bad} the drive does not tell" if bad else ""
+            without = f"; {bad} the drive does not report" if bad else ""
             self.note(f"Saved: {len(upload.raws)} parameters{without}, in {path}")
         finally:
             self._tell_reading("")

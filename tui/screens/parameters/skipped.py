@@ -18,7 +18,7 @@ from tui.widgets.plain import Plain
 
 from ..dialogs.question import KeyQuestion, hint
 
-SKIPPED_KEYS = hint(("Enter or Esc", "closes"), ("Up, Down", "scroll"))
+SKIPPED_KEYS = hint(("Enter or Esc", "close"), ("Up, Down", "scroll"))
 
 
 class Skipped(KeyQuestion[None]):

@@ -90,7 +90,7 @@ class StageKeys(ParameterKeys):
         if waits := [e.code for e in self.editor.staging.edits if self._waits_for_rest(e.code)]:
             which = ", ".join(waits) if len(waits) <= WAITING_NAMED else f"{len(waits)} of them"
             wait = "waits" if len(waits) == 1 else "wait"
-            self.note(f"{text} {which} {wait} until the motor stands.")
+            self.note(f"{text} {which} {wait} until the motor is at standstill.")
             return
         them = "it" if count == 1 else "both" if count == 2 else f"all {count}"
         running = self.editor.state == "running" and not self.session.arming.hindrance
@@ -187,16 +187,16 @@ class StageKeys(ParameterKeys):
             "Undo all edits?",
             follows,
             yes="drops them",
-            no="keeps them",
+            no="keep them",
             loses=True,
             now=self.motor_now(),
         )
         self.app.push_screen(requested, reported)
 
-    def action_favourite(self) -> None:
+    def action_favorite(self) -> None:
         """Mark or unmark the parameter."""
         if self.listed.code:
-            self.editor.toggle_favourite(self.listed.code)
+            self.editor.toggle_favorite(self.listed.code)
             self.look()
 
 

@@ -33,7 +33,7 @@ class WriteKeys(ParameterKeys):
 
         many = f"{len(edits)} parameters" if len(edits) > 1 else "1 parameter"
         yes = "writes it, read back" if len(edits) == 1 else "writes, each read back"
-        no = "writes nothing"
+        no = "write nothing"
         self._ask(f"Write {only or many}?", write_text(self.editor, edits), yes, no, work)
 
     def action_write_one(self) -> None:
@@ -64,7 +64,7 @@ class WriteKeys(ParameterKeys):
             self._refuse(str(refused))
             return
         if self._require_armed():
-            self._ask(question, order.does, "does it", "leaves all as it is", work)
+            self._ask(question, order.does, "do it", "change nothing", work)
 
     def show_results(self) -> None:
         """Report once the result of each edit; where one failed, ask before the rest."""

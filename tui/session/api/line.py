@@ -81,7 +81,7 @@ class DriveLine:
             if identity.profile is None:
                 fits = ", ".join(identity.candidates) or "any"
                 raise DriveError(
-                    f"Device {address} does not say who it is; name its profile: {fits}."
+                    f"Device {address} does not identify itself; name its profile: {fits}."
                 )
             found = library.load(identity.profile)
         else:

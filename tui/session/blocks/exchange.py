@@ -63,8 +63,8 @@ async def exchange(
         raise AssignmentRefused(f"{why} Nothing was written.")
     if outputs.block.effective == "after-reset" and not in_force:
         raise AssignmentRefused(
-            f"What {outputs.block.name.lower()} is mapped to since the last reset cannot be read,"
-            " and nobody has confirmed it: nothing is written."
+            f"The mapping of {outputs.block.name.lower()} since the last reset cannot be read,"
+            " and no person has confirmed it: nothing is written."
         )
     retrying = RetryingReader(session)
     checks = ExchangeChecks(session, retrying, outputs, inputs, wanted)

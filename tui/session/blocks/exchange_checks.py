@@ -75,7 +75,7 @@ class ExchangeChecks:
         raws = self.session.image.raws
         found = chart_in_force(profile, raws)
         if found is None or not found.orders:
-            raise AssignmentRefused("This drive is not commanded from here.")
+            raise AssignmentRefused("Drive Panel does not command this drive.")
         if (held := held_back(profile, found, "forward", raws)) is not None:
             raise AssignmentRefused(f"{held.text} {held.remedy}".strip())
 
@@ -98,7 +98,7 @@ class ExchangeChecks:
             changed = [slot for slot, raw in plan.slots.items() if held.get(slot) != raw]
             if not changed:
                 continue
-            text = f"{', '.join(changed)} of {block.name.lower()} were changed by somebody else"
+            text = f"{', '.join(changed)} of {block.name.lower()} were changed by another program"
             if when == "before":
                 raise AssignmentRefused(f"{text}: nothing was written. Look at them first.")
             if plan is self.inputs:

@@ -171,7 +171,7 @@ class _Writing:
     def _changed(self, slot: str, old: int | None, now: int) -> AssignmentRefused:
         profile, block = self.session.profile, self.plan.block
         was, is_now = describe(profile, block, old), describe(profile, block, now)
-        text = f"{slot} was changed meanwhile by somebody else: {was} is now {is_now}."
+        text = f"{slot} was changed in the meantime by another program: {was} is now {is_now}."
         return AssignmentRefused(self.so_far(f"{text} Look at it, then write again."))
 
     def so_far(self, text: str, *, sent: str = "") -> str:

@@ -78,7 +78,7 @@ class CommandAccess:
         found = chart_in_force(session.profile, self.raws)
         if found is None or not found.orders:
             name = found.name if found else "what decides about its commands was not read"
-            raise OrderRefused(f"This drive is not commanded from here: {name}.")
+            raise OrderRefused(f"Drive Panel does not command this drive: {name}.")
         held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
         if held is not None:
             raise OrderRefused(block_reason_text(held))

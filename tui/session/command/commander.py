@@ -146,7 +146,7 @@ class Commander:
                 raise NothingToTakeOver("Starts of motors are not put on record here.")
             await asyncio.to_thread(session.starts.take_over, session)
             session.note_command()
-            return "Taken over: leaving asks what becomes of the motor."
+            return "Taken over. On leaving you are asked what happens to the motor."
 
         self._begin(work, stamp)
 

@@ -55,7 +55,7 @@ def without_effect(access: CommandAccess) -> str:
     found = reference_channel(access.session.profile, access.raws)
     if found is None or found.by_line is not False:
         return ""
-    return f"; no effect from here: the reference comes from {found.text}"
+    return f"; no effect: the reference comes from {found.text}"
 
 
 @dataclass(slots=True)

@@ -282,11 +282,11 @@ class MotorStop:
         state = self.session.state(STATE_FRESH)
         who = "from its terminals or keypad" if state.local else state.channel
         if hertz == 0:
-            by = who or "from elsewhere"
-            return f"it stands at 0 Hz and is still enabled {by}: a reference turns it at once."
+            by = who or "by another source"
+            return f"it is at 0 Hz and still enabled {by}: a reference turns it at once."
         if why := run_by_others(self.session):
             return why
-        return f"it answers and runs on; it is commanded {who or 'from elsewhere'}."
+        return f"it answers and runs on; it is commanded {who or 'by another source'}."
 
     async def _motion(self, chart: Chart) -> tuple[str, float | None]:
         """The kind of state and the output frequency in Hz, read now."""

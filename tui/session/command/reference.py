@@ -145,7 +145,7 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Readin
     """
     match = _TYPED.fullmatch(text.strip())
     if match is None:
-        raise ValueRefused(f"{text!r} is no reference. Write it like 30, 30.5Hz or 900rpm.")
+        raise ValueRefused(f"{text!r} is not a reference. Write it like 30, 30.5Hz or 900rpm.")
     typed, unit = Decimal(match[1].replace(",", ".")), spelled((match[2] or "").strip())
     known = ReferenceUnits(profile, readings)
     if not reference_parameters(profile):

@@ -75,7 +75,7 @@ class StopSummary(NamedTuple):
         """Result."""
         if self.failed:
             which = ", ".join(str(r.device) for r in self.reports if r.phase in NOT_STOPPING)
-            return f"NOT STOPPED from here: device {which}. Stop it at the machine."
+            return f"NOT STOPPED by Drive Panel: device {which}. Stop it at the machine."
         return "STOPPED by the stop key." if self.ended else "STOP is being carried out."
 
     @property

@@ -17,7 +17,7 @@ def parse_addresses(text: str) -> list[int]:
     for part in text.replace(" ", "").split(","):
         low, dash, high = part.partition("-")
         if not low.isdecimal() or (dash and not high.isdecimal()):
-            raise LinkSyntaxError(f"{text!r} is no list of addresses. Write 1-10 or 1,2,31.")
+            raise LinkSyntaxError(f"{text!r} is not a list of addresses. Write 1-10 or 1,2,31.")
         ends = (low, high) if dash else (low, low)
         # a long one is past the last in any case, and longer ones than int() takes can be pasted
         first, last = (int(end) if len(end) <= LONGEST_SPAN_END else LAST + 1 for end in ends)

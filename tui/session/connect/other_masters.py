@@ -45,14 +45,15 @@ class Overheard:
         if self.requests:
             requested = dict.fromkeys(one.device for one in self.requests)
             reported = "; ".join(f"address {device}: {self._of(device)}" for device in requested)
-            return f"Another master asks drives on this line. {reported[0].upper()}{reported[1:]}."
+            return f"Another master polls drives on this line. {reported[0].upper()}{reported[1:]}."
         if self.answered:
             who = addresses_text(self.answered)
-            return f"Another master asks drives on this line: {who} answered it."
+            return f"Another master polls drives on this line: {who} answered it."
         if self.loose >= TALK:
             return (
-                f"Somebody talks on this line at another baud or format: {self.loose} bytes that"
-                " are no frame."
+                f"Another device sends on this line at another baud or format: {self.loose} bytes"
+                " that"
+                " form no frame."
             )
         return ""
 

@@ -20,7 +20,7 @@ STRANGE = 0x8000
 """Frames more than this program sent, from which on a count that fell was restarted."""
 
 COUNTED_ANEW = (
-    "The drive has begun to count anew: it was switched off, or somebody reset its counters. It is"
+    "The drive has restarted counting: it was switched off, or its counters were reset. It is"
     " compared from there on."
 )
 
@@ -140,7 +140,7 @@ def _differences(found: Comparison) -> Iterator[Difference]:
         yield Difference(
             "never-arrived",
             lost,
-            f"{_frames(lost)} went out that the drive never counted: lost on the way to it, or"
+            f"{_frames(lost)} were sent that the drive never counted: lost on the way to it, or"
             " damaged so that it did not see its address. Look at its connector, the polarity, the"
             " termination.",
         )
@@ -164,8 +164,8 @@ def _differences(found: Comparison) -> Iterator[Difference]:
         yield Difference(
             "not-from-here",
             foreign,
-            f"The drive counted {_frames(foreign)} more than were sent from here: another master"
-            " asks it, or a gateway repeats.",
+            f"The drive counted {_frames(foreign)} more than this program sent: another master"
+            " polls it, or a gateway repeats.",
         )
 
 
@@ -181,8 +181,8 @@ def own_differences(ours: DeviceCounters) -> list[Difference]:
         found.append(Difference("damaged-here", ours.checksum, text))
     if ours.timeouts:
         text = (
-            f"{_frames(ours.timeouts)} went unanswered. Whether they were lost on the way to the"
-            " drive or on the way back only counters of the drive would tell."
+            f"{_frames(ours.timeouts)} went unanswered. If they were lost on the way to the"
+            " drive or on the way back, only counters of the drive would show."
         )
         found.append(Difference("no-answer", ours.timeouts, text))
     return found

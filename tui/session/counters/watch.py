@@ -82,9 +82,12 @@ class CountersNow:
         """That nothing differs, in a sentence."""
         one = self.compared
         if one is None:
-            rest = "" if self.drive else " The drive tells no counters of its own."
+            rest = "" if self.drive else " The drive reports no counters of its own."
             return f"Frames sent: {self.since.requests}; none was lost.{rest}"
-        return f"Frames the drive counted: {one.frames}; each was sent from here and answered."
+        return (
+            f"Frames the drive counted: {one.frames}; this program sent each, and each was"
+            " answered."
+        )
 
 
 @dataclass(slots=True, eq=False)

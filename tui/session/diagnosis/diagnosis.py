@@ -13,7 +13,7 @@ ANSWERS = "answers"
 
 UNOPENED = "not-open"
 NOTHING_SEEN = "Nothing is wrong with this line as far as it is seen while it is not open."
-OPEN_IT = "Open it, then ask again: the drive is asked only on an open line."
+OPEN_IT = "Open it, then try again: a drive is polled only on an open line."
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,7 @@ def address_hint(sight: Sight) -> str:
     setting = _code(sight.profile, "address")
     if known.off is not None:
         left = ", and so it leaves the factory" if known.factory == known.off else ""
-        return f"Address: {setting}. At OFF ({known.off}) it answers nobody{left}."
+        return f"Address: {setting}. At OFF ({known.off}) it does not answer{left}."
     return f"Address: {setting}; it leaves the factory at {known.factory}."
 
 

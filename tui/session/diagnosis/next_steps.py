@@ -16,7 +16,7 @@ LATER = frozenset({5, 6})
 """Exceptions by which a request is put off."""
 NOT_KNOWN = frozenset({1, 2, 3})
 """Exceptions by which what was asked is not known: function, register, value."""
-NAME_A_FAMILY = "Name the drive's profile: then what its manual says of all this stands here."
+NAME_A_FAMILY = "Name the drive's profile: then the advice of its manual is shown here."
 
 
 def find_adapter(sight: Sight) -> Iterator[str]:
@@ -40,7 +40,7 @@ def plug_in(sight: Sight) -> Iterator[str]:
     yield f"Ports here: {', '.join(ports)}." if ports else "No serial port is here."
     if sight.adapter.was:
         yield f"It was {sight.adapter.was}: that one is not plugged in."
-    yield "Plug the adapter in; dmesg tells whether the system has seen it."
+    yield "Plug the adapter in; dmesg shows if the system has detected it."
 
 
 def get_permission(sight: Sight) -> Iterator[str]:
@@ -52,7 +52,8 @@ def get_permission(sight: Sight) -> Iterator[str]:
         return
     if port is not None and not group:
         yield (
-            f"sudo chmod g+rw {port.path} lets its group use it until it is plugged in anew; a rule"
+            f"sudo chmod g+rw {port.path} lets its group use it until it is plugged in again; a"
+            " rule"
             " for udev gives it to a group for good (60-drivepanel.rules has one)."
         )
         return
@@ -75,7 +76,7 @@ def other_port(sight: Sight) -> Iterator[str]:
 def reach_line(sight: Sight) -> Iterator[str]:
     """A line that was lost, or a host that is not reached."""
     if isinstance(sight.link, SerialLink):
-        yield "Look at the adapter's plug; the line is opened again by itself."
+        yield "Check the adapter's plug; the line reopens automatically."
         return
     yield "Look at the gateway's supply and cable, its address, and the port that it listens on."
 

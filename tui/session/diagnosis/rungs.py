@@ -118,7 +118,7 @@ def _says_garbled(sight: Sight) -> str:
 
 
 def _loose(sight: Sight) -> str:
-    return f"{sight.heard.garbage} bytes came back that are no frame"
+    return f"{sight.heard.garbage} bytes came back that form no frame"
 
 
 def _late(sight: Sight) -> bool:
@@ -133,8 +133,8 @@ def _silent(sight: Sight) -> bool:
 def _says_silent(sight: Sight) -> str:
     if sight.neighbors:
         others = ", ".join(map(str, sight.neighbors))
-        return f"Nobody answers at address {sight.device}, while {others} on this line does."
-    return f"Nobody answers at address {sight.device}: not one byte came back."
+        return f"No device answers at address {sight.device}, while {others} on this line does."
+    return f"No device answers at address {sight.device}: not one byte came back."
 
 
 def _damaged(sight: Sight) -> bool:
@@ -209,7 +209,9 @@ LADDER: tuple[Rung, ...] = (
     Rung(
         "echo",
         lambda s: bool(s.heard.echoed) and not s.heard.answered and s.heard.nothing,
-        lambda s: f"Only the adapter's own echo came back: nobody answers at address {s.device}.",
+        lambda s: (
+            f"Only the adapter's own echo came back: no device answers at address {s.device}."
+        ),
         steps.end_echo,
     ),
     Rung("checksum", _damaged, _says_damaged, steps.end_damage),

@@ -20,7 +20,7 @@ from .started import StartedMotors
 log = logging.getLogger(__name__)
 
 STOPPED_ELSEWHERE = (
-    "was stopped from elsewhere: a client commands it again once it has sent a stop itself"
+    "was stopped by another program: a client commands it again once it has sent a stop itself"
 )
 
 
@@ -125,8 +125,9 @@ class GatewayCommanding:
         for device in left:
             self._release(device)
             text = (
-                f"Modbus TCP client {client}, which commanded this drive, has gone: its motor does"
-                " what it was told last."
+                f"Modbus TCP client {client}, which commanded this drive, has disconnected: its"
+                " motor follows"
+                " the last command."
             )
             log.warning("drive %s: %s", device, text)
             self._line.facts.tell_all(device, text)

@@ -84,7 +84,7 @@ class StartedMotors:
 
     def _look_at(self, device: int) -> None:
         if device not in self._looks:
-            task = self._loop.create_task(self._until_standing(device), name=f"stands {device}")
+            task = self._loop.create_task(self._until_standing(device), name=f"standstill {device}")
             self._looks[device] = task
             task.add_done_callback(lambda done: self._looked(device, done))
 
@@ -92,7 +92,7 @@ class StartedMotors:
         if self._looks.get(device) is task:
             del self._looks[device]
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.error("device %s was not seen to stand: %r", device, error)
+            log.error("device %s was not seen at standstill: %r", device, error)
 
     async def _until_standing(self, device: int) -> None:
         session = self._sessions[device]
@@ -104,7 +104,7 @@ class StartedMotors:
             except LineClosed:
                 return
             except LineError as error:
-                log.info("device %s was not seen to stand: %s", device, error)
+                log.info("device %s was not seen at standstill: %s", device, error)
             await session.clock.sleep(STANDSTILL_LOOK)
 
     async def end(self) -> StopSummary | None:

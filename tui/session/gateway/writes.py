@@ -264,7 +264,7 @@ class GatewayWrite:
         if self._line.pending.void(self._write):
             return "Not sent: a stop came meanwhile."
         if self._request.stale:
-            return "Not sent: serve stood still when it came, and nobody may expect it now."
+            return "Not sent: serve was suspended when it came, and it is too late now."
         gone = self._commands and self._request.client.left
         return "Not sent: its client has gone, and would not stop the motor." if gone else ""
 

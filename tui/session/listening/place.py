@@ -39,8 +39,8 @@ def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
     link = parse_link(text)
     if not isinstance(link, SerialLink):
         raise NothingToHear(
-            f"{text}: listening needs a serial port. Over a network nobody hears what others say;"
-            " the Frames screen shows what goes over a line of this program."
+            f"{text}: listening needs a serial port. Over a network other masters cannot be"
+            " monitored; the Frames screen shows the traffic on a line of this program."
         )
     with ListeningLine(link, share_place(text), this_program(program)) as line:
         yield PlaceToListen(line)

@@ -93,7 +93,7 @@ def summary_lines(summary: ListeningSummary) -> list[str]:
         f" {pace:.1f} a second{load}."
     )
     if not tally.bytes:
-        lines.append("Nothing was heard: is anybody talking, and are A and B connected?")
+        lines.append("Nothing was received. Is a master polling, and are A and B connected?")
     elif not tally.frames:
         lines.append(
             f"{_many(tally.noise_bytes, 'byte')} and no frame: are baud and format those of the"
@@ -178,7 +178,7 @@ def feeding_text(feeding: Feeding) -> str:
         return f"{head}: begins with a first command, and none was heard"
     if feeding.fed:
         return f"{head}: fed, {feeding.margin:.2f} s to spare"
-    return f"{head}: NOT FED, nobody asked it for {feeding.longest_pause:.2f} s"
+    return f"{head}: NOT POLLED for {feeding.longest_pause:.2f} s"
 
 
 def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str]:

@@ -150,7 +150,7 @@ def record_text(
     lines += [
         f"| {_clock(m.wall)} | {m.state} | " + " | ".join(m.texts) + " |" for m in record.moments
     ]
-    lines += ["", f"## Written from here in the last {SECONDS_KEPT:g} s", ""]
+    lines += ["", f"## Writes by Drive Panel in the last {SECONDS_KEPT:g} s", ""]
     if record.writes:
         lines += ["| time | code | old | new | answer | why |", "|---|---|---|---|---|---|"]
     lines += [

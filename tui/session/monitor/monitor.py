@@ -144,7 +144,7 @@ class Monitor:
             except Exception as error:
                 log.exception("watching device %s failed", self.device)
                 self.restarts += 1
-                reported = f"Watching failed ({type(error).__name__}: {error}) and is begun anew."
+                reported = f"Watching failed ({type(error).__name__}: {error}) and restarts."
                 self._tell_failure(reported)
                 await self.session.clock.sleep(RESTART_AFTER)
 

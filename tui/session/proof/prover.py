@@ -26,7 +26,7 @@ from ..work import Permit
 from .result import UNNAMED_FAULT, ProofResult
 from .silences import Bracket, silences
 
-LEFT_ALONE_FOR_PROOF = "Its communication timeout is being proved: nobody asks it meanwhile."
+LEFT_ALONE_FOR_PROOF = "Its communication timeout is being tested: polling is paused."
 LOOK_FOR_STOP = 0.05
 """Seconds between two looks, in a silence, whether a stop was given."""
 RECONNECTED_BY_THEN = 10.0
@@ -250,7 +250,7 @@ class Prover:
         """Raise OrderRefused where a motor turns by now that was at rest: nobody agreed to that."""
         if not self.turning and state.motion in ENABLED_KINDS:
             raise OrderRefused(
-                "The motor began to turn: the proof has ended, and the drive is asked on."
+                "The motor began to turn: the test has ended, and the drive is polled again."
             )
 
     async def _silence(self, until: float) -> None:

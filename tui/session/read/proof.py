@@ -87,12 +87,12 @@ class SlotEvidence:
         return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""
 
     def holds(self, slot: str, raw: int) -> bool:
-        """Return True if a place surely brings what its slot's raw value stands for."""
+        """Return True if a place surely brings what its slot's raw value means."""
         code = self._code(raw)
         return bool(code) and self.brings(slot) == code
 
     def excludes(self, slot: str, raw: int) -> bool:
-        """Return True if a place surely brings something else than its slot's raw value stands
+        """Return True if a place surely returns something other than its slot's raw value stands
         for."""
         return not self.holds(slot, raw) and self._excluded(slot, self._code(raw))
 

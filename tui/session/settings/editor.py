@@ -119,7 +119,7 @@ class Editor:
 
     # Marks
 
-    def toggle_favourite(self, code: str) -> None:
+    def toggle_favorite(self, code: str) -> None:
         """Mark a parameter, or take the mark away."""
         self._mark(self.marks.toggled(code))
 
@@ -172,7 +172,7 @@ class Editor:
         with suppress(LineError):
             self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
         left = len(self.staging.edits)
-        return f"{len(done)} written and read back, {left} still staged." if left else ""
+        return f"Wrote {len(done)}, all verified. {left} still staged." if left else ""
 
     async def _see_what_is_held(self) -> None:
         """Of the edit that a stop cut short it is not known whether the drive took it: look."""
@@ -235,7 +235,7 @@ class Editor:
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
     """Return the result of all edits and the staged ones, in a sentence or two."""
     done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
-    parts = [f"{done} written and read back" if done else "nothing written"]
+    parts = [f"Wrote {done}, all verified" if done else "Nothing written"]
     if left := list(dict.fromkeys((*failed, *staged))):
         more = f" and {len(left) - LEFT_NAMED} more" if len(left) > LEFT_NAMED else ""
         parts.append(f"{len(left)} still staged: {', '.join(left[:LEFT_NAMED])}{more}")

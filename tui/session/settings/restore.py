@@ -174,8 +174,8 @@ class Mark:
             return ""
         begun, of, taken = (str(reported[key])[:60] for key in ("begun", "parameters", "set"))
         return (
-            f"A restoring of {of} settings (set of {taken}) began at {begun} and did not come to"
-            " its end. The drive is read and what is missing is written."
+            f"A restoring of {of} settings (set of {taken}) began at {begun} and did not"
+            " finish. The drive is read, and missing values are written."
         )
 
     def begin(self, source: ParameterSet, count: int) -> None:

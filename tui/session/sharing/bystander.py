@@ -18,7 +18,7 @@ from ..drive import DriveSession
 if TYPE_CHECKING:
     from ..monitor.snapshot import Snapshot
 
-COMMANDER_SILENT = "Not asked: whoever started its motor gives no sign of life."
+COMMANDER_SILENT = "Not polled: the program that started its motor gives no heartbeat."
 UNKNOWN_TIMEOUT_ACTED = 60.0
 """Seconds of silence after which a drive has reacted that does not report its timeout."""
 GRACE_SHARE = 0.25

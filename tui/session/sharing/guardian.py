@@ -157,7 +157,7 @@ class Guardian:
         of another family that has its address now.
         """
         if unknown := [one for one in devices if self._known(one) is None]:
-            log.warning("drives %s are not stopped for %s: nobody has armed them", unknown, by)
+            log.warning("drives %s are not stopped for %s: no program has armed them", unknown, by)
         sessions = list(filter(None, map(self._known, devices)))
         if sessions:
             self._stopper.stop(sessions, by=by, given=True)

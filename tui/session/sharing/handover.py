@@ -83,7 +83,7 @@ class Handover:
         """Request the drive from its commander."""
         other = self._line.facts.commander(device)
         if other is None:
-            self._say(device, "Nobody else commands this drive: a arms it.")
+            self._say(device, "No other program commands this drive. Press a to arm it.")
             return
         self._line.facts.ask_for(device)
         self._say(device, f"Asked {other.text} for this drive; the answer comes here.")

@@ -16,7 +16,7 @@ class StartNotRecorded(DriveError):
         self.device, self.folder, self.reason = device, folder, reason
         super().__init__(
             f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record "
-            "nobody knows after a crash that the motor was started from here. Make the folder "
+            "it is not known after a crash which program started the motor. Make the folder "
             "writable, or name another one in DRIVEPANEL_STATE."
         )
 

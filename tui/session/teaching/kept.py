@@ -95,8 +95,8 @@ def load_taught(drive: TaughtDrive) -> TaughtLooks:
         return _looks_in(json.loads(read_small_text(path, LONGEST)))
     except (OSError, ValueError, RecursionError, ValueRefused) as error:
         raise TaughtUnreadable(
-            f"What was taught of this drive cannot be read, {path}: {_reason(error)}. Nothing"
-            " taught is used. Mend the file, or teach anew: it is kept beside the new one."
+            f"The taught scales of this drive cannot be read, {path}: {_reason(error)}. Nothing"
+            " taught is used. Fix the file, or teach again: it is kept beside the new one."
         ) from error
 
 
@@ -155,7 +155,7 @@ def _as_json(drive: TaughtDrive, kept: TaughtLooks) -> dict[str, object]:
 def _looks_in(reported: object) -> TaughtLooks:
     """Parse a file; raises ValueRefused if it holds anything else."""
     if not isinstance(reported, dict):
-        raise ValueRefused("it is no table")
+        raise ValueRefused("it is not a table")
     looks, reference = reported.get("looks"), reported.get("reference", "")
     if not isinstance(looks, dict) or not isinstance(reference, str):
         raise ValueRefused("it has no looks")
@@ -164,13 +164,13 @@ def _looks_in(reported: object) -> TaughtLooks:
 
 def _code(code: object) -> str:
     if not isinstance(code, str) or not _CODE.fullmatch(code):
-        raise ValueRefused(f"{code!r} is no code of a parameter")
+        raise ValueRefused(f"{code!r} is not the code of a parameter")
     return code
 
 
 def _looks_of(code: str, listed: object) -> tuple[DisplayLook, ...]:
     if not isinstance(listed, list) or len(listed) > LOOKS_KEPT:
-        raise ValueRefused(f"the looks at {code} are no list, or too many")
+        raise ValueRefused(f"the readings of {code} are not a list, or too many")
     return tuple(_look(code, one) for one in listed)
 
 

@@ -29,7 +29,7 @@ from .altivar21_words import outputs, show_altivar21_words
     1 << 15,
 )
 ENERGY_RESET, STALL_2 = 1 << 1, 1 << 12
-SERIAL_COMMAND, SERIAL_REFERENCE, PRESET_REFERENCE, ANALOGUE_REFERENCE = 2, 4, 255, 1
+SERIAL_COMMAND, SERIAL_REFERENCE, PRESET_REFERENCE, ANALOG_REFERENCE = 2, 4, 255, 1
 EMERGENCY_FAULT = 17
 ATV21_REACHED_HZ = 0.05
 PRESET_QUANTITIES: tuple[Quantity, ...] = (
@@ -119,7 +119,7 @@ class Altivar21Chart:
         command = bool(word & OWN_COMMAND) or self._body.setting("CMOD", 0) == SERIAL_COMMAND
         chosen = self._body.setting("FMOD", 1)
         if self._inputs.switched(SECOND_REFERENCE):
-            chosen = self._body.setting("F207", ANALOGUE_REFERENCE)
+            chosen = self._body.setting("F207", ANALOG_REFERENCE)
         reference = bool(word & OWN_REFERENCE) or chosen == SERIAL_REFERENCE
         wired = 1 if self._inputs.switched(PRESET_INPUT) else 0
         return Sources(command, reference, word & PRESETS if command else wired)
@@ -245,7 +245,7 @@ class Altivar21Chart:
     def _reference_source(self, sources: Sources) -> int:
         if sources.preset:
             return PRESET_REFERENCE
-        return SERIAL_REFERENCE if sources.reference else ANALOGUE_REFERENCE
+        return SERIAL_REFERENCE if sources.reference else ANALOG_REFERENCE
 
     def _status(self, alarms: int) -> int:
         body = self._body

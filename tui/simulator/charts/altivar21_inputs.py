@@ -7,7 +7,7 @@ F runs forward, R runs the other way, RES resets a fault; that is the wiring mos
 from __future__ import annotations
 
 from ..body import Body
-from .altivar21_words import ANALOGUE_HZ
+from .altivar21_words import ANALOG_HZ
 
 INPUT_FUNCTIONS = {"F": "F111", "R": "F112", "RES": "F113"}
 FORCED_LOCAL, SECOND_REFERENCE, PRESET_INPUT = 48, 38, 6
@@ -29,7 +29,7 @@ class Altivar21Inputs:
 
     def refer(self, hz: float) -> None:
         """Change the reference at VIA, in Hz."""
-        self._body.terminals.apply("VIA", abs(hz) / ANALOGUE_HZ)
+        self._body.terminals.apply("VIA", abs(hz) / ANALOG_HZ)
 
     def halt(self) -> None:
         """Open F and R."""
@@ -70,4 +70,4 @@ class Altivar21Inputs:
     def hz(self) -> float:
         """The analog reference, in Hz."""
         name = "VIB" if self._body.setting("FMOD", 1) == VIB_REFERENCE else "VIA"
-        return ANALOGUE_HZ * self._body.terminals.level(name)
+        return ANALOG_HZ * self._body.terminals.level(name)

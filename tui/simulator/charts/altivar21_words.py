@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 from ..body import Body
 
-ANALOGUE_FULL = 1023
-ANALOGUE_HZ = 50.0
+ANALOG_FULL = 1023
+ANALOG_HZ = 50.0
 BY_LINE, BY_LINE_NEGATED = 38, 39
 """Functions of an output that hand it to FA50, as it is or negated."""
 RELAY, FAULT_RELAY = 1 << 0, 1 << 2
@@ -37,8 +37,8 @@ def show_altivar21_words(body: Body) -> None:
         "FE16": abs(motor.rotor),
         "FE20": 100 * torque_current / rated,
         "FE21": 100 * excitation / rated,
-        "FE35": ANALOGUE_FULL * body.terminals.level("VIA"),
-        "FE36": ANALOGUE_FULL * body.terminals.level("VIB"),
+        "FE35": ANALOG_FULL * body.terminals.level("VIA"),
+        "FE36": ANALOG_FULL * body.terminals.level("VIB"),
         "FE76": motor.energy,
         "FE77": 0.93 * motor.energy,
     }

@@ -14,7 +14,7 @@ from .channels import ChannelsInForce, channel_bit, channel_marks
 
 INPUT_BITS = 0x003F
 """Bits of IOLR that are inputs."""
-ANALOGUE_COUNTS = 1000
+ANALOG_COUNTS = 1000
 """Counts of AI1C in a volt."""
 VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
 """Raw values of VCAL on three phases, by the voltage of the motor in V."""
@@ -74,10 +74,10 @@ def show_inputs(body: Body) -> None:
     if outputs := body.registers.named("IOLR"):
         kept = body.registers.present(outputs) & ~INPUT_BITS
         body.registers.put(outputs, kept | (body.terminals.bits() & INPUT_BITS))
-    for name in body.terminals.names.analogue:
-        if analogue := body.registers.named(f"{name}C"):
+    for name in body.terminals.names.analog:
+        if analog := body.registers.named(f"{name}C"):
             volts = FULL_VOLTS * body.terminals.level(name)
-            body.registers.put(analogue, round(volts * ANALOGUE_COUNTS))
+            body.registers.put(analog, round(volts * ANALOG_COUNTS))
 
 
 def show_channels(body: Body, channels: ChannelsInForce, *, second_ramp: bool) -> None:

@@ -25,16 +25,16 @@ class TerminalNames:
     """Names of a family's terminals; the first analog input gives the reference."""
 
     logic: tuple[str, ...]
-    analogue: tuple[str, ...]
+    analog: tuple[str, ...]
     forward: str
     reverse: str
     reset: str = ""
 
 
-def _altivar(logic: int, analogue: int) -> TerminalNames:
+def _altivar(logic: int, analog: int) -> TerminalNames:
     return TerminalNames(
         tuple(f"LI{n}" for n in range(1, logic + 1)),
-        tuple(f"AI{n}" for n in range(1, analogue + 1)),
+        tuple(f"AI{n}" for n in range(1, analog + 1)),
         "LI1",
         "LI2",
     )
@@ -93,9 +93,9 @@ class Terminals:
         wanted = name.strip().upper()
         if wanted in self.names.logic:
             return wanted, _switch(wanted, text)
-        if wanted in self.names.analogue:
+        if wanted in self.names.analog:
             return wanted, _part(wanted, text)
-        known = ", ".join((*self.names.logic, *self.names.analogue))
+        known = ", ".join((*self.names.logic, *self.names.analog))
         raise SimulatorError(f"No input is called {name.strip()!r} here. Inputs: {known}.")
 
     def bits(self) -> int:
@@ -107,7 +107,7 @@ class Terminals:
         logic = self.names.logic
         group = f"{logic[0]} to {logic[-1]}" if len(logic) > SHORT_LIST else ", ".join(logic)
         closed = ", ".join(name for name in logic if self.closed(name)) or "none"
-        levels = ", ".join(f"{name} {100 * self.level(name):g} %" for name in self.names.analogue)
+        levels = ", ".join(f"{name} {100 * self.level(name):g} %" for name in self.names.analog)
         return f"closed of {group}: {closed}; {levels}"
 
 
@@ -122,7 +122,7 @@ def _part(name: str, text: str) -> float:
     match = _LEVEL.fullmatch(text.strip())
     if match is None:
         raise SimulatorError(
-            f"{name} is an analogue input: 5 or 5V of 10 V, 12mA of 20 mA, or 50%,"
+            f"{name} is an analog input: 5 or 5V of 10 V, 12mA of 20 mA, or 50%,"
             f" not {text.strip()!r}."
         )
     unit = (match[2] or "v").casefold()

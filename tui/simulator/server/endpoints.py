@@ -131,7 +131,7 @@ class PtyEndpoint(Endpoint):
             self._folder.mkdir(mode=0o700, exist_ok=True)
         if link.exists() and not link.is_symlink():
             self._shut()
-            raise SimulatorError(f"{link} exists and is no link; choose another path.")
+            raise SimulatorError(f"{link} exists and is not a link; choose another path.")
         link.unlink(missing_ok=True)
         link.symlink_to(device)
 

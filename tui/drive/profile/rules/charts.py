@@ -42,7 +42,7 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         }:
             yield (
                 (*at, "runs_in"),
-                f"chart {chart.id}: runs_in {chart.runs_in!r} is no state of the kind running.",
+                f"chart {chart.id}: runs_in {chart.runs_in!r} is not a state of the kind running.",
             )
 
 

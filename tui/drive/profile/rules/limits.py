@@ -135,7 +135,7 @@ def start_up(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             if code in seen:
                 yield (
                     ("start_up", index),
-                    f"step {step.step}: {code} stands in step {seen[code]} already.",
+                    f"step {step.step}: {code} is already in step {seen[code]}.",
                 )
             seen.setdefault(code, step.step)
 
