@@ -131,7 +131,7 @@ async def test_counters_of_the_open_drive_on_both_sides() -> None:
         await made.pilot.press("tab", "tab")
         await made.until(lambda: "Counters of drive 1" in made.shown("frames"))
         await made.until(lambda: "function 8" in made.shown("frames"))
-        await made.until(lambda: "this program sent each" in made.shown("frames"))
+        await made.until(lambda: "all sent by this program" in made.shown("frames"))
         screen = made.app.screen
         assert isinstance(screen, FramesScreen)
         watch = screen.console.counters

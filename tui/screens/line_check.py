@@ -102,8 +102,8 @@ class LineCheck(Panel):
         requested = Confirm(
             QUESTION,
             "\n".join((*changed, FOLLOWS)),
-            yes="takes it as it is now",
-            no="keeps it read-only",
+            yes="accept it as it is",
+            no="keep it read-only",
             loses=True,
             by_itself=by_itself,
         )

@@ -71,9 +71,7 @@ class BlockKeys(ArmingKeys):
             work = partial(block_editor.exchange, agreed)
             self._ask(question, agreed.follows, "write, read back", "write nothing", work)
 
-        requested = Ask(
-            "Write through the outputs", wrong, about=about, takes="goes on to a question"
-        )
+        requested = Ask("Write through the outputs", wrong, about=about, takes="continue")
         self.app.push_screen(requested, given)
 
     # Files and user words
@@ -94,7 +92,7 @@ class BlockKeys(ArmingKeys):
         proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
         about = "The assignment shown, proposals included; one slot a line (TOML)."
         text = str(Path.cwd() / proposed)
-        requested = Ask("Save to", fault_of_new, text=text, about=about, takes="writes the file")
+        requested = Ask("Save to", fault_of_new, text=text, about=about, takes="write the file")
         self.app.push_screen(requested, given)
 
     def _save(self, path: Path) -> None:

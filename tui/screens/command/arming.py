@@ -139,8 +139,8 @@ class ArmingKeys(PanelScreen):
             f"Request drive {device}?",
             f"It is commanded by {other.text}. The question is answered there; without an answer"
             " it is a no while the motor runs.",
-            "asks",
-            "does not ask",
+            "ask",
+            "cancel",
             ask,
         )
 

@@ -24,12 +24,12 @@ STOPS_THAT_ASK = {
     "freewheel": (
         "Coast to a stop?",
         "The output is switched off: nothing brakes the motor, and a hoist falls.",
-        "lets it coast",
+        "coast",
     ),
     "dc-braking": (
         "Brake by direct current?",
         "Direct current heats the motor; it holds no load at standstill.",
-        "brakes it",
+        "brake",
     ),
 }
 """Question, what follows and the yes of the stops that need no arming but ask."""
@@ -88,7 +88,7 @@ class OrderKeys(TeachKeys):
             self.commander.run(order, reference, stamp)
 
         question, why = f"Run {order} unrecorded?", str(outcome.error)
-        self._ask(question, why, "runs it", "does not run it", run, by_itself=True)
+        self._ask(question, why, "run it", "cancel", run, by_itself=True)
 
     def _refuse(self, text: str) -> None:
         self.commander.refuse(text)

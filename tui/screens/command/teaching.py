@@ -55,7 +55,7 @@ class TeachKeys(ArmingKeys):
             f"What does the drive's display show for {code}, {name}?",
             fault_of_look,
             about=f"{_known(self.console, code)} {HOW}",
-            takes="reads the word and learns",
+            takes="read the word and learn",
             number=True,
             now=self.motor_now(),
         )
@@ -133,7 +133,7 @@ class PickWord(KeyQuestion[str | None]):
             lines = (entry(word_to_teach(self._drive_console, code), id=code_id(at)) for at, code in
                      enumerate(self._codes))  # fmt: skip
             yield OptionList(*lines, id="choices", compact=True)
-            keys = (("Up, Down", "choose"), ("Enter", "asks what is shown"), ("Esc or q", "no"))
+            keys = (("Up, Down", "choose"), ("Enter", "continue"), ("Esc or q", "no"))
             yield Plain("Others: Parameters (3), L.", id="about")
             yield Plain(hint(*keys), id="hint")
 

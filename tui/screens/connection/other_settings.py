@@ -43,7 +43,7 @@ class OtherSettings(LineKeys):
         self.end_search()
         always = self._what_is_here() if self.found else self._who_is_unclear()
         question = "Try other baud rates and formats?"
-        if not await self.app.may_let_go(question, yes="tries them", no="stays", always=always):
+        if not await self.app.may_let_go(question, yes="try them", no="stay", always=always):
             return
         await self.name_families()
         if not await self.hears_another_master(link):

@@ -41,9 +41,9 @@ class Leave(KeyQuestion[LeaveChoice]):
                 yield Plain(self._follows, id="follows")
             yield Plain(
                 hint(
-                    ("s or Enter", "stops and leaves"),
-                    ("l", "leaves it running"),
-                    ("Esc or q", "stays"),
+                    ("s or Enter", "stop and leave"),
+                    ("l", "leave it running"),
+                    ("Esc or q", "stay"),
                 ),
                 id="hint",
             )

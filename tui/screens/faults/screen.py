@@ -244,7 +244,7 @@ class FaultsScreen(OrderKeys):
 
         about = "Markdown, with the values, what the drive stored, and what was written."
         requested = Ask(
-            "Save the trip as", fault_of_new, text=proposed, about=about, takes="writes the file"
+            "Save the trip as", fault_of_new, text=proposed, about=about, takes="write the file"
         )
         self.app.push_screen(requested, reported)
 

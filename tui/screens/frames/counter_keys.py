@@ -100,7 +100,7 @@ class CounterKeys(PanelScreen):
         requested = Confirm(
             f"Reset the counters of drive {device}?",
             RESETS_NOTHING_ELSE,
-            yes="resets them",
+            yes="reset them",
             no="leave them",
             loses=True,
             now=MotorsNow(self.app, [self.session]),

@@ -80,7 +80,7 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
         reported = wrapped(found.trouble, width - 2, 3)
         return [Text("The drive's own", FAINT), *(Text(line, ALARM) for line in reported), *codes]
     if not found.drive:
-        none = Text("None is reported, or none was read yet.", FAINT)
+        none = Text("None reported or read yet.", FAINT)
         return [Text("The drive's own", FAINT), none, *codes]
     lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'of':>8}", FAINT)]
     for name, one in found.drive:

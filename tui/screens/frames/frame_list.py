@@ -220,7 +220,7 @@ class FrameListScreen(PanelScreen):
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """Those of the filter, or of what is looked for."""
         if self._asking == "find":
-            return ("Enter", "older one"), ("Esc", "ends")
+            return ("Enter", "older one"), ("Esc", "end")
         return ("Enter", "keep it"), ("Esc", "all frames")
 
     def _end_asking(self) -> None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..dialogs.now import MotorsNow
 
 ROUNDED = "rounded to what the drive can hold"
-STAGES_NOTHING = ("Esc", "stages nothing")
+STAGES_NOTHING = ("Esc", "cancel")
 
 
 class EditNumber(Question[str | None]):
@@ -58,7 +58,7 @@ class EditNumber(Question[str | None]):
             yield Plain("", id="held")
             yield Plain(about_number(editor, parameter), id="about")
             steps = (("Up Down", "step"), ("PgUp PgDn", "ten"))
-            keys = (("Enter", "stages it"), *steps, STAGES_NOTHING)
+            keys = (("Enter", "stage it"), *steps, STAGES_NOTHING)
             yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
@@ -156,7 +156,7 @@ class PickValue(KeyQuestion[int | None]):
                 id="choices",
                 compact=True,
             )
-            yield Plain(hint(("Enter", "stages it"), STAGES_NOTHING), id="hint")
+            yield Plain(hint(("Enter", "stage it"), STAGES_NOTHING), id="hint")
 
     def on_mount(self) -> None:
         """Begin at the staged or held value."""
@@ -205,7 +205,7 @@ class EditBits(KeyQuestion[int | None]):
             yield from self.now_lines()
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="held")
-            keys = (("Enter", "turns a bit"), ("s", "stages the word"), STAGES_NOTHING)
+            keys = (("Enter", "change a bit"), ("s", "stage the word"), STAGES_NOTHING)
             yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:

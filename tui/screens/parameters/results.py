@@ -52,7 +52,7 @@ class Results(KeyQuestion[bool | None]):
                 yield Plain(results_table(self._applied))
             keys = [("Enter or Esc", "close")]
             if self._applied.unsaved:
-                keys.append(("S", "saves to EEPROM, asks"))
+                keys.append(("S", "save to EEPROM, asks"))
             if self._applied.written and not self._staged:
                 keys.append(("u", "afterwards stages the old values"))
             yield Plain(hint(*keys), id="hint")

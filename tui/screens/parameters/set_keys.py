@@ -76,7 +76,7 @@ class SetKeys(ParameterKeys):
                 self.run_worker(work, exclusive=True, group="sets")
 
         proposed = str(Path.cwd() / name)
-        requested = Ask(question, fault_of_new, text=proposed, about=about, takes="writes the file")
+        requested = Ask(question, fault_of_new, text=proposed, about=about, takes="write the file")
         self.app.push_screen(requested, reported)
 
     async def _read_to_file(

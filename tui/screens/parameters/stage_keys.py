@@ -186,7 +186,7 @@ class StageKeys(ParameterKeys):
         requested = Confirm(
             "Undo all edits?",
             follows,
-            yes="drops them",
+            yes="drop them",
             no="keep them",
             loses=True,
             now=self.motor_now(),

@@ -32,7 +32,7 @@ class WriteKeys(ParameterKeys):
             self.editor.apply((only,) if only else (), stamp)
 
         many = f"{len(edits)} parameters" if len(edits) > 1 else "1 parameter"
-        yes = "writes it, read back" if len(edits) == 1 else "writes, each read back"
+        yes = "write it, read back" if len(edits) == 1 else "write, each read back"
         no = "write nothing"
         self._ask(f"Write {only or many}?", write_text(self.editor, edits), yes, no, work)
 
@@ -115,7 +115,7 @@ class WriteKeys(ParameterKeys):
             "Follow the drive?",
             moved.text,
             yes="follows it",
-            no="stays",
+            no="stay",
             loses=len(self.app.fleet.sessions if self.app.fleet else ()) > 1,
             now=self.motor_now(),
             by_itself=True,

@@ -84,10 +84,7 @@ class CountersNow:
         if one is None:
             rest = "" if self.drive else " The drive reports no counters of its own."
             return f"Frames sent: {self.since.requests}; none was lost.{rest}"
-        return (
-            f"Frames the drive counted: {one.frames}; this program sent each, and each was"
-            " answered."
-        )
+        return f"Frames the drive counted: {one.frames}, all sent by this program and answered."
 
 
 @dataclass(slots=True, eq=False)
