@@ -284,9 +284,9 @@ def test_inputs_as_a_person_types_them(name: str, text: str, reported: str) -> N
     [
         ("LI7", "1", "No input is called 'LI7'"),
         ("LI1", "2", "is a logic input"),
-        ("AI1", "much", "is an analogue input"),
+        ("AI1", "much", "is an analog input"),
         ("AI1", "11", "more than its full scale"),
-        ("AI1", "-1", "is an analogue input"),
+        ("AI1", "-1", "is an analog input"),
         ("AI1", "21mA", "more than its full scale"),
     ],
 )

@@ -361,6 +361,6 @@ async def test_s_in_the_results_of_a_write_goes_on_to_saving(
         await on_monitor(app, pilot, monkeypatch)
         answers: list[object] = []
         app.push_screen(Results(replace(APPLIED, unsaved=("ACC",))), answers.append)
-        await until(pilot, lambda: "S saves to EEPROM, asks" in picture(app))
+        await until(pilot, lambda: "S save to EEPROM, asks" in picture(app))
         await pilot.press("S")
         await until(pilot, lambda: answers == [True])
