@@ -76,8 +76,8 @@ TASKS = (
     ),
     Task(
         "change a ramp and keep it",
-        [("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", "Enter stages"), *typed("5"),
-         ("Enter!", "staged"), ARM, ("w", "Write 1"), ("y!", "written"), ("S", "EEPROM?"),
+        [("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", "Enter stage"), *typed("5"),
+         ("Enter!", "staged"), ARM, ("w", "Write 1"), ("y!", "verified"), ("S", "EEPROM?"),
          ("y!", "saved to EEPROM")],
         [("3", "settings"), ("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", ""),
          *typed("5"), ("Enter", "staged"), ("w", "Write 1"), ("y", "written"),
