@@ -62,7 +62,7 @@ WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps
 SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks."
 WHY = "Why no answer? Diagnose a silent drive, and show the next step."
 HEAR = "Listen to a line on which another master asks; the panel sends nothing there, asks."
-ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
+ACCEPT = "Accept the line with another adapter or other drives than before; asks."
 BUNDLE = "Bundle for a colleague: all about the line in one file."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
@@ -117,7 +117,7 @@ ACTIONS: tuple[Action, ...] = (
         (FRAMES, LISTENING),
         ("hold", "h", "hold", "Pause or resume the list."),
         ("other_page", "tab", "page", "Codes and values, bytes, or what was counted."),
-        ("only", "O", "only", "Only some frames: 2 read error; of a drive, a function, errors."),
+        ("only", "O", "only", "Show only frames of a drive, a function or errors: 2 read error."),
         ("find_frame", "j", "", "Find frames by drive, function, error, or what they say."),
         ("scroll(-1)", "up", "", "Older frames; the list is held."),
         ("scroll(1)", "down", "", "Newer frames."),
