@@ -111,7 +111,7 @@ CHECKS: dict[int, Check] = {
     ),
     22: Check("L", _no_imperative, 1, "What a drive does"),
     23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), 0, "What it does."),
-    24: Check("D", _long, 111, "It is: one; and then two: three."),
+    24: Check("D", _long, 43, "It is: one; and then two: three."),
     25: Check(
         "G",
         lambda text: int(bool(re.match(r"(A|An|The|What|Who|Where|No|One)\b", text))
@@ -184,10 +184,11 @@ def _paragraphs(path: Path) -> Iterator[Text]:
     name, begun, held = path.relative_to(ROOT).as_posix(), 1, ""
     for number, line in enumerate([*text.splitlines(), ""], 1):
         starts = re.match(r"\s*(?:[-*>#]+|\d+\.) ", line)
-        if held and (not line.strip() or starts or line.startswith("|")):
+        is_row = line.lstrip().startswith("|")
+        if held and (not line.strip() or starts or is_row):
             yield Text("D", name, begun, held)
             held = ""
-        if line.startswith("|"):
+        if is_row:
             yield from (Text("D", name, number, cell.strip()) for cell in line.split("|"))
         elif line.strip():
             begun = begun if held else number
@@ -272,7 +273,7 @@ def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
     page = tmp_path / "page.md"
     page.write_text(
-        "# Head\n\nOne\ntwo.\n\n```sh\ncode\n```\n- item\n- more\n\n| a | b |\n", "utf-8"
+        "# Head\n\nOne\ntwo.\n\n```sh\ncode\n```\n- item\n- more\n\n  | a | b |\n", "utf-8"
     )
     assert [one.text for one in _paragraphs(page) if one.text] == [
         "# Head", "One two.", "- item", "- more", "a", "b",
