@@ -112,7 +112,7 @@ class Service:
         return False
 
 
-class LeftAlone:
+class PolledDrive:
     """A program whose log-in has ended without it."""
 
     def __init__(self, pid: int) -> None:
@@ -305,7 +305,7 @@ class LoggedOut(_InBox):
         stage = self._stage
         stage.run_motor_in("logout", LINGERS)
         pid = int((stage.folder / f"state-{LINGERS}" / LEFT_ALONE).read_text())
-        self._owner = LeftAlone(pid)
+        self._owner = PolledDrive(pid)
         self._ready = time.time()
         stage.observe_in("user", LINGERS)
 

@@ -25,10 +25,10 @@ from rich.table import Table
 
 from benchmarks.wire import ROOT, Exchange, WireLine
 from tui.drive.finding import LineSetting, longest_turnaround, silent_cost, wait_for_reply
+from tui.session.connect.address_prober import known_profiles, settings_worth_a_try
 from tui.session.connect.identify import ScanResult
 from tui.session.connect.open_line import OpenLine, open_line, reopen
 from tui.session.connect.search import Search
-from tui.session.connect.strangers import known_profiles, settings_worth_a_try
 from tui.simulator import LineTiming
 
 FACTORY = LineSetting(19200, "8E1")

@@ -19,7 +19,7 @@ EXCEPTIONS: dict[str, tuple[int, str]] = {
     "bus/fake.py:FakeLine": (19, "the same interface, for tests"),
     "bus/fake.py": (336, "a complete fake line in one module, with an example at the top"),
     "bus/line.py:Line": (16, "implements ModbusLine: one method for each kind of request"),
-    "bus/shared_facts.py:SharedFacts": (18, "all state that the programs on a line share"),
+    "bus/shared_state.py:SharedState": (18, "all state that the programs on a line share"),
     "screens/app_port.py:Panel": (25, "the complete interface of the app for screens"),
     "screens/connection/state.py:LineView": (
         19,

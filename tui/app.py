@@ -23,14 +23,14 @@ from tui.terminal.last_words import LastWords
 from tui.widgets.drawing import short
 from tui.widgets.palette import THEME
 
-from .screens.hands import Hands
+from .screens.key_dispatcher import KeyDispatcher
 from .screens.last_stops import LastStops
 from .screens.leaving import Leaving
 from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
-from .screens.lookout import FRAME_LOOK, Lookout
 from .screens.open_lines import LineOpening
 from .screens.places import Places
+from .screens.status_refresher import FRAME_LOOK, StatusRefresher
 
 if TYPE_CHECKING:
     from tui.session.bundle.subject import DriveDocuments
@@ -39,7 +39,9 @@ LONGEST_CAUSE = 120
 """Characters that an error takes on the terminal; the log has all of it."""
 
 
-class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Leaving):
+class DrivePanelApp(
+    LastWords, KeyDispatcher, StatusRefresher, LineOwner, LineCheck, Places, Leaving
+):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from tui.bus.share.signs import BACK_AT_LATEST, BACK_LOOK, BACK_WITHIN, programs_back
+from tui.bus.share.heartbeat import BACK_AT_LATEST, BACK_LOOK, BACK_WITHIN, programs_back
 
 
 class StarvedLoop:

@@ -38,7 +38,7 @@ REQUEST = Read(1, 5, 1)
 QUESTION = bytes([3, 0, 5, 0, 1])
 
 
-class HeldBack:
+class CommandBlocked:
     """A transport with bytes that came in and that nobody has fetched from the system yet."""
 
     note = ""
@@ -78,7 +78,7 @@ def context(strays: list[Piece]) -> LineContext:
 
 async def test_bytes_before_a_request_are_not_its_reply() -> None:
     strays: list[Piece] = []
-    transport = HeldBack(reply(b"\x01" + QUESTION + b"\0\0"))
+    transport = CommandBlocked(reply(b"\x01" + QUESTION + b"\0\0"))
     around = context(strays)
     master = RtuMaster(transport, RtuTcpLink("x", 1), around, lambda: None, wire_time=False)
     result = await master.exchange(Sending(1, QUESTION, REQUEST.expectation(), 0.05))
@@ -91,7 +91,7 @@ async def test_bytes_before_a_request_are_not_its_reply() -> None:
 async def test_bytes_from_a_suspension_while_sending_are_no_reply() -> None:
     """Frozen between its look at the line and the request: an answer of before is there first."""
     strays: list[Piece] = []
-    transport = HeldBack(b"")
+    transport = CommandBlocked(b"")
     around = context(strays)
     master = RtuMaster(transport, RtuTcpLink("x", 1), around, lambda: None, wire_time=False)
 
@@ -111,7 +111,7 @@ async def test_bytes_from_a_suspension_while_sending_are_no_reply() -> None:
 
 async def test_bytes_before_a_request_with_guessed_number_are_no_reply() -> None:
     """The transaction ids of a client count up: whoever wants to can tell the next one."""
-    transport = HeldBack(tcp_reply(bytes([0, 1, 0, 0, 0, 6, 1]) + QUESTION))
+    transport = CommandBlocked(tcp_reply(bytes([0, 1, 0, 0, 0, 6, 1]) + QUESTION))
     around = context([])
     master = TcpMaster(transport, around, lambda: None)
     result = await master.exchange(Sending(1, QUESTION, REQUEST.expectation(), 0.05))

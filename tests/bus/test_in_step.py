@@ -21,7 +21,7 @@ from tui.bus.schedule.in_step import InStep
 from tui.bus.schedule.outcomes import Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
 from tui.wire.frames import frame
 
@@ -256,7 +256,7 @@ async def test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing(
 
 def test_length_of_a_reply_that_may_still_come_is_not_used() -> None:
     devices, timing = Devices(Timing(), mistakable=True), Timing()
-    outcomes = Outcomes(devices, Tally(), timing, lambda: 1.0, SharedFacts(), gateway=False)
+    outcomes = Outcomes(devices, Tally(), timing, lambda: 1.0, SharedState(), gateway=False)
     steps = InStep(devices, outcomes, lambda: 1.0, timing, buffers=False)
     for count in (1, 2):
         devices.may_come(1, Read(1, 0, count).expectation(), 0.5, 0.6)
@@ -315,7 +315,7 @@ def test_connection_that_buffers_proves_its_step_every_ten_seconds(
     def clock() -> float:
         return now
 
-    outcomes = Outcomes(devices, Tally(), timing, clock, SharedFacts(), gateway=False)
+    outcomes = Outcomes(devices, Tally(), timing, clock, SharedState(), gateway=False)
     steps = InStep(devices, outcomes, clock, timing, buffers=buffers)
     steps.opened()
     probes, counts = 0, []
@@ -340,7 +340,7 @@ class _Line:
         timing = Timing()
         self.devices = Devices(timing, mistakable=not gateway)
         self.outcomes = Outcomes(
-            self.devices, Tally(), timing, lambda: self.now, SharedFacts(), gateway=gateway
+            self.devices, Tally(), timing, lambda: self.now, SharedState(), gateway=gateway
         )
         self.steps = InStep(self.devices, self.outcomes, lambda: self.now, timing, False, gateway)
 

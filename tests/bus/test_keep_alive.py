@@ -19,7 +19,7 @@ from tui.bus.schedule.alive_reads import AliveReads
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.share.messages import NoMessage, packed, unpacked
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 
 from .conftest import OpenLine, Share
 from .peer import PtyPeer, eventually, honest, honest_pdu
@@ -40,7 +40,7 @@ class Bench:
         self.sent: list[tuple[float, int, Priority]] = []
         """When which device was read, and how urgently."""
         self.programs: list[str] = []
-        self.facts = SharedFacts(Program("me", "panel", 1))
+        self.facts = SharedState(Program("me", "panel", 1))
         self.devices = Devices(Timing(), mistakable=True)
         self._reads = AliveReads(self.devices, self.facts, lambda: self.now, self._submit)
 
@@ -160,7 +160,7 @@ def test_malformed_message_is_refused(wrong: dict[str, float]) -> None:
 
 @pytest.mark.parametrize("timeout", [0.001, 1e9])
 def test_odd_timeout_is_brought_within_bounds(timeout: float) -> None:
-    facts = SharedFacts()
+    facts = SharedState()
     facts.keep_alives.keep(KeepAlive(1, timeout, ADDRESS))
     (one,) = facts.keep_alives.of(facts.me.id)
     assert SHORTEST_TIMEOUT <= one.timeout <= LONGEST_TIMEOUT

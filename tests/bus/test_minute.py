@@ -11,7 +11,7 @@ from tui.bus.result import ExchangeResult, Piece, ResultKind
 from tui.bus.schedule.outcomes import SHORT_SILENCE, Outcomes
 from tui.bus.schedule.patience import MISSES, Devices
 from tui.bus.schedule.queue import Job
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
 from tui.wire.frames import frame
 
@@ -30,7 +30,7 @@ class Ended:
         self.tally = Tally(clock=lambda: self.now)
         self.devices = Devices(TIMING, mistakable=True)
         self._outcomes = Outcomes(
-            self.devices, self.tally, TIMING, lambda: self.now, SharedFacts(), gateway=False
+            self.devices, self.tally, TIMING, lambda: self.now, SharedState(), gateway=False
         )
 
     def reply(self, device: int, kind: ResultKind, priority: Priority = Priority.POLL) -> None:

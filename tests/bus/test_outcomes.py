@@ -11,7 +11,7 @@ from tui.bus.result import ExchangeResult, ResultKind
 from tui.bus.schedule.outcomes import Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
 
 
@@ -30,7 +30,7 @@ def test_an_answer_is_requested_again_where_it_waited_and_not_where_it_is_long(
     """A backup at 1200 baud asked for its first long answer again and again, without an end."""
     timing, end = Timing(), turnaround + on_wire
     devices, tally = Devices(timing, mistakable=True), Tally()
-    outcomes = Outcomes(devices, tally, timing, lambda: end + lay, SharedFacts(), gateway=False)
+    outcomes = Outcomes(devices, tally, timing, lambda: end + lay, SharedState(), gateway=False)
     job = Job(Read(1, 4201, 61), Priority.BACKGROUND, CAUTIOUS)
     devices.answered(1, job.request.expectation(), 0.005, 0.0)
     result = ExchangeResult(ResultKind.REPLY, sent=0.0, end=end, turnaround=turnaround)

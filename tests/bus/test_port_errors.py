@@ -24,7 +24,7 @@ from tui.bus.transport.port_seen import latency_of, see_port
 
 from .conftest import BRISK
 from .peer import reply
-from .test_hostile_peers import QUESTION, REQUEST, HeldBack
+from .test_hostile_peers import QUESTION, REQUEST, CommandBlocked
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="no ports like these here")
 
@@ -65,7 +65,7 @@ def test_counts_begin_anew_with_the_driver() -> None:
 @pytest.mark.parametrize("answered", [False, True])
 async def test_added_request_is_counted_if_a_reply_fails(answered: bool) -> None:
     counts = counting(PortErrors(7, 1, 0, 0), PortErrors(10, 1, 2, 0))
-    transport, tally = HeldBack(b""), Tally()
+    transport, tally = CommandBlocked(b""), Tally()
     around = LineContext(BRISK, Trace(9), tally, time.monotonic, lambda *_: None)
     master = RtuMaster(
         transport, SerialLink("x"), around, lambda: None,

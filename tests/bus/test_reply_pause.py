@@ -26,7 +26,7 @@ from tui.wire.frames import frame
 
 from .conftest import BRISK
 from .peer import honest_pdu
-from .test_hostile_peers import HeldBack, Taker
+from .test_hostile_peers import CommandBlocked, Taker
 
 READ = Read(1, 5, 20)
 REPLY = frame(1, honest_pdu(READ.pdu()))
@@ -63,7 +63,7 @@ def test_missing_waits_for_a_known_echo_first() -> None:
 
 async def test_master_pauses_until_just_before_the_end_of_a_reply() -> None:
     paused: list[float] = []
-    transport = HeldBack(b"")
+    transport = CommandBlocked(b"")
     around = LineContext(BRISK, Trace(9), Tally(), time.monotonic, lambda *_: None)
     master = RtuMaster(transport, LINE, around, lambda: None, wire_time=False)
     master.pause = paused.append

@@ -27,20 +27,20 @@ from tui.bus.share.messages import (
     Alive,
     Answer,
     AnyMessage,
-    AskedFor,
     Asking,
     Claim,
-    Denied,
     Describe,
+    DriveRequested,
     Facts,
     Failed,
-    Granting,
     Hello,
     News,
     NoMessage,
     Notified,
     PollPause,
     PollWish,
+    RequestDenied,
+    RequestGranted,
     StopGiven,
     TurnedAway,
     Welcome,
@@ -49,7 +49,7 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.share.place import Owner
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.bus.stop_counts import StopCounts
 
 from .conftest import Share
@@ -242,9 +242,9 @@ SAMPLES: tuple[AnyMessage, ...] = (
     StopGiven((5, 6), (1, 2), "a key", STRANGER, 5.0),
     Alive(),
     Claim(5, True),
-    Denied(5, STRANGER),
-    AskedFor(5, STRANGER),
-    Granting(5, "stranger", True, "why"),
+    RequestDenied(5, STRANGER),
+    DriveRequested(5, STRANGER),
+    RequestGranted(5, "stranger", True, "why"),
     PollPause(5, "a test of its timeout"),
     Notified(5, "text"),
     PollWish({1: 0.2}, True),
@@ -398,7 +398,7 @@ async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
 
 
 def test_texts_of_other_programs_are_shown_plain_and_not_endless() -> None:
-    facts, heard = SharedFacts(), list[str]()
+    facts, heard = SharedState(), list[str]()
     facts.on_text(lambda _, text: heard.append(text))
     facts.on_stop(lambda _, by, program: heard.extend((by, program.text)))
     program = Program("x", "\x1b[31m" + "n" * 100, 7, "", "pts/\x07" + "3" * 100)

@@ -198,7 +198,7 @@ async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Shar
 async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
     share: Share, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
-    monkeypatch.setattr("tui.bus.share.signs.BACK_WITHIN", 0.5)
+    monkeypatch.setattr("tui.bus.share.heartbeat.BACK_WITHIN", 0.5)
     with (
         PtyPeer(honest) as peer,
         other_program(peer.path, tmp_path, "panel") as owner,

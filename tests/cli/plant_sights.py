@@ -8,7 +8,7 @@ from decimal import Decimal
 
 from tests.session.fakes import OneDrive, parameter, profile_of
 from tui.bus.model import DeviceCounters, LineCounters, LineState, LineStatus
-from tui.cli.plant.sights import DriveSight, LineSight, drive_sight
+from tui.cli.plant.status import DriveStatus, LineReport, drive_status_of
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.drive import DriveSession
@@ -62,16 +62,16 @@ def cycle(profile: Profile, *, quality: Quality = Quality.GOOD, **raws: int) -> 
 
 
 def line_of(
-    *drives: DriveSight, name: str = "pump", counters: LineCounters | None = None
-) -> LineSight:
+    *drives: DriveStatus, name: str = "pump", counters: LineCounters | None = None
+) -> LineReport:
     """A line with these drives."""
-    return LineSight(name, "tcp:10.0.0.1:502", CONNECTED, counters or LineCounters(), drives)
+    return LineReport(name, "tcp:10.0.0.1:502", CONNECTED, counters or LineCounters(), drives)
 
 
-def drive_of(seen: Snapshot, profile: Profile | None = None, now: float = NOW) -> DriveSight:
+def drive_of(seen: Snapshot, profile: Profile | None = None, now: float = NOW) -> DriveStatus:
     """Drive 2 by this cycle."""
     session = DriveSession(OneDrive({}, device=2), 2, profile or small_drive())
-    return drive_sight(2, session, seen, now)
+    return drive_status_of(2, session, seen, now)
 
 
 def failed(seen: Snapshot, error: str) -> Snapshot:

@@ -217,7 +217,7 @@ def test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_do
         tasks.append(asyncio.ensure_future(to_its_end([OpenLine.__new__(OpenLine)], work)))
         return await tasks[0]
 
-    monkeypatch.setattr("tui.cli.shared.left_alone.say_farewells", interrupted)
+    monkeypatch.setattr("tui.cli.shared.pending_timeouts.say_farewells", interrupted)
     if failure:
         with pytest.raises(Failure, match=failure):
             asyncio.run(command())

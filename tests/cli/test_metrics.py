@@ -16,7 +16,7 @@ import pytest_asyncio
 from tui.bus.api import Contact, DeviceCounters, LastMinute, LineCounters
 from tui.cli.plant.metrics import BASE_UNITS, metrics_text, value_metric
 from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
-from tui.cli.plant.sights import DriveSight, LineSight
+from tui.cli.plant.status import DriveStatus, LineReport
 from tui.drive.profile import library
 
 from .plant_sights import NOW, counted, cycle, drive_of, failed, line_of, small_drive
@@ -25,11 +25,11 @@ SAMPLE = re.compile(r'drivepanel_[a-z_]+\{([a-z]+="([^"\\]|\\[\\"n])*",?)*\} \S+
 WHERE = 'line="pump",device="2"'
 
 
-def text_of(*lines: LineSight) -> str:
+def text_of(*lines: LineReport) -> str:
     return metrics_text(lines, "1.0", NOW)
 
 
-def samples(*lines: LineSight) -> set[str]:
+def samples(*lines: LineReport) -> set[str]:
     return {line for line in text_of(*lines).splitlines() if not line.startswith("#")}
 
 
@@ -110,7 +110,7 @@ def test_uncertain_value_is_not_a_number_and_taught_scale_is_marked() -> None:
 
 @pytest.mark.parametrize("contact", get_args(Contact))
 def test_result_of_the_last_requests_is_one_of_five(contact: Contact) -> None:
-    seen = samples(line_of(DriveSight(2, error="Why.", contact=contact)))
+    seen = samples(line_of(DriveStatus(2, error="Why.", contact=contact)))
     contacts = [one for one in seen if one.startswith("drivepanel_drive_contact")]
     assert len(contacts) == len(get_args(Contact))
     expected = f'drivepanel_drive_contact{{{WHERE},contact="{contact}"}} 1'
@@ -132,7 +132,7 @@ def test_cycle_time_is_published_with_the_wished_one() -> None:
 
 
 def test_a_drive_that_was_never_found_is_down_and_nothing_else() -> None:
-    seen = samples(line_of(DriveSight(2, error="Nobody answers.")))
+    seen = samples(line_of(DriveStatus(2, error="Nobody answers.")))
     assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen
     assert not [one for one in seen if "value" in one or "info{line" in one]
 

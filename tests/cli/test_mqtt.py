@@ -20,7 +20,7 @@ from tests.session.test_stop import wait_for
 from tui.cli.plant import mqtt
 from tui.cli.plant.broker import PASSWORD_SETTING, Broker, broker_of, level, need_mqtt
 from tui.cli.plant.mqtt import MqttPublisher, client_id
-from tui.cli.plant.sights import DriveSight, LineSight
+from tui.cli.plant.status import DriveStatus, LineReport
 from tui.cli.plant.topics import drive_messages, line_messages, line_topics
 from tui.cli.shared.errors import Failure
 
@@ -52,7 +52,7 @@ def test_bad_reading_is_marked() -> None:
     reported = json.loads(text)
     assert (reported["state"], reported["error"]) == (None, "No answer.")
     assert {one["quality"] for one in reported["values"].values()} == {"stale"}
-    (text,) = drive_messages("plant", [line_of(DriveSight(2, error="Nobody."))]).values()
+    (text,) = drive_messages("plant", [line_of(DriveStatus(2, error="Nobody."))]).values()
     assert json.loads(text) | {"error": "Nobody.", "values": {}, "profile": None} == json.loads(
         text
     )
@@ -194,7 +194,7 @@ async def test_everything_is_retained_anew_after_a_lost_connection(
     clients: type[FakeClient], capsys: pytest.CaptureFixture[str]
 ) -> None:
     clients.refuses = 2
-    sights: list[LineSight] = [line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=1)))]
+    sights: list[LineReport] = [line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=1)))]
     publisher = MqttPublisher(BROKER, lambda: sights)
     task = asyncio.create_task(publisher.run())
     topics = {"plant/status", "plant/pump/line", "plant/pump/2"}
@@ -227,7 +227,7 @@ async def test_an_error_that_nobody_foresaw_ends_no_publishing(
 ) -> None:
     wrong = [True]
 
-    def sights() -> list[LineSight]:
+    def sights() -> list[LineReport]:
         if wrong:
             raise RuntimeError(wrong.pop())
         return [line_of()]

@@ -16,7 +16,7 @@ from tui.bus.line import Line, Timing
 from tui.bus.link import RtuTcpLink
 from tui.cli.plant import drives
 from tui.cli.plant.drives import PlantDrive, PlantLine
-from tui.cli.plant.sights import DriveSight
+from tui.cli.plant.status import DriveStatus
 from tui.cli.shared.options import Target
 from tui.session.connect.open_line import OpenLine
 from tui.simulator import Simulation, parse_drives
@@ -38,7 +38,7 @@ class Bench:
         assert self.opened.simulation is not None
         return self.opened.simulation
 
-    def sight(self, device: int) -> DriveSight:
+    def sight(self, device: int) -> DriveStatus:
         seen = self.plant.sight(time.monotonic())
         return next(one for one in seen.drives if one.device == device)
 

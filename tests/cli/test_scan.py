@@ -20,7 +20,7 @@ import pytest
 from tests.bus.peer import PtyPeer, Step, TcpPeer, silent, tcp_reply, tcp_request_length
 from tests.programs import DRIVEPANEL, PATIENCE, served
 from tui.drive.finding import LineSetting, likely_settings
-from tui.session.connect import strangers
+from tui.session.connect import address_prober
 from tui.simulator import DriveSpec, LineTiming, Simulation
 from tui.wire.frames import frame, read_frame
 
@@ -36,8 +36,8 @@ MOTORS = (DriveSpec("atv71", 2), DriveSpec("atv312", 4), DriveSpec("powerdrive",
 def busy_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Listens for less long, tries fewer settings, and waits for drives of this very process."""
     monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.5)
-    monkeypatch.setattr(strangers, "JITTER", 0.25)
-    monkeypatch.setattr(strangers, "likely_settings", lambda *a: likely_settings(*a)[:6])
+    monkeypatch.setattr(address_prober, "JITTER", 0.25)
+    monkeypatch.setattr(address_prober, "likely_settings", lambda *a: likely_settings(*a)[:6])
 
 
 @contextmanager
@@ -269,7 +269,7 @@ def test_other_settings_are_tried_and_what_hears_two_is_reported_once() -> None:
 
 def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = [LineSetting(9600, "8E1"), LineSetting(600, "8E1"), LineSetting(300, "8E1")]
-    monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
+    monkeypatch.setattr(address_prober, "likely_settings", lambda *_: slow)
     with PtyPeer(silent) as peer:
         done = invoked("scan", peer.path, "--addresses", "1", "--all-settings", "--json")
     (reported,) = events(done.stdout, "slow")

@@ -12,7 +12,7 @@ import pytest
 from tui.bus.fake import FakeLine
 from tui.cli.commands import serve
 from tui.cli.commands.serve import with_named
-from tui.cli.plant.wish import read_drives
+from tui.cli.plant.publish_options import read_drives
 from tui.cli.running.serving import GatewayWish
 from tui.cli.shared.host_port import host_port, written_host_port
 from tui.cli.shared.served_lines import ServedLine, served_lines

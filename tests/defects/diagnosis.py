@@ -12,7 +12,7 @@ MEASURED = "tests/session/test_examining.py"
 DEFECTS = (
     Defect(
         "silent-drive-said-to-be-well",
-        "tui/session/diagnosis/rungs.py",
+        "tui/session/diagnosis/checks.py",
         "return bool(heard.requested) and heard.nothing and not heard.echoed",
         "return bool(heard.requested) and heard.nothing and bool(sight.neighbors)",
         "A script takes a line on which nobody answers for a good one.",
@@ -36,7 +36,7 @@ DEFECTS = (
     ),
     Defect(
         "families-own-exception-taken-for-a-gateways",
-        "tui/session/diagnosis/rungs.py",
+        "tui/session/diagnosis/checks.py",
         "if code in codes]",
         "if code not in codes]",
         "A gateway that does not reach the drive is looked for in the drive.",
@@ -44,7 +44,7 @@ DEFECTS = (
     ),
     Defect(
         "latency-told-unmeasured",
-        "tui/session/diagnosis/rungs.py",
+        "tui/session/diagnosis/checks.py",
         "return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT",
         "return not sight.heard.damaged",
         "An adapter that holds nothing back is blamed.",

@@ -177,7 +177,7 @@ DEFECTS = (
     ),
     Defect(
         "unread-channel-word-passes",
-        "tui/drive/held_back.py",
+        "tui/drive/command_blocked.py",
         "if found is not None and not found.by_line:",
         "if found is not None and found.by_line is False:",
         "A run command is sent to a drive of which nobody knows who commands it.",
@@ -185,8 +185,8 @@ DEFECTS = (
     ),
     Defect(
         "unread-interlock-passes",
-        "tui/drive/held_back.py",
-        'return HeldBack(f"{lock.parameter} is not known, and it decides: {lock.text}")',
+        "tui/drive/command_blocked.py",
+        'return CommandBlocked(f"{lock.parameter} is not known, and it decides: {lock.text}")',
         "return None",
         "A motor is started although the word that forbids it could not be read.",
         ("tests/drive/test_orders.py",),

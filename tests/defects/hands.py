@@ -44,7 +44,7 @@ DEFECTS = (
     ),
     Defect(
         "stop-that-reaches-nobody-is-silent",
-        "tui/screens/hands.py",
+        "tui/screens/key_dispatcher.py",
         '            self.events.add("failed", text)\n            self.unreached = text,',
         "            _ = text,",
         "F9 stops all but one drive, and says nothing of it.",
@@ -68,7 +68,7 @@ DEFECTS = (
     ),
     Defect(
         "error-behind-a-stop-key-loses-it",
-        "tui/screens/hands.py",
+        "tui/screens/key_dispatcher.py",
         "                fleet.last_stop(error, chosen)\n",
         "                pass\n",
         "An error in the panel takes the stop key away.",
@@ -102,7 +102,7 @@ DEFECTS = (
     ),
     Defect(
         "keys-count-while-a-line-opens",
-        "tui/screens/hands.py",
+        "tui/screens/key_dispatcher.py",
         "if name in STOP_KEYS or self.screen.is_modal:",
         "if True:",
         "Keys typed while the demo opens open a real line of another day instead.",
@@ -113,7 +113,7 @@ DEFECTS = (
     ),
     Defect(
         "key-read-while-a-line-opens-counts-later",
-        "tui/screens/hands.py",
+        "tui/screens/key_dispatcher.py",
         "if stroke is None or stroke.read_at > self.opening.ended:",
         "if True:",
         "A key that a slow panel takes late opens a drive, or another line, of its own.",

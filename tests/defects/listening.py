@@ -84,8 +84,8 @@ DEFECTS = (
     Defect(
         "likely-told-as-sure",
         "tui/session/listening/families.py",
-        'return TakenFamily(first, "likely",',
-        'return TakenFamily(first, "identified",',
+        'return AssumedProfile(first, "likely",',
+        'return AssumedProfile(first, "identified",',
         "A guessed family is shown as one that the drive has told.",
         ("tests/session/test_listening.py::test_a_family_is_likely_by_what_the_drive_answers",),
     ),
@@ -132,7 +132,7 @@ DEFECTS = (
     ),
     Defect(
         "listening-says-it-stops",
-        "tui/screens/hands.py",
+        "tui/screens/key_dispatcher.py",
         "if self.hearing and not self.fleets:",
         "if False:",
         "A person relies on a stop key that stops nothing.",

@@ -11,7 +11,7 @@ BYSTANDER = "tests/session/test_bystander.py"
 DEFECTS = (
     Defect(
         "plant-feeds-a-dead-commanders-motor",
-        "tui/session/sharing/bystander.py",
+        "tui/session/sharing/observer_poller.py",
         "return self._silence() > timeout + ACTED_AFTER",
         "return True",
         "A motor whose controller died runs on for the sake of a graph.",
@@ -19,7 +19,7 @@ DEFECTS = (
     ),
     Defect(
         "plant-feeds-what-an-ended-program-left",
-        "tui/session/sharing/bystander.py",
+        "tui/session/sharing/observer_poller.py",
         "if sign is None and not self.orphan:",
         "if sign is None:",
         "A service that comes back keeps the motor of the one before running.",
@@ -51,7 +51,7 @@ DEFECTS = (
     ),
     Defect(
         "old-cycle-for-good",
-        "tui/cli/plant/sights.py",
+        "tui/cli/plant/status.py",
         "if session is not None and cycle.is_stale(now):",
         "if False:",
         "Values stay good though nobody reads the drive any more.",

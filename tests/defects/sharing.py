@@ -21,7 +21,7 @@ BLOCK = "tests/cli/test_block.py"
 DEFECTS = (
     Defect(
         "keeper-sends-what-is-not-armed",
-        "tui/bus/shared_facts.py",
+        "tui/bus/shared_state.py",
         "if writes and self.gated else",
         "if False else",
         "A program that is wrong about itself writes to a drive that is not armed.",
@@ -45,7 +45,7 @@ DEFECTS = (
     ),
     Defect(
         "heartbeat-beside-a-hung-loop",
-        "tui/bus/share/signs.py",
+        "tui/bus/share/heartbeat.py",
         "if monotonic() - self._turned < LOOP_HANGS:",
         "if True:",
         "The motor of a program that hangs for good runs on.",
@@ -85,7 +85,7 @@ DEFECTS = (
     ),
     Defect(
         "due-stop-not-carried-out",
-        "tui/session/sharing/guardian.py",
+        "tui/session/sharing/orphan_motors.py",
         'self._spawn(partial(self._stop, devices, by), f"stop for {by}")',
         "pass",
         "The keeper hears of a stop that nobody sends, and does not send it.",
@@ -157,7 +157,7 @@ DEFECTS = (
     ),
     Defect(
         "line-comes-and-goes-for-ever",
-        "tui/session/sharing/guardian.py",
+        "tui/session/sharing/orphan_motors.py",
         "self._lost.setdefault(session.device, self._clock.monotonic())",
         "self._clock.monotonic()",
         "A keeper lives for ever on a port whose number another program has got.",
@@ -213,7 +213,7 @@ DEFECTS = (
     ),
     Defect(
         "thawed-owner-sends-on",
-        "tui/bus/share/signs.py",
+        "tui/bus/share/heartbeat.py",
         "lambda: self._stood > SENDS_WITHIN",
         "lambda: False",
         "A frozen panel goes on with a run command from before a stop.",
@@ -221,7 +221,7 @@ DEFECTS = (
     ),
     Defect(
         "frozen-client-kept",
-        "tui/bus/share/signs.py",
+        "tui/bus/share/heartbeat.py",
         "if client.is_silent(now, LOOKS_IN_VAIN):",
         "if False:",
         "A frozen program commands its drive for ever, and a recorder feeds its motor.",
@@ -253,7 +253,7 @@ DEFECTS = (
     ),
     Defect(
         "motor-of-a-living-program-left",
-        "tui/session/sharing/guardian.py",
+        "tui/session/sharing/orphan_motors.py",
         "absent = pids_absent(self._line.facts) | {program.process}",
         "absent = pids_absent(self._line.facts) - {program.process}",
         "A recorder feeds the motor of a frozen program for ever.",
@@ -328,7 +328,7 @@ DEFECTS = (
     ),
     Defect(
         "queued-writes-outlive-a-stop",
-        "tui/bus/shared_facts.py",
+        "tui/bus/shared_state.py",
         "if stamp != self.stops.stamp(device):",
         "if False:",
         "A run command that waited behind a stop starts the motor again.",
@@ -336,7 +336,7 @@ DEFECTS = (
     ),
     Defect(
         "two-command-one-drive",
-        "tui/bus/shared_facts.py",
+        "tui/bus/shared_state.py",
         "if holder is not None and holder != program:",
         "if False:",
         "Two programs write to one drive in turns.",
@@ -440,7 +440,7 @@ DEFECTS = (
     ),
     Defect(
         "motor-of-a-killed-program-fed",
-        "tui/session/sharing/guardian.py",
+        "tui/session/sharing/orphan_motors.py",
         'self._stopper.stop([session], by=f"{program.text} {why}")',
         "return",
         "A recorder keeps a motor running whose program was killed.",
@@ -448,7 +448,7 @@ DEFECTS = (
     ),
     Defect(
         "no-time-to-take-a-motor-over",
-        "tui/session/sharing/guardian.py",
+        "tui/session/sharing/orphan_motors.py",
         "if takers else begun",
         "if frozen else begun",
         "A motor stops before the person beside it can take it over.",
@@ -456,7 +456,7 @@ DEFECTS = (
     ),
     Defect(
         "motor-left-running-on-purpose-stopped",
-        "tui/session/sharing/guardian.py",
+        "tui/session/sharing/orphan_motors.py",
         "and not one.left_running",
         "",
         "A pump that was to run on is stopped.",

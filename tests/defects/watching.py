@@ -146,7 +146,7 @@ DEFECTS = (
     ),
     Defect(
         "kept-alive-by-no-program",
-        "tui/bus/shared_facts.py",
+        "tui/bus/shared_state.py",
         "        self.keep_alives.end(program.id)\n",
         "",
         "Reads keep a motor running whose program has died.",

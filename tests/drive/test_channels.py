@@ -8,7 +8,7 @@ import pytest
 
 from tui.drive.channel import channel_codes, command_channel, reference_channel, switch_texts
 from tui.drive.chart import read_chart
-from tui.drive.held_back import held_back
+from tui.drive.command_blocked import held_back
 from tui.drive.orders import chart_in_force
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile

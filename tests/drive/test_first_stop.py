@@ -17,9 +17,9 @@ from tui.drive.first_stop import (
 from tui.drive.orders import GENTLE_FIRST
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
-from tui.drive.profile.stop_facts import StopFacts, stop_facts
+from tui.drive.profile.stop_profile import StopProfile, stop_profile
 
-FACTS = stop_facts()
+FACTS = stop_profile()
 PLACES = {one.address: one for one in stop_places(FACTS)}
 CMD, CHCF, DOTD, ETA, LEROY, LEROY_STATUS = 8501, 8401, 8652, 3201, 641, 1039
 ENABLED, HALF_WAY = 0x0027, 0x0021
@@ -33,7 +33,7 @@ def word(address: int, raws: dict[int, int], way: OrderId = "stop", *named: str)
 
 
 @pytest.mark.parametrize("one", FACTS, ids=lambda one: one.id)
-def test_quick_head_equals_full_profile(one: StopFacts) -> None:
+def test_quick_head_equals_full_profile(one: StopProfile) -> None:
     profile = library.load(one.id)
     assert one.charts == tuple(profile.data.charts)
     assert one.names_itself is (profile.function(43) is not None)
@@ -50,7 +50,7 @@ def test_a_profile_of_the_users_own_is_read_too() -> None:
     for name in ("atv71.toml",):
         text = (packaged / name).read_text().replace('id = "atv71"', 'id = "pump"', 1)
         (folder / "pump.toml").write_text(text)
-    found = {one.id: one for one in stop_facts()}
+    found = {one.id: one for one in stop_profile()}
     assert found["pump"].charts == found["atv71"].charts
     assert set(found["atv71"].places) <= set(found["pump"].places)
 

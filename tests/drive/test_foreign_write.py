@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tui.drive.foreign_write import (
     ALL,
     WordKind,
-    foreign_words,
+    classify_words,
     setting_refusal,
     stop_deciding_codes,
     value_refusal,
@@ -23,7 +23,7 @@ DRIVECOM, IO, SERIES_8 = {"CHCF": 1}, {"CHCF": 3, "TCC": 0}, {"CHCF": 0}
 
 
 def kind(profile: Profile, code: str, word: int, **raws: int) -> WordKind:
-    (found,) = foreign_words(profile, {profile[code].address: word}, raws)
+    (found,) = classify_words(profile, {profile[code].address: word}, raws)
     return found.kind
 
 
@@ -97,13 +97,13 @@ def test_a_scanner_word_that_passes_a_command_on_is_a_command() -> None:
 def test_a_setting_is_distinguished_from_what_nobody_knows() -> None:
     assert kind(ATV71, "ACC", 30) is WordKind.SETTING
     assert kind(ATV71, "RFR", 30) is WordKind.UNKNOWN
-    (found,) = foreign_words(ATV71, {64000: 1}, {})
+    (found,) = classify_words(ATV71, {64000: 1}, {})
     assert found.kind is WordKind.UNKNOWN
 
 
 def test_all_leaves_out_who_commands_and_what_cuts_the_line() -> None:
     def refusal(code: str, *allowed: str) -> str:
-        (found,) = foreign_words(ATV71, {ATV71[code].address: 1}, {})
+        (found,) = classify_words(ATV71, {ATV71[code].address: 1}, {})
         assert found.kind is WordKind.SETTING
         return setting_refusal(ATV71, found, allowed)
 
@@ -153,4 +153,4 @@ def test_words_read_before_stop_decide(word: int, profile: Profile, values: list
     for chart in charts:
         words = {profile[chart.command].address: word}
         read = {code: raws[code] for code in stop_deciding_codes(profile, words)}
-        assert foreign_words(profile, words, raws) == foreign_words(profile, words, read)
+        assert classify_words(profile, words, raws) == classify_words(profile, words, read)

@@ -10,7 +10,7 @@ from tests.programs import PATIENCE
 PROGRAM = """
 import sys, threading
 sys.setswitchinterval(1e-6)
-from tui.drive.profile import library, stop_facts
+from tui.drive.profile import library, stop_profile
 ids = [listing.id for listing in library.listings()]
 start = threading.Barrier(len(ids) + 1)
 def load(id):
@@ -21,7 +21,7 @@ for thread in threads:
     thread.start()
 start.wait()
 for listing in library.listings():
-    stop_facts._quick(listing.path)
+    stop_profile._quick(listing.path)
 for thread in threads:
     thread.join()
 print(len({library.load(id).id for id in ids}))

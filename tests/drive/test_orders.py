@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tui.drive.held_back import held_back
+from tui.drive.command_blocked import held_back
 from tui.drive.orders import MOVING_ORDERS, STOP_ORDERS
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile

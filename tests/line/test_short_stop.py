@@ -14,7 +14,7 @@ import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, keepers, served, wait_until
 from tui.bus.program import Program
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.drive import DriveSession
@@ -42,7 +42,7 @@ def panel(with_keepers: None) -> Iterator[OpenLine]:
         yield opened
 
 
-def stops_heard(facts: SharedFacts) -> list[tuple[tuple[int, ...], Program, bool]]:
+def stops_heard(facts: SharedState) -> list[tuple[tuple[int, ...], Program, bool]]:
     """Stops of others from now on: of which devices, by whom, and True if that one is attached."""
     heard: list[tuple[tuple[int, ...], Program, bool]] = []
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from tests.session.sets_bench import Bench, bench
-from tui.bus.errors import UNKNOWN_FATE, DeviceException, LineLost, NoAnswer, RequestRefused
+from tui.bus.errors import OUTCOME_UNKNOWN, DeviceException, LineLost, NoAnswer, RequestRefused
 from tui.cli.shared.errors import LINE_TROUBLE, REFUSED_HERE
 from tui.cli.shared.messages import Messages
 from tui.cli.shared.sets import ResultTelling, status_of_results
@@ -245,7 +245,7 @@ async def test_a_line_that_goes_on_at_another_owner_is_gone_on_with(taken: bool)
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
         ended = "The program that owned the line ended during the request."
-        lost = LineLost(ended + UNKNOWN_FATE)
+        lost = LineLost(ended + OUTCOME_UNKNOWN)
         sent = made.lose_answer("DEC", lost, taken=taken)
         applied = await made.write(edits)
         was = EditOutcome.DONE if taken else EditOutcome.NOT_SENT

@@ -9,12 +9,12 @@ from typing import Any, cast
 import pytest
 
 from tui.session.drive import DriveSession
-from tui.session.sharing.bystander import (
+from tui.session.sharing.observer_poller import (
     ACTED_AFTER,
     COMMANDER_SILENT,
     GRACE_SHARE,
     UNKNOWN_TIMEOUT_ACTED,
-    Bystander,
+    ObserverPoller,
 )
 from tui.session.timeout_report import Timeout, TimeoutWatch
 
@@ -38,7 +38,7 @@ class Bench:
         line = SimpleNamespace(device_state=lambda _: SimpleNamespace(heard=self.heard))
         session = SimpleNamespace(line=line, device=1)
         self.session = session
-        self.looks_on = Bystander(
+        self.looks_on = ObserverPoller(
             cast(DriveSession, session), lambda: self.sign, lambda: self.latest, lambda: self.time
         )
 

@@ -19,7 +19,7 @@ from tui.drive.orders import OrderRefused, chart_in_force, stop_in_any
 from tui.drive.profile import library
 from tui.drive.values import is_enumeration, is_field, raw_range, to_words, word_count
 from tui.session.command.access import CommandAccess
-from tui.session.command.given import GivenCommands
+from tui.session.command.command_history import CommandHistory
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.drive import DriveSession
@@ -141,7 +141,7 @@ async def test_line_that_was_lost_is_checked_again_before_a_command() -> None:
         session.arming.arm()
         simulation.faults.rates = SWAPPED
         Reader(session).forget()
-        given = GivenCommands(session)
+        given = CommandHistory(session)
         access = CommandAccess(session, Journal(), given, Permit(session.work, session.work.stops))
         with pytest.raises(BytesSwapped):
             await access.read(["RFR"])

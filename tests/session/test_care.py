@@ -18,7 +18,7 @@ from tui.session.care_data import CareData, packed_care
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.sharing.care import DrivesInCare
-from tui.session.sharing.guardian import Guardian
+from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
 from .test_guardian import GONE, Bench, come
 from .test_guardian import bench as bench
@@ -36,9 +36,9 @@ def kept() -> Iterator[tuple[DrivesInCare, FakeLine, Journal]]:
     journal.close()
 
 
-def guard(bench: Bench) -> Guardian:
+def guard(bench: Bench) -> OrphanMotorGuard:
     """One that knows no drive by itself, as a keeper."""
-    return Guardian(bench.line, bench.journal, clock=bench.clock, starts=bench.starts)
+    return OrphanMotorGuard(bench.line, bench.journal, clock=bench.clock, starts=bench.starts)
 
 
 def arm(bench: Bench, device: int, family: str) -> None:

@@ -15,7 +15,7 @@ import tui.session
 from tui.bus.api import LineState, LineStatus
 from tui.bus.limits import Limits
 from tui.bus.line import Line
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR
 from tui.session.clock import Clock
@@ -62,7 +62,7 @@ class ConnectedLine:
     read_only = False
     state = LineState(LineStatus.CONNECTED, "", 0.0)
     held = ""
-    facts = SharedFacts()
+    facts = SharedState()
 
     def describe(self, _device: int, _limits: Limits) -> None:
         """What a device may be sent does not matter here."""

@@ -51,13 +51,13 @@ from tui.bus.transport.port_seen import PortSeen
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.session.connect.known_line import KnownLine
-from tui.session.diagnosis.asking import sight_of_drive, sight_of_port
+from tui.session.diagnosis.asking import evidence_of_port, sight_of_drive
+from tui.session.diagnosis.checks import LADDER
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.evidence import AdapterSeen, DiagnosticEvidence
 from tui.session.diagnosis.gateway_probe import Works
 from tui.session.diagnosis.heard import Heard, heard_by_errors
 from tui.session.diagnosis.measure import Measure
-from tui.session.diagnosis.rungs import LADDER
-from tui.session.diagnosis.sight import AdapterSeen, Sight
 from tui.wire.frames import frame
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
@@ -99,13 +99,13 @@ def reported(found: Diagnosis) -> Diagnosis:
     return found
 
 
-def of(sight: Sight) -> Diagnosis:
+def of(sight: DiagnosticEvidence) -> Diagnosis:
     return reported(diagnosed(sight))
 
 
-def heard(**seen: Any) -> Sight:
+def heard(**seen: Any) -> DiagnosticEvidence:
     """What a drive answered on a good port."""
-    return Sight(LINK, 2, PROFILE, heard=Heard(requested=3, **seen))
+    return DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=3, **seen))
 
 
 def test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed() -> None:
@@ -149,7 +149,7 @@ def test_no_port(tmp_path: Path) -> None:
     path = str(tmp_path / "ttyUSB7")
     with pytest.raises(PortMissing) as caught:
         Line(SerialLink(path)).open(wait=5.0)
-    found = of(sight_of_port(SerialLink(path), 2, caught.value))
+    found = of(evidence_of_port(SerialLink(path), 2, caught.value))
     assert (found.rung, found.text) == ("no-port", f"There is no port {path}.")
     assert "dmesg" in found.steps[-1]
 
@@ -165,7 +165,7 @@ def test_an_adapter_that_has_another_number_now(adapters: Adapters) -> None:
     port = remembered(adapters, "ttyUSB0", "A5")
     adapters.unplug("ttyUSB0")
     moved = adapters.plug("ttyUSB3", "1.2", serial="A5")
-    found = of(sight_of_port(SerialLink(port), 2, PortMissing(port)))
+    found = of(evidence_of_port(SerialLink(port), 2, PortMissing(port)))
     assert found.rung == "renumbered"
     assert found.text == f"{port} is not there: the adapter that it was is {moved} now."
     assert moved in found.steps[0]
@@ -176,16 +176,16 @@ def test_another_adapter_has_the_name_now(adapters: Adapters) -> None:
     port = remembered(adapters, "ttyUSB0", "A5")
     adapters.unplug("ttyUSB0")
     adapters.plug("ttyUSB0", "1.2", serial="B7")
-    found = of(sight_of_port(SerialLink(port), 2))
+    found = of(evidence_of_port(SerialLink(port), 2))
     assert found.rung == "renumbered"
     assert found.text.endswith("the one that it was is not plugged in.")
     moved = adapters.plug("ttyUSB1", "1.1", serial="A5")
-    assert f"is {moved} now." in of(sight_of_port(SerialLink(port), 2)).text
+    assert f"is {moved} now." in of(evidence_of_port(SerialLink(port), 2)).text
 
 
 def test_an_adapter_in_its_place_is_no_rung(adapters: Adapters) -> None:
     port = remembered(adapters, "ttyUSB0", "A5")
-    assert sight_of_port(SerialLink(port), 2).adapter.was == ""
+    assert evidence_of_port(SerialLink(port), 2).adapter.was == ""
 
 
 def test_a_port_that_a_program_has() -> None:
@@ -197,7 +197,7 @@ def test_a_port_that_a_program_has() -> None:
                 Line(SerialLink(peer.path)).open(wait=5.0)
         finally:
             first.close()
-    busy = replace(sight_of_port(LINK, 2), port=PortSeen(PORT))
+    busy = replace(evidence_of_port(LINK, 2), port=PortSeen(PORT))
     found = of(replace(busy, trouble=caught.value))
     assert found.rung == "busy"
     assert "(pid " in found.text
@@ -211,7 +211,7 @@ def test_a_port_that_a_program_has() -> None:
 
 
 def test_a_program_that_listens_on_the_same_port() -> None:
-    seen = Sight(
+    seen = DiagnosticEvidence(
         LINK, 2, PROFILE, port=PortSeen(PORT, others="cat (pid 3)"), heard=Heard(requested=2)
     )
     assert of(seen).text == f"cat (pid 3) has {PORT} open too, and takes what the drive answers."
@@ -239,7 +239,7 @@ def test_a_program_that_listens_on_the_same_port() -> None:
     ],
 )
 def test_no_permission(seen: PortSeen, text: str, step: str) -> None:
-    found = of(Sight(LINK, 2, trouble=PortRefused(PORT, "no."), port=seen))
+    found = of(DiagnosticEvidence(LINK, 2, trouble=PortRefused(PORT, "no."), port=seen))
     assert found.rung == "no-permission"
     assert text in found.text
     assert step in found.steps[0]
@@ -247,7 +247,7 @@ def test_no_permission(seen: PortSeen, text: str, step: str) -> None:
 
 def test_a_port_that_takes_no_such_format() -> None:
     trouble = PortRefused(PORT, "it does not take parity E.")
-    found = of(Sight(LINK, 2, trouble=trouble, port=PortSeen(PORT)))
+    found = of(DiagnosticEvidence(LINK, 2, trouble=trouble, port=PortSeen(PORT)))
     assert (found.rung, "parity E" in found.text) == ("port-refused", True)
 
 
@@ -257,7 +257,7 @@ def test_a_host_that_is_not_reached() -> None:
     link = TcpLink("127.0.0.1", port)
     with pytest.raises(LineError) as caught:
         Line(link).open(wait=0.5)
-    found = of(sight_of_port(link, 2, caught.value))
+    found = of(evidence_of_port(link, 2, caught.value))
     assert found.rung == "line-lost"
     assert "gateway" in found.steps[0]
 
@@ -275,7 +275,7 @@ def test_latency_is_reported_where_it_is_set_and_measured(
 ) -> None:
     heard = Heard(requested=5, answered=5)
     port = PortSeen(PORT, latency=latency)
-    found = of(Sight(LINK, 2, PROFILE, port=port, heard=heard, turnaround=turnaround))
+    found = of(DiagnosticEvidence(LINK, 2, PROFILE, port=port, heard=heard, turnaround=turnaround))
     assert found.rung == rung
     if rung == "slow-adapter":
         assert "17 ms after each request" in found.text
@@ -323,7 +323,7 @@ async def test_bytes_that_came_at_another_baud_tell_which(baud: int, line: Opene
 
 def test_the_counts_of_a_real_port_tell_it() -> None:
     errors = PortErrors(framing=3, parity=1, breaks=2, overruns=0)
-    found = of(Sight(LINK, 2, PROFILE, heard=Heard(requested=2), errors=errors))
+    found = of(DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=2), errors=errors))
     assert found.rung == "wrong-settings"
     assert "3 without a stop bit and 1 with a wrong parity and 2 breaks" in found.text
 
@@ -346,7 +346,9 @@ async def test_the_counts_come_from_the_line() -> None:
 @pytest.mark.parametrize("family", ["proxidrive", "varmeca"])
 def test_a_speed_that_the_family_has_not(family: str) -> None:
     profile = library.load(family)
-    found = of(Sight(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(requested=2)))
+    found = of(
+        DiagnosticEvidence(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(requested=2))
+    )
     assert found.rung == "silence"
     assert found.steps[0].startswith("38400 bit/s does not work on ")
     assert "300 to 19200" in found.steps[0]
@@ -511,7 +513,7 @@ async def test_it_asks_as_an_operator_does() -> None:
 )
 def test_the_ends_of_requests_tell_it_too(error: LineError | None, rung: str) -> None:
     heard = heard_by_errors([error, error], 2)
-    assert of(Sight(LINK, 2, PROFILE, heard=heard)).rung == rung
+    assert of(DiagnosticEvidence(LINK, 2, PROFILE, heard=heard)).rung == rung
 
 
 # What the manual of a family says to look at next
@@ -519,7 +521,7 @@ def test_the_ends_of_requests_tell_it_too(error: LineError | None, rung: str) ->
 
 def steps_in_silence(family: str, device: int = 2) -> str:
     link = SerialLink(PORT, 19200, "8E1")
-    found = of(Sight(link, device, library.load(family), heard=Heard(requested=2)))
+    found = of(DiagnosticEvidence(link, device, library.load(family), heard=Heard(requested=2)))
     assert found.rung == "silence"
     return "\n".join(found.steps)
 
@@ -556,13 +558,13 @@ def test_an_address_that_no_drive_has() -> None:
 
 def test_a_format_that_the_family_has_not() -> None:
     link = SerialLink(PORT, 19200, "8O2")
-    found = of(Sight(link, 2, PROFILE, heard=Heard(requested=2)))
+    found = of(DiagnosticEvidence(link, 2, PROFILE, heard=Heard(requested=2)))
     assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
 
 
 # The ladder as a whole
 
-ASKED = Sight(LINK, 2, PROFILE, port=PortSeen(PORT))
+ASKED = DiagnosticEvidence(LINK, 2, PROFILE, port=PortSeen(PORT))
 EXAMPLES = {
     "other-master": replace(
         ASKED, overheard="Another master polls drives on this line. Address 2."
@@ -633,6 +635,6 @@ CODES = st.lists(st.sampled_from([1, 2, 10, 11]), max_size=2).map(tuple)
 def test_a_drive_that_has_not_answered_is_never_reported_to_be_well(
     heard: Heard, profile: Profile | None
 ) -> None:
-    found = of(Sight(LINK, 2, profile, heard=heard))
+    found = of(DiagnosticEvidence(LINK, 2, profile, heard=heard))
     assert found.rung not in ("answers", "not-open")
     assert found.steps

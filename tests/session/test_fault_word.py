@@ -8,13 +8,13 @@ import pytest
 
 from tui.bus.api import Priority
 from tui.drive.chart import watched_codes
-from tui.drive.held_back import IN_FAULT, state_refusal
+from tui.drive.command_blocked import IN_FAULT, state_refusal
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.session.command.access import CommandAccess
 from tui.session.command.carry_out import give_order
-from tui.session.command.given import GivenCommands
+from tui.session.command.command_history import CommandHistory
 from tui.session.drive import DriveSession
 from tui.session.drive_state import STATE_FRESH, drive_state
 from tui.session.journal import Journal
@@ -76,7 +76,7 @@ def held(status: int, trip: int) -> dict[int, int]:
 def access(line: OwnDrive, profile: Profile | None = None) -> CommandAccess:
     session = DriveSession(line, 1, profile or own())
     session.arming.arm(seconds=math.inf)
-    return CommandAccess(session, Journal(), GivenCommands(session), session.work.permit())
+    return CommandAccess(session, Journal(), CommandHistory(session), session.work.permit())
 
 
 @pytest.mark.parametrize("status", [READY, RUNNING, 0])

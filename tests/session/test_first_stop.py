@@ -6,7 +6,7 @@ import pytest
 
 from tui.bus.line import Line
 from tui.drive.profile import library
-from tui.drive.profile.stop_facts import stop_facts
+from tui.drive.profile.stop_profile import stop_profile
 from tui.session.command.first_stop import FIRST_WHY, FirstStop, stop_first
 from tui.session.connect.limits import limits_of
 from tui.session.journal import Journal
@@ -16,7 +16,7 @@ from tui.simulator.troubles import FaultRates
 from .test_stop import FAMILIES, WORDS, Start, journal, start, wait_for, writes
 
 __all__ = ["journal", "start"]
-FACTS = stop_facts()
+FACTS = stop_profile()
 PLACES = {0xFA00, 8501, 641}
 
 

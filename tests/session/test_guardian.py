@@ -22,13 +22,13 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
 from tui.session.journal import Journal
-from tui.session.sharing.guardian import (
+from tui.session.sharing.orphan_motors import (
     ENDS_WITHIN,
     LINE_BACK_WITHIN,
     LINE_STAYS_LOST,
     LONGEST_GRACE,
     TAKEN_OVER_WITHIN,
-    Guardian,
+    OrphanMotorGuard,
 )
 from tui.session.starts.processes import Processes
 from tui.session.starts.record import StartRecord
@@ -70,7 +70,7 @@ class Bench:
         self.reported: list[tuple[int, str]] = []
         self.line.facts.on_text(lambda device, text: self.reported.append((device, text)))
 
-    def guardian(self, *, person: bool = False) -> Guardian:
+    def guardian(self, *, person: bool = False) -> OrphanMotorGuard:
         """The guardian of this program, which is a panel if there is a `person`."""
         if person:
             facts = self.line.facts
@@ -80,7 +80,7 @@ class Bench:
             one: DriveSession(self.line, one, library.load(profile), clock=self.clock)
             for one, profile in ((1, "atv71"), (2, "atv312"))
         }
-        return Guardian(
+        return OrphanMotorGuard(
             self.line,
             self.journal,
             clock=self.clock,
@@ -398,12 +398,12 @@ async def test_a_line_that_comes_and_goes_is_given_up_like_one_that_stays_lost(
     bench.simulation.stop()
     looks = {0: 0}
 
-    def is_connected(_: Guardian) -> bool:
+    def is_connected(_: OrphanMotorGuard) -> bool:
         stops = bench.line.facts.stops.stamp(1)
         looks[stops] = looks.get(stops, 0) + 1
         return looks[stops] == 8
 
-    monkeypatch.setattr(Guardian, "_is_connected", is_connected)
+    monkeypatch.setattr(OrphanMotorGuard, "_is_connected", is_connected)
     bench.gone()
     await come(lambda: guardian.busy)
     await let_go_until(bench.clock, lambda: not guardian.busy, step=LINE_BACK_WITHIN / 20)

@@ -13,8 +13,8 @@ import pytest
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
 from tui.bus.program import Program
-from tui.bus.share.messages import AnyMessage, Armed, AskedFor, Claim, Granting
-from tui.bus.share.voices import LineVoice
+from tui.bus.share.messages import AnyMessage, Armed, Claim, DriveRequested, RequestGranted
+from tui.bus.share.publishers import LinePublisher
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR, CommandedElsewhere
 from tui.session.drive import DriveSession
@@ -30,7 +30,7 @@ from .fake_clock import FakeClock
 REMOTE = Program("remote", "panel", 77, "", "pts/9")
 
 
-class Heard(LineVoice):
+class Heard(LinePublisher):
     """The voice of this program, as another one would hear it."""
 
     def __init__(self) -> None:
@@ -41,9 +41,9 @@ class Heard(LineVoice):
         match message:
             case Claim(device=device, take=take):
                 self.output.append(("claim", device, take))
-            case AskedFor(device=device):
+            case DriveRequested(device=device):
                 self.output.append(("ask", device))
-            case Granting(device=device, program=program, yes=yes):
+            case RequestGranted(device=device, program=program, yes=yes):
                 self.output.append(("reply", device, program, yes))
             case Armed(device=device, until=until):
                 self.output.append(("armed", device, until != 0))

@@ -8,7 +8,7 @@ from tui.bus.fake import FakeLine
 from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
-from tui.session.sharing.leaving import left_to_others
+from tui.session.sharing.leaving import peer_effect_text
 from tui.session.starts.keeper import StartKeeper
 
 WATCH = Program("watch", "watch", 78)
@@ -31,31 +31,31 @@ def on_a_line(*others: Program, requested: bool = True) -> DriveSession:
 
 @pytest.mark.parametrize("on_purpose", [False, True])
 def test_alone_on_the_line_nothing_is_added(on_purpose: bool) -> None:
-    assert left_to_others(on_a_line(), on_purpose=on_purpose) == ""
+    assert peer_effect_text(on_a_line(), on_purpose=on_purpose) == ""
 
 
 def test_a_motor_that_is_not_left_on_purpose_is_stopped_by_the_others() -> None:
-    reported = left_to_others(on_a_line(WATCH, requested=False), on_purpose=False)
+    reported = peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=False)
     assert (
         reported == f"Watch (pid 78) is on the line, too: {STOPPED} the line is opened here again."
     )
-    reported = left_to_others(on_a_line(PANEL), on_purpose=False)
+    reported = peer_effect_text(on_a_line(PANEL), on_purpose=False)
     assert f"{STOPPED} it is taken over there, or the line" in reported
-    reported = left_to_others(on_a_line(WATCH, PANEL), on_purpose=False)
+    reported = peer_effect_text(on_a_line(WATCH, PANEL), on_purpose=False)
     assert reported.startswith("Other programs are on the line, too: ")
 
 
 def test_a_motor_that_is_left_on_purpose_runs_on_while_it_is_requested() -> None:
-    reported = left_to_others(on_a_line(WATCH), on_purpose=True)
+    reported = peer_effect_text(on_a_line(WATCH), on_purpose=True)
     assert reported == f"Watch (pid 78) asks it on: while it does, {RUNS_ON}"
-    assert left_to_others(on_a_line(WATCH, requested=False), on_purpose=True) == ""
+    assert peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=True) == ""
 
 
 def test_a_panel_whose_motors_go_on_leaves_them_running_by_closing_a_line_too() -> None:
     session = on_a_line(WATCH, PANEL)
     assert session.starts is not None
     session.starts.leave(session)
-    reported = left_to_others(session, on_purpose=False)
+    reported = peer_effect_text(session, on_purpose=False)
     assert reported == f"Other programs on the line ask it on: while they do, {RUNS_ON}"
 
 
@@ -63,4 +63,4 @@ def test_a_motor_that_was_not_started_here_is_not_stopped_by_the_others() -> Non
     session = on_a_line(WATCH)
     assert session.starts is not None
     session.starts.give_away(session)
-    assert RUNS_ON in left_to_others(session, on_purpose=False)
+    assert RUNS_ON in peer_effect_text(session, on_purpose=False)

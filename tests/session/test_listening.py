@@ -18,8 +18,8 @@ from tests.wire.test_heard import (
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.drive.read_plan import WireTiming
+from tui.session.connect.address_prober import known_profiles
 from tui.session.connect.known_lines import DriveMark, LineMark, LinesMemory, keep_memory
-from tui.session.connect.strangers import known_profiles
 from tui.session.listening.families import Families, remembered_families
 from tui.session.listening.listener import LineListener, ToldExchange
 from tui.session.listening.summary import ListeningSummary, summary_lines, summary_of

@@ -15,7 +15,7 @@ from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.bus.trace import Frame
 from tui.session.connect.other_masters import (
-    MasterLookout,
+    MasterDetector,
     OtherMaster,
     Overheard,
     listen_first,
@@ -122,7 +122,7 @@ async def test_a_master_that_begins_during_a_search_ends_it() -> None:
         line = Line(SerialLink(peer.path))
         line.open(wait=10.0)
         try:
-            lookout = MasterLookout(line)
+            lookout = MasterDetector(line)
             lookout.look()
             peer.send(READ)
             await asyncio.to_thread(eventually, lambda: bool(line.trace))

@@ -10,7 +10,7 @@ from tui.drive.fault_reset import reset_follows
 from tui.drive.profile import library
 from tui.session.command.access import CommandAccess
 from tui.session.command.carry_out import give_order, give_reference, run_at_reference
-from tui.session.command.given import GivenCommands
+from tui.session.command.command_history import CommandHistory
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 
@@ -45,7 +45,7 @@ class TrippedDrive(OneDrive):
 def access(line: TrippedDrive) -> CommandAccess:
     session = DriveSession(line, 1, ATV21)
     session.arming.arm(seconds=math.inf)
-    return CommandAccess(session, Journal(), GivenCommands(session), session.work.permit())
+    return CommandAccess(session, Journal(), CommandHistory(session), session.work.permit())
 
 
 def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:

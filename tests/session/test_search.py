@@ -25,12 +25,12 @@ from tui.bus.errors import (
 from tui.bus.line import Line, Timing
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.schedule.pace import Pace
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
+from tui.session.connect.address_prober import JITTER, AddressProber
 from tui.session.connect.identify import ScanResult, identify_drive
 from tui.session.connect.open_line import demo_line, open_line
 from tui.session.connect.search import LATE_WAIT, REST, SECOND_WAIT, Search
-from tui.session.connect.strangers import JITTER, Strangers
 from tui.session.drive import DriveSession
 from tui.simulator import DriveSpec, Simulation
 
@@ -49,7 +49,7 @@ class Replies:
     pace: Pace = field(default_factory=Pace)
     timing: Timing = field(default_factory=Timing)
     link: Link = field(default_factory=lambda: SerialLink("/dev/null", 19200, "8E1"))
-    facts: SharedFacts = field(default_factory=SharedFacts)
+    facts: SharedState = field(default_factory=SharedState)
     heard_late: set[int] = field(default_factory=set)
     waits: list[float | None] = field(default_factory=list)
     """How long each answer was waited for that did not come."""
@@ -110,10 +110,10 @@ async def searched(
 async def test_a_single_drive_says_who_it_is_before_any_profile_is_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def read_them(*_: object, **__: object) -> Strangers:
+    def read_them(*_: object, **__: object) -> AddressProber:
         raise AssertionError
 
-    monkeypatch.setattr("tui.session.connect.search.strangers_of", read_them)
+    monkeypatch.setattr("tui.session.connect.search.probers_of", read_them)
     line = Replies(present=set())
     texts: list[str] = []
     search = Search([7], line.no_time)

@@ -10,8 +10,8 @@ import pytest
 from tui.bus.notes import LineNote
 from tui.bus.program import Program
 from tui.bus.share.messages import LENGTH, AnyMessage, packed, unpacked
-from tui.bus.share.voices import LineVoice
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.share.publishers import LinePublisher
+from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
 from tui.session.event_notes import EVENTS_OF_LINE, EventNotes, LeftEvent
 from tui.session.events import Event, EventLog
@@ -25,11 +25,11 @@ class LineHolder:
     """Gives programs the notes that they ask for, as the holder of their line does."""
 
     def __init__(self) -> None:
-        self.facts = SharedFacts(Program("keeper", "keeper"))
+        self.facts = SharedState(Program("keeper", "keeper"))
 
-    def program(self, name: str) -> SharedFacts:
+    def program(self, name: str) -> SharedState:
         """The facts of one more program on the line."""
-        facts = SharedFacts(Program(name, name))
+        facts = SharedState(Program(name, name))
 
         def send(message: AnyMessage) -> None:
             assert isinstance(message, LineNote)
@@ -39,7 +39,7 @@ class LineHolder:
                 for note in self.facts.notes.of(message.device, message.kind):
                     facts.notes.hear(note)
 
-        facts.voice = LineVoice(send)
+        facts.voice = LinePublisher(send)
         return facts
 
 

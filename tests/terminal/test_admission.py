@@ -80,7 +80,7 @@ class Panel(App[None]):
     def stop_stamp(self) -> object:
         return self.stops
 
-    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
         self.not_taken.append(count)
         self.late += late
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts, Given
+from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts, KeyInput
 from tui.terminal.dialects import APART
 from tui.terminal.tokens import KeyToken, Paste
 
@@ -27,9 +27,9 @@ class Bench:
     def __init__(self) -> None:
         self.bursts = Bursts()
         self.now = 0.0
-        self.found: list[Given] = []
+        self.found: list[KeyInput] = []
 
-    def read(self, *names: str, after: float = 1.0) -> list[Given]:
+    def read(self, *names: str, after: float = 1.0) -> list[KeyInput]:
         """Keys of one read, so long after the last; what is given out by then."""
         self.now += after
         before = len(self.found)
@@ -44,7 +44,7 @@ class Bench:
         self.found += self.bursts.given(self.now)
         return self.found[before:]
 
-    def rest(self) -> list[Given]:
+    def rest(self) -> list[KeyInput]:
         return self.read()
 
     def names(self) -> list[str]:

@@ -23,7 +23,7 @@ from .test_pictures import SIZES, WATCH, Compare
 
 
 @dataclass
-class Given:
+class KeyInput:
     """How a drive is commanded from here: armed for so many seconds, and what came of it."""
 
     armed_for: float | None = None
@@ -57,37 +57,37 @@ def outcome(kind: OutcomeKind, text: str) -> Outcome:
 REMOTE = {**fakes.READY, "CCC": 1, "CRC": 1}
 RUNNING = {"raws": fakes.RUNNING}
 LIMITS = {"HSP": 500, "LSP": 0, "ACC": 30, "INR": 1, "TFR": 600, "FRS": 500}
-STATES: dict[str, tuple[dict[str, Any], Given, StopReport | None, bool]] = {
-    "armed": ({"raws": fakes.READY}, Given(57), None, False),
+STATES: dict[str, tuple[dict[str, Any], KeyInput, StopReport | None, bool]] = {
+    "armed": ({"raws": fakes.READY}, KeyInput(57), None, False),
     "done": (
         RUNNING,
-        Given(59, outcome(OutcomeKind.DONE, "Run forward: Operation enabled")),
+        KeyInput(59, outcome(OutcomeKind.DONE, "Run forward: Operation enabled")),
         None,
         False,
     ),
     "refused": (
         {"raws": fakes.READY},
-        Given(
+        KeyInput(
             41, outcome(OutcomeKind.REFUSED, "LFR: 80.0 Hz is above the high speed HSP, 60.0 Hz.")
         ),
         None,
         False,
     ),
-    "no-effect": ({"raws": REMOTE}, Given(57), None, False),
-    "stopping": (RUNNING, Given(57), stop(Phase.STOPPING, "Ramp stop, 31.5 Hz"), False),
+    "no-effect": ({"raws": REMOTE}, KeyInput(57), None, False),
+    "stopping": (RUNNING, KeyInput(57), stop(Phase.STOPPING, "Ramp stop, 31.5 Hz"), False),
     "not-stopped": (
         RUNNING,
-        Given(),
+        KeyInput(),
         stop(Phase.FAILED, "NOT STOPPED: Device 2 did not answer. Stop it at the machine."),
         False,
     ),
     "lost-orders": (
         {"raws": fakes.READY},
-        Given(lost=True),
+        KeyInput(lost=True),
         None,
         False,
     ),
-    "tripped": ({"raws": fakes.FAULT}, Given(31), None, True),
+    "tripped": ({"raws": fakes.FAULT}, KeyInput(31), None, True),
 }
 
 

@@ -31,7 +31,7 @@ from tui.screens.dialogs.bundle import BundleScreen
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.files import fault_of_new
 from tui.screens.dialogs.leave import Leave
-from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.palette import Palette
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import KeyQuestion, Question
@@ -81,7 +81,7 @@ DIALOGS: dict[str, Make] = {
     "Ask": lambda *_: Ask("Save to", lambda _: "wrong"),
     "Ask for a number": lambda *_: Ask("Rated current", lambda _: "wrong", number=True),
     "Confirm": lambda app, one: Confirm(
-        "Write?", "It is.", yes="writes", no="no", loses=True, now=MotorsNow(app, [one.session])
+        "Write?", "It is.", yes="writes", no="no", loses=True, now=MotorStates(app, [one.session])
     ),
     "Leave": lambda *_: Leave("It runs."),
     "Palette": lambda *_: Palette("monitor"),
@@ -89,7 +89,7 @@ DIALOGS: dict[str, Make] = {
     "WhyScreen": lambda *_: WhyScreen("Why no answer?", _no_answer),
     "HelpScreen": lambda *_: HelpScreen("monitor"),
     "OptionsScreen": lambda _, one: OptionsScreen(one.session.profile.data.charts[0].options, {}),
-    "PickWord": lambda app, one: PickWord(one, ["HSP"], MotorsNow(app, [one.session])),
+    "PickWord": lambda app, one: PickWord(one, ["HSP"], MotorStates(app, [one.session])),
     "PickParameter": lambda _, one: PickParameter(
         one.session.profile, one.session.profile.data.blocks[0], "NMA1"
     ),
@@ -97,7 +97,7 @@ DIALOGS: dict[str, Make] = {
     "PickValue": lambda _, one: PickValue(one.editor, _parameter(one, "FR1")),
     "EditBits": lambda _, one: EditBits(one.editor, _parameter(one, "CMD")),
     "Results": lambda *_: Results(APPLIED),
-    "RestQuestion": lambda app, one: RestQuestion(APPLIED, MotorsNow(app, [one.session])),
+    "RestQuestion": lambda app, one: RestQuestion(APPLIED, MotorStates(app, [one.session])),
     "BundleScreen": lambda *_: BundleScreen(Path("a.zip"), _no_bundle),
     "Skipped": lambda *_: Skipped(1, "backup.toml", []),
 }
@@ -236,7 +236,7 @@ async def test_the_keys_of_a_dialog_are_in_sight_whatever_is_above_them(
     app = fakes.app_of(kind=fakes.Easel)
     async with app.run_test(size=size) as pilot:
         console, _ = await on_monitor(app, pilot, monkeypatch)
-        now = MotorsNow(app, [console.session] * 5)
+        now = MotorStates(app, [console.session] * 5)
         long: dict[str, Make] = {
             "long Confirm": lambda *_: Confirm(
                 "Write?", LONG, yes="y", no="n", loses=True, now=now

@@ -18,7 +18,7 @@ from tui.drive.profile import library
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.frames.heard import HeardScreen
 from tui.screens.hear import why_not_hear
-from tui.session.connect import strangers
+from tui.session.connect import address_prober
 from tui.session.connect.identify import DriveIdentity
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.listening.background import HeardLine
@@ -40,7 +40,7 @@ ATV71 = frame(6, bytes.fromhex("2b 0e 01 01 00 00 01 01 0b") + b"ATV71HU15M3")
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
     monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.5)
-    monkeypatch.setattr(strangers, "JITTER", 0.25)
+    monkeypatch.setattr(address_prober, "JITTER", 0.25)
 
 
 def output(app: DrivePanelApp) -> str:

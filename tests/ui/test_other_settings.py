@@ -12,7 +12,7 @@ from tests.bus.peer import PtyPeer, Step, silent
 from tui.app import DrivePanelApp
 from tui.drive.finding import LineSetting, likely_settings
 from tui.screens.dialogs.confirm import Confirm
-from tui.session.connect import strangers
+from tui.session.connect import address_prober
 from tui.session.paths import recent_lines
 from tui.simulator import DriveSpec, LineTiming, Simulation
 from tui.widgets.plain import Plain
@@ -25,8 +25,8 @@ from .test_flows import shown, until
 def few_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
     monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.5)
-    monkeypatch.setattr(strangers, "JITTER", 0.25)
-    monkeypatch.setattr(strangers, "likely_settings", lambda *a: likely_settings(*a)[:6])
+    monkeypatch.setattr(address_prober, "JITTER", 0.25)
+    monkeypatch.setattr(address_prober, "likely_settings", lambda *a: likely_settings(*a)[:6])
 
 
 @asynccontextmanager
@@ -81,7 +81,7 @@ async def test_a_drive_that_would_act_is_left_alone_only_with_a_yes() -> None:
 
 async def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = [LineSetting(9600, "8E1"), LineSetting(600, "8E1"), LineSetting(300, "8E1")]
-    monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
+    monkeypatch.setattr(address_prober, "likely_settings", lambda *_: slow)
     with PtyPeer(silent) as peer:
         async with panel_on(peer.path) as (app, pilot):
             app.connection.form.offer_addresses("1-3")

@@ -15,7 +15,7 @@ from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
-from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.parameters.detail_view import parameter_lines
 from tui.screens.parameters.edit_value import EditBits
@@ -297,7 +297,7 @@ def test_bits(snap_compare: Compare, size: tuple[int, int]) -> None:
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(ParametersScreen(console))
         await pilot.pause()
-        now = MotorsNow(app, [console.session])
+        now = MotorStates(app, [console.session])
         app.push_screen(EditBits(console.editor, console.session.profile["CMI"], now))
         await pilot.pause()
         await pilot.press("down", "enter")

@@ -20,7 +20,7 @@ from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
-from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import Question, void_questions
 from tui.screens.keys.help import HelpScreen
@@ -28,7 +28,7 @@ from tui.screens.parameters.results import RestQuestion
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot
-from tui.widgets.motor_now import motor_now
+from tui.widgets.motor_state_text import motor_state_text
 
 from . import fakes
 from .test_command_flows import Bench, bench
@@ -65,7 +65,7 @@ def slow_hands(monkeypatch: pytest.MonkeyPatch, quick_hands: None) -> None:
 
 
 def confirm(
-    *, loses: bool = True, now: MotorsNow | None = None, by_itself: bool = False
+    *, loses: bool = True, now: MotorStates | None = None, by_itself: bool = False
 ) -> Confirm:
     return Confirm(
         "Write?", "It is written.", yes="writes", no="no", loses=loses, now=now, by_itself=by_itself
@@ -267,7 +267,7 @@ async def test_only_questions_about_the_stopped_drive_end() -> None:
     app = fakes.app_of()
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     async with app.run_test(size=(80, 24)) as pilot:
-        about = confirm(now=MotorsNow(app, [fakes.console_of(snapshot).session]))
+        about = confirm(now=MotorStates(app, [fakes.console_of(snapshot).session]))
         other = confirm()
         await app.push_screen(other)
         await app.push_screen(about)
@@ -283,7 +283,7 @@ async def test_only_questions_about_the_stopped_drive_end() -> None:
 
 def now_text(snapshot: Snapshot | None, look: Look | None = None, passed: float = 0.0) -> str:
     now = fakes.NOW + passed
-    return motor_now(library.load("atv71"), snapshot, 0.5, look, now).plain
+    return motor_state_text(library.load("atv71"), snapshot, 0.5, look, now).plain
 
 
 def test_motor_state_is_shown_in_one_line() -> None:
@@ -319,7 +319,7 @@ async def test_a_question_tells_what_the_motor_does_while_it_is_open() -> None:
     console = fakes.console_of(fakes.snapshot_of(profile, fakes.RUNNING))
     fakes.choose(requested.app, console)
     session = console.session
-    requested.question._now = MotorsNow(requested.app, [session])
+    requested.question._now = MotorStates(requested.app, [session])
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         now = requested.question.query_one("#now")
@@ -327,9 +327,9 @@ async def test_a_question_tells_what_the_motor_does_while_it_is_open() -> None:
         stopped = fakes.snapshot_of(profile, fakes.READY)
         cast("Any", console.monitor)._latest = replace(stopped)
         await until(pilot, lambda: "ready" in str(now.render()))
-        two = MotorsNow(requested.app, [session, session])
+        two = MotorStates(requested.app, [session, session])
         assert [line.split()[:2] for line in two().plain.splitlines()] == [["Now", "2"]] * 2
-        six = MotorsNow(requested.app, [session] * 6)
+        six = MotorStates(requested.app, [session] * 6)
         assert six().plain.splitlines()[-1] == "and 2 more"
 
 
@@ -507,7 +507,7 @@ async def test_the_keys_of_leaving_stand_below_however_much_is_reported(
     reported = "\n".join(
         f"Device {n}: on loss of communication it acts 3 s after." for n in range(40)
     )
-    requested = Asked(Leave(reported, cast(MotorsNow, runs)))
+    requested = Asked(Leave(reported, cast(MotorStates, runs)))
     async with requested.app.run_test(size=size) as pilot:
         await requested.put(pilot)
         await pilot.pause()

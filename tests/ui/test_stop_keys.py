@@ -15,10 +15,10 @@ from textual.events import Key, Paste
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 from tui.screens.base import PanelScreen
 from tui.screens.dialogs.ask import Ask
-from tui.screens.hands import NOBODY_TO_STOP
+from tui.screens.key_dispatcher import NOBODY_TO_STOP
 from tui.session.command.commander import Commander
 from tui.session.fleet import FoundDrive
 from tui.terminal.admission import PASTE_IGNORED
@@ -71,9 +71,9 @@ async def test_f12_and_f9_stop_in_every_field_and_nothing_else_does() -> None:
 async def test_keys_that_were_not_taken_are_reported_without_markup() -> None:
     app = app_of()
     async with app.run_test() as pilot:
-        app.keys_not_taken(3)
-        app.keys_not_taken(1)
-        app.keys_not_taken(2, late=True)
+        app.ignored_keys_text(3)
+        app.ignored_keys_text(1)
+        app.ignored_keys_text(2, late=True)
         await pilot.pause()
         assert [event.text for event in app.events.events] == [
             "3 keys came at once and were not taken.",
@@ -205,7 +205,7 @@ async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
         assert [event for event in app.events.events if event.kind == "failed"] == reported
 
 
-@pytest.mark.parametrize("passed", [(SharedFacts, "commander"), (Commander, "arm")])
+@pytest.mark.parametrize("passed", [(SharedState, "commander"), (Commander, "arm")])
 async def test_a_stop_while_the_key_that_arms_has_its_effect_is_the_last_word(
     monkeypatch: pytest.MonkeyPatch, passed: tuple[type, str]
 ) -> None:
@@ -230,16 +230,16 @@ async def test_a_stop_while_the_key_that_arms_has_its_effect_is_the_last_word(
 
 
 PLANTED = (
-    "tui.screens.hands.takes_space",
-    "tui.screens.hands.is_too_small",
-    "tui.screens.hands.soon_in_loop",
-    "tui.screens.hands.carried_on",
-    "tui.screens.hands.every_fleet",
-    "tui.screens.hands.Hands._open_drive",
-    "tui.screens.hands.Hands._stop_sessions",
-    "tui.screens.hands.Hands._stop",
-    "tui.screens.hands.Hands._space_is_text",
-    "tui.screens.hands.Hands.take_stop_key",
+    "tui.screens.key_dispatcher.takes_space",
+    "tui.screens.key_dispatcher.is_too_small",
+    "tui.screens.key_dispatcher.soon_in_loop",
+    "tui.screens.key_dispatcher.carried_on",
+    "tui.screens.key_dispatcher.every_fleet",
+    "tui.screens.key_dispatcher.KeyDispatcher._open_drive",
+    "tui.screens.key_dispatcher.KeyDispatcher._stop_sessions",
+    "tui.screens.key_dispatcher.KeyDispatcher._stop",
+    "tui.screens.key_dispatcher.KeyDispatcher._space_is_text",
+    "tui.screens.key_dispatcher.KeyDispatcher.take_stop_key",
     "tui.app.DrivePanelApp.hurry",
     "tui.screens.app_port.Panel.fleets",
     "tui.session.fleet.Fleet.stop",

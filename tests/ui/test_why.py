@@ -18,8 +18,8 @@ from tui.screens.dialogs.why import WhyScreen, reason_lines
 from tui.screens.keys.finding import find
 from tui.session.connect.open_line import open_line
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.evidence import DiagnosticEvidence
 from tui.session.diagnosis.heard import Heard
-from tui.session.diagnosis.sight import Sight
 from tui.session.events import EventLog
 
 from . import fakes
@@ -101,7 +101,9 @@ async def test_on_monitor_it_is_the_open_drive() -> None:
 
 def silence(family: str) -> Diagnosis:
     heard = Heard(requested=2)
-    return diagnosed(Sight(SerialLink("/dev/ttyUSB0"), 2, library.load(family), heard=heard))
+    return diagnosed(
+        DiagnosticEvidence(SerialLink("/dev/ttyUSB0"), 2, library.load(family), heard=heard)
+    )
 
 
 @pytest.mark.parametrize("width", [40, 70])

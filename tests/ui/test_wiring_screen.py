@@ -13,9 +13,9 @@ from tui.screens.keys.finding import find
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.diagnosis import examining
+from tui.session.diagnosis.evidence import DiagnosticEvidence
 from tui.session.diagnosis.heard import Heard
 from tui.session.diagnosis.measure import Measure
-from tui.session.diagnosis.sight import Sight
 
 from .test_frame import Panel, panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
@@ -43,11 +43,12 @@ async def test_the_page_of_the_open_drive_with_its_model() -> None:
 async def test_verdict_of_n_is_the_first_section_until_the_drive_is_well(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    seen = [Sight(RtuTcpLink("h", 1), 1, heard=Heard(requested=40, answered=30), measure=Measure(
-        requested=40, answered=30, lost=10, seconds=2.0))]  # fmt: skip
+    measure = Measure(requested=40, answered=30, lost=10, seconds=2.0)
+    heard = Heard(requested=40, answered=30)
+    seen = [DiagnosticEvidence(RtuTcpLink("h", 1), 1, heard=heard, measure=measure)]
     seen.append(replace(seen[0], measure=Measure(requested=40, answered=40)))
 
-    async def examined(*_: object, **__: object) -> Sight:
+    async def examined(*_: object, **__: object) -> DiagnosticEvidence:
         return seen.pop(0)
 
     monkeypatch.setattr(examining, "examine_line", examined)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .link import Link
     from .prepared import PreparedWrite
     from .schedule.pace import Pace
-    from .shared_facts import SharedFacts
+    from .shared_state import SharedState
 
 __all__ = [
     "TURNAROUND_EDGES",
@@ -95,7 +95,7 @@ class ModbusLine(Protocol):
         """Shares the line's time out among regular polls."""
 
     @property
-    def facts(self) -> SharedFacts:
+    def facts(self) -> SharedState:
         """State shared by the programs on the line: commanders, stops."""
 
     @property

@@ -9,13 +9,13 @@ class LineError(Exception):
     """Something about a line is wrong; the text says what happened and what to do next."""
 
 
-UNKNOWN_FATE = " The write may or may not have taken effect. Read the register before retrying."
+OUTCOME_UNKNOWN = " The write may or may not have taken effect. Read the register before retrying."
 """Ends the text of an error after a write that may have been taken."""
 
 
-def without_fate(error: LineError) -> str:
+def strip_outcome_note(error: LineError) -> str:
     """Return the text of an error once the result of the write was read."""
-    return str(error).removesuffix(UNKNOWN_FATE)
+    return str(error).removesuffix(OUTCOME_UNKNOWN)
 
 
 class LinkSyntaxError(LineError):

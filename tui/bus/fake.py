@@ -51,7 +51,7 @@ from .requests import (
     write_request,
 )
 from .schedule.pace import Pace
-from .shared_facts import SharedFacts
+from .shared_state import SharedState
 from .trace import Frame
 
 T = TypeVar("T")
@@ -77,7 +77,7 @@ class FakeLine:
         self.held = ""
         self.timing = Timing()
         self.pace = Pace()
-        self.facts = SharedFacts()
+        self.facts = SharedState()
         self.devices = {n: FakeDevice(n, words) for n, words in (registers or {}).items()}
         """Those that are there; may be added to, and replaced by some of another kind."""
         self.requests: list[Request] = []

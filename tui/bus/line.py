@@ -43,7 +43,7 @@ from .schedule.queue import Job
 from .schedule.worker import ThreadWork, Worker
 from .share.place import SharePlace
 from .share.sharing import ShareLine, Sharing
-from .shared_facts import SharedFacts
+from .shared_state import SharedState
 from .trace import Frame
 
 __all__ = [
@@ -93,7 +93,7 @@ class Line:
         self.link, self.read_only = link, read_only
         self.held = ""
         self.timing = timing or timing_of(link)
-        self.facts = SharedFacts(program)
+        self.facts = SharedState(program)
         self.facts.gated = gated  # nothing is written to a device that is not armed
         """State shared by the programs on the line."""
         shared = partial(share, place) if place is not None else None

@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from .bounds import DeviceId
-from .facts_heard import LineListeners
+from .state_listeners import LineListeners
 
 if TYPE_CHECKING:
     from .share.messages import AnyMessage

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from .channel import command_channel
-from .held_back import held_back
+from .command_blocked import held_back
 from .orders import chart_in_force, deciding_codes, follows_from
 from .profile.profile import Profile
 from .profile.schema import Chart, StateKind

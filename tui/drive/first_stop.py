@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .chart import state_of
 from .orders import GENTLE_FIRST
 from .profile.schema import Chart, Order, OrderId
-from .profile.stop_facts import StopFacts
+from .profile.stop_profile import StopProfile
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class FirstWord:
     code: str
     """Name of the register in those families."""
     order: OrderId
-    families: tuple[StopFacts, ...]
+    families: tuple[StopProfile, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class StopPlace:
     """One register that families are stopped by, those of them first that were named."""
 
     address: int
-    families: tuple[StopFacts, ...]
+    families: tuple[StopProfile, ...]
 
     @property
     def status(self) -> tuple[int, ...]:
@@ -66,12 +66,12 @@ class StopPlace:
         return tuple(sorted(found))
 
 
-def stop_places(families: Sequence[StopFacts], named: Sequence[str] = ()) -> list[StopPlace]:
+def stop_places(families: Sequence[StopProfile], named: Sequence[str] = ()) -> list[StopPlace]:
     """Return the stop registers of families: named ones first, then those that ignore a wrong word.
 
     The others refuse at once a word that they do not have.
     """
-    places: dict[int, list[StopFacts]] = {}
+    places: dict[int, list[StopProfile]] = {}
     for one in families:
         for address in {
             _place(one, chart, order) for chart in one.charts for order in _stops(chart)
@@ -80,7 +80,7 @@ def stop_places(families: Sequence[StopFacts], named: Sequence[str] = ()) -> lis
                 places.setdefault(address, []).append(one)
     rank = {id: number for number, id in enumerate(named)}
 
-    def place_of(one: StopFacts) -> int:
+    def place_of(one: StopProfile) -> int:
         return rank.get(one.id, len(rank))
 
     found = [
@@ -96,7 +96,7 @@ def stop_places(families: Sequence[StopFacts], named: Sequence[str] = ()) -> lis
     )
 
 
-def families_beside(families: Sequence[StopFacts], named: str) -> tuple[StopFacts, ...]:
+def families_beside(families: Sequence[StopProfile], named: str) -> tuple[StopProfile, ...]:
     """A named family, and those that are stopped by one of its registers.
 
     No other register may be written to a drive whose family the user has named.
@@ -151,7 +151,7 @@ def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tupl
     return tuple(found)
 
 
-def blind_stops(families: Sequence[StopFacts]) -> list[FirstWord]:
+def blind_stops(families: Sequence[StopProfile]) -> list[FirstWord]:
     """The words that stop a drive of any of these families in any chart; one for each register.
 
     Nothing needs to be known of the drive. Empty if no word stops them all.
@@ -161,7 +161,7 @@ def blind_stops(families: Sequence[StopFacts]) -> list[FirstWord]:
     return [one for one in found if one is not None] if all(found) else []
 
 
-def _stopped_by(family: StopFacts, address: int, word: int, raws: Mapping[int, int]) -> bool:
+def _stopped_by(family: StopProfile, address: int, word: int, raws: Mapping[int, int]) -> bool:
     """Return True if a word stops a family in every chart that may be in force."""
     known = _known(family, raws)
     charts = _charts(family, known)
@@ -176,7 +176,7 @@ def _stopped_by(family: StopFacts, address: int, word: int, raws: Mapping[int, i
     )
 
 
-def _charts(family: StopFacts, known: Mapping[str, int]) -> list[Chart]:
+def _charts(family: StopProfile, known: Mapping[str, int]) -> list[Chart]:
     """The charts that may be in force; one of which no commands are known only where it surely is.
 
     There no word is known to stop, so none is sent.
@@ -203,10 +203,10 @@ def _stops(chart: Chart) -> list[Order]:
     return [order for order in chart.orders if order.id in GENTLE_FIRST]
 
 
-def _place(family: StopFacts, chart: Chart, order: Order) -> int | None:
+def _place(family: StopProfile, chart: Chart, order: Order) -> int | None:
     return family.places.get(order.parameter or chart.command)
 
 
-def _known(family: StopFacts, raws: Mapping[int, int]) -> dict[str, int]:
+def _known(family: StopProfile, raws: Mapping[int, int]) -> dict[str, int]:
     """Raw values by the family's own codes."""
     return {code: raws[address] for code, address in family.places.items() if address in raws}

@@ -38,7 +38,7 @@ class WordKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class ForeignWord:
+class ExternalWord:
     """One word of a write, and the parameters at its place."""
 
     address: int
@@ -58,29 +58,29 @@ def _places(profile: Profile) -> Mapping[int, tuple[Parameter, ...]]:
     return {address: tuple(found) for address, found in places.items()}
 
 
-def foreign_words(
+def classify_words(
     profile: Profile, words: Mapping[int, int], raws: Mapping[str, int]
-) -> list[ForeignWord]:
+) -> list[ExternalWord]:
     """Return the effect of each word of a write, given what was surely read just now."""
     return [_word(profile, address, word, raws) for address, word in words.items()]
 
 
-def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) -> ForeignWord:
+def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) -> ExternalWord:
     found = _places(profile).get(address, ())
     if any(is_order(profile, one) or one.code in _ordered(profile) for one in found):
         stops = any(only_stops(profile, one, word, raws) for one in found)
-        return ForeignWord(address, word, WordKind.STOP if stops else WordKind.COMMAND, found)
+        return ExternalWord(address, word, WordKind.STOP if stops else WordKind.COMMAND, found)
     if found and all(is_setting(profile, one) for one in found):
-        return ForeignWord(address, word, WordKind.SETTING, found)
-    return ForeignWord(address, word, WordKind.UNKNOWN, found)
+        return ExternalWord(address, word, WordKind.SETTING, found)
+    return ExternalWord(address, word, WordKind.UNKNOWN, found)
 
 
-def parameters_at(words: Collection[ForeignWord]) -> list[Parameter]:
+def parameters_at(words: Collection[ExternalWord]) -> list[Parameter]:
     """The parameters of several words, each once."""
     return list({p.code: p for one in words for p in one.parameters}.values())
 
 
-def starts_by(profile: Profile, words: Collection[ForeignWord]) -> StartDirection | None:
+def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirection | None:
     """Return the direction in which words may start the motor; None if none may.
 
     Every command counts but a reference, which starts nothing that no command has enabled.
@@ -186,7 +186,7 @@ def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]
     ]
 
 
-def setting_refusal(profile: Profile, found: ForeignWord, allowed: Collection[str]) -> str:
+def setting_refusal(profile: Profile, found: ExternalWord, allowed: Collection[str]) -> str:
     """Why a setting is not written for a program that is not ours; empty where it may be.
 
     `allowed` are codes, or `ALL`: that leaves out what decides who commands the drive, what cuts

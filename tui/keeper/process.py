@@ -27,7 +27,7 @@ from tui.session.event_notes import EventNotes
 from tui.session.events import EventLog
 from tui.session.journal import Journal
 from tui.session.logs import start_logging
-from tui.session.sharing.guardian import Guardian
+from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
 ENDING_SIGNALS = ("SIGTERM", "SIGINT", "SIGQUIT")
 IGNORED_SIGNALS = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGTSTP", "SIGTTIN", "SIGTTOU")
@@ -60,7 +60,7 @@ class Keeper:
             gated=True,
         )
         self._journal = Journal()
-        self._guardian = Guardian(self._line, self._journal)
+        self._guardian = OrphanMotorGuard(self._line, self._journal)
         self._events = EventLog()
         EventNotes(self._line.facts, self._events)
         self._line.facts.on_text(self._note_text)

@@ -34,13 +34,13 @@ class Leaving(Panel):
     async def action_quit(self) -> None:
         """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
         from .dialogs.leave import Leave
-        from .dialogs.now import MotorsNow
+        from .dialogs.now import MotorStates
 
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
             reported = self._leaving_report(self.fleets, on_purpose=True)
-            requested = Leave("\n".join(reported), MotorsNow(self, running))
+            requested = Leave("\n".join(reported), MotorStates(self, running))
             self.push_screen(requested, self._leave_motors)
             return
         if self._requested in self.screen_stack:
@@ -75,12 +75,12 @@ class Leaving(Panel):
     ) -> list[str]:
         """Which motors run, what each drive does left alone, and what others on its line do."""
         from tui.session.monitor.timeout import left_alone_text
-        from tui.session.sharing.leaving import left_to_others
+        from tui.session.sharing.leaving import peer_effect_text
 
         reported = []
         for one in sessions:
             reported.append(left_alone_text(one, watch=fleet.line_watch.watch(one.device)))
-            reported += [others] if (others := left_to_others(one, on_purpose=on_purpose)) else []
+            reported += [others] if (others := peer_effect_text(one, on_purpose=on_purpose)) else []
         return reported
 
     def _left_behind(self, fleet: Fleet) -> list[str]:
@@ -194,7 +194,7 @@ class Leaving(Panel):
     ) -> Confirm | None:
         """Return the question before polling stops; None if nothing needs to be reported."""
         from .dialogs.confirm import Confirm
-        from .dialogs.now import MotorsNow
+        from .dialogs.now import MotorStates
 
         reported = self._leaving_report(fleets)
         if always:
@@ -202,7 +202,7 @@ class Leaving(Panel):
         if not reported:
             return None
         drives = [one for fleet in fleets for one in _concerned(fleet)]
-        now = MotorsNow(self, drives) if drives else None
+        now = MotorStates(self, drives) if drives else None
         return Confirm(question, "\n".join(reported), yes=yes, no=no, loses=True, now=now)
 
     def _unfinished(self, fleet: Fleet) -> list[str]:

@@ -112,7 +112,7 @@ class LineOwner(Panel):
 
     def _look_after(self, fleet: Fleet) -> None:
         """Show who shares the line, and stop the motors of programs on it that have exited."""
-        from tui.session.sharing.guardian import Guardian
+        from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
         def session_of(device: int) -> DriveSession | None:
             console = fleet.console(device)
@@ -123,7 +123,7 @@ class LineOwner(Panel):
 
         fleet.line.facts.on_stop(stopped)
         fleet.handover.person = True
-        Guardian(
+        OrphanMotorGuard(
             fleet.line, self.journal, session_of=session_of, events=fleet.events, clock=self.clock
         )
 

@@ -67,7 +67,7 @@ async def _kept(app: Panel, target: WhyTarget) -> Diagnosis:
 
 async def _looked(target: WhyTarget) -> Diagnosis:
     """Return the evidence, and the check that fails."""
-    from tui.session.diagnosis.asking import profile_remembered, sight_of_port
+    from tui.session.diagnosis.asking import evidence_of_port, profile_remembered
     from tui.session.diagnosis.diagnosis import diagnosed
     from tui.session.diagnosis.examining import examine_line
 
@@ -76,7 +76,7 @@ async def _looked(target: WhyTarget) -> Diagnosis:
     profile = await asyncio.to_thread(_profile, target)
     profile = profile or await asyncio.to_thread(profile_remembered, link, target.device)
     if opened is None:
-        seen = await asyncio.to_thread(sight_of_port, link, target.device, target.trouble)
+        seen = await asyncio.to_thread(evidence_of_port, link, target.device, target.trouble)
         return diagnosed(replace(seen, profile=profile))
     line = opened.line
     answer = [one for one in target.neighbors if line.device_state(one).answers]

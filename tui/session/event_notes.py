@@ -6,7 +6,7 @@ import msgspec
 
 from tui.bus.notes import MOST_NOTE, LineNote
 from tui.bus.program import readable
-from tui.bus.shared_facts import SharedFacts
+from tui.bus.shared_state import SharedState
 
 from .events import Event, EventLog
 
@@ -26,7 +26,7 @@ class LeftEvent(msgspec.Struct, frozen=True):
 class EventNotes:
     """Leaves the events of one log, and puts into it those that other programs have left."""
 
-    def __init__(self, facts: SharedFacts, events: EventLog) -> None:
+    def __init__(self, facts: SharedState, events: EventLog) -> None:
         self._facts = facts
         self._events = events
         self._heard: list[Event] = []

@@ -34,7 +34,7 @@ class Stamps(Protocol):
     def stop_stamp(self) -> object:
         """Another object after every stop."""
 
-    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
         """Report that keys came at once, or too late, and did nothing."""
 
 
@@ -91,4 +91,4 @@ class Admission:
             return
         count, late = self._refused, self._late
         self._refused, self._late, self._looking = 0, False, False
-        self._stamps.keys_not_taken(count, late=late)
+        self._stamps.ignored_keys_text(count, late=late)

@@ -29,7 +29,7 @@ STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"
 """Keys that a person holds down to go on."""
 
 
-class Given(NamedTuple):
+class KeyInput(NamedTuple):
     """A key, or a paste, and the company in which it came."""
 
     what: KeyToken | Paste
@@ -52,7 +52,7 @@ class Bursts:
         self._reads: list[list[KeyToken]] = []
         self._repeating: str | None = None
         self._stepped = False
-        self._given: list[Given] = []
+        self._given: list[KeyInput] = []
 
     def key(self, key: KeyToken) -> None:
         """Take a key; `given` decides about it."""
@@ -74,9 +74,9 @@ class Bursts:
         """A paste keeps its place among the keys; those beside it are not alone."""
         self._join(paste.at, paste.at)
         self._give_parts()
-        self._given.append(Given(paste))
+        self._given.append(KeyInput(paste))
 
-    def given(self, now: float, pending: float | None = None) -> list[Given]:
+    def given(self, now: float, pending: float | None = None) -> list[KeyInput]:
         """Return the known keys; `pending` is when a sequence began that may become a key."""
         self._give_repeats()
         if not self._hangs_on(pending):
@@ -104,7 +104,7 @@ class Bursts:
     def _close(self) -> None:
         """The piece is over."""
         if self._members == 1 and self._waiting:
-            self._given.append(Given(self._waiting.pop(), alone=True, steps=True))
+            self._given.append(KeyInput(self._waiting.pop(), alone=True, steps=True))
         self._give_parts()
         self._members, self._names, self._reads = 0, set(), []
         self._repeating, self._stepped = None, False
@@ -113,7 +113,7 @@ class Bursts:
         """Give out what waits as parts of a piece; of arrows, the first steps once."""
         steps = not self._stepped and len(self._names) == 1 and self._names <= STEPPING
         for key in self._waiting:
-            self._given.append(Given(key, steps=steps, piece=self._members))
+            self._given.append(KeyInput(key, steps=steps, piece=self._members))
             self._stepped, steps = self._stepped or steps, False
         self._waiting.clear()
 
@@ -139,7 +139,7 @@ class Bursts:
         self._give_parts()
         self._stepped = True
         for key in held:
-            self._given.append(Given(key, held=True, steps=True, piece=self._members))
+            self._given.append(KeyInput(key, held=True, steps=True, piece=self._members))
         self._waiting = behind
         self._give_parts()
 

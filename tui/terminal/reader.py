@@ -10,7 +10,7 @@ import codecs
 import logging
 from typing import NamedTuple, Protocol
 
-from .bursts import Bursts, Given
+from .bursts import Bursts, KeyInput
 from .dialects import ESCAPE_DELAY, Tokenizer
 from .names import STOP_KEYS
 from .stroke import Stroke
@@ -136,7 +136,7 @@ class KeyReader:
         return self._left_at if writes or key.name in EDITING else key.began
 
 
-def _to_input(given: Given) -> Pressed | Paste:
+def _to_input(given: KeyInput) -> Pressed | Paste:
     key = given.what
     if not isinstance(key, KeyToken):
         return key

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from ..keep_alive import READS_PER_TIMEOUT, KeepAlive
 from ..master import MonotonicClock
 from ..model import Priority
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from .patience import Devices
 from .queue import Job
 
@@ -25,7 +25,7 @@ class AliveReads:
     def __init__(
         self,
         devices: Devices,
-        facts: SharedFacts,
+        facts: SharedState,
         clock: MonotonicClock,
         submit: Callable[[Job], None],
     ) -> None:

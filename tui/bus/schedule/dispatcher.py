@@ -12,7 +12,7 @@ from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import Request
 from ..result import ExchangeResult, Piece, ResultKind
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from ..tally import Tally
 from .alive_reads import AliveReads
 from .back_to_back import BackToBack
@@ -43,9 +43,9 @@ class Dispatcher:
         *,
         gateway: bool,
         buffers: bool = False,
-        facts: SharedFacts | None = None,
+        facts: SharedState | None = None,
     ) -> None:
-        self.facts = facts or SharedFacts()
+        self.facts = facts or SharedState()
         """State shared by the programs on the line."""
         self._devices = devices
         self._clock = clock

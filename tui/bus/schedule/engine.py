@@ -15,7 +15,7 @@ from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
 from ..prepared import PreparedWrite
 from ..program_use import ProgramUse
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from ..tally import Tally
 from ..trace import Trace
 from .connection import Connection, open_transport
@@ -47,10 +47,10 @@ class Engine:
         link: Link,
         timing: Timing,
         clock: MonotonicClock,
-        facts: SharedFacts | None = None,
+        facts: SharedState | None = None,
         share: Callable[[LineInside], SharedLine] | None = None,
     ) -> None:
-        self.facts = facts or SharedFacts()
+        self.facts = facts or SharedState()
         self.pace = Pace()
         self.trace = Trace(timing.trace_length)
         self.tally = Tally(use=ProgramUse(clock), clock=clock)

@@ -10,7 +10,7 @@ from ..errors import LineError
 from ..link import Link
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from .dispatcher import Dispatcher
 from .pace import Pace
 from .patience import Devices
@@ -43,7 +43,7 @@ class LineInside:
         return self.around.clock
 
     @property
-    def facts(self) -> SharedFacts:
+    def facts(self) -> SharedState:
         """State shared by the programs on the line."""
         return self.dispatcher.facts
 

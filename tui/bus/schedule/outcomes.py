@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from tui.wire.overheard import overheard_request
 
 from ..errors import (
-    UNKNOWN_FATE,
+    OUTCOME_UNKNOWN,
     ChecksumFault,
     DeviceException,
     LineError,
@@ -19,7 +19,7 @@ from ..master import MonotonicClock
 from ..model import Priority, Reply, Timing
 from ..requests import BROADCAST
 from ..result import ExchangeResult, Piece, ResultKind
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from ..tally import Tally
 from .patience import MISSES, Devices
 from .queue import Job
@@ -45,7 +45,7 @@ class Outcomes:
         tally: Tally,
         timing: Timing,
         clock: MonotonicClock,
-        facts: SharedFacts,
+        facts: SharedState,
         *,
         gateway: bool,
     ) -> None:
@@ -232,4 +232,4 @@ class Outcomes:
 def with_fate(job: Job, text: str) -> str:
     """Add to an error of a write that it may have been taken nevertheless."""
     unknown = job.request.changes and job.request.device != BROADCAST
-    return text + UNKNOWN_FATE if unknown else text
+    return text + OUTCOME_UNKNOWN if unknown else text

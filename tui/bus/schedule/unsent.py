@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..errors import LineError, NoAnswer
 from ..model import Priority
 from ..requests import Diagnose
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from .outcomes import with_fate
 from .patience import Devices
 from .queue import Job
@@ -74,7 +74,7 @@ def _is_answered(job: Job, values: SharedValues, now: float) -> bool:
     return True
 
 
-def refusal_of(job: Job, facts: SharedFacts) -> str:
+def refusal_of(job: Job, facts: SharedState) -> str:
     """Why a write must not go out: a stop came after it, or another program commands."""
     if job.priority is Priority.STOP or not job.program:
         return ""

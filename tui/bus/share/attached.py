@@ -139,7 +139,7 @@ class Client:
         job.answer.add_done_callback(partial(self._answered, message.number))
         late = inside.clock() - message.requested
         if job.commands and late > TOO_LATE:
-            job.fail(RequestRefused(stood_still(late)))
+            job.fail(RequestRefused(was_suspended(late)))
         else:
             inside.submit(job)
 
@@ -184,6 +184,6 @@ class Client:
         )
 
 
-def stood_still(seconds: float) -> str:
+def was_suspended(seconds: float) -> str:
     """Why a command is not sent, for a person."""
     return f"Not sent: the program that owns the line stood still for {seconds:.0f} s."

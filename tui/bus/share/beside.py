@@ -137,7 +137,7 @@ class LinePast(msgspec.Struct, frozen=True):
     notes: tuple[LineNote, ...] = ()
 
 
-async def send_past(
+async def send_directly(
     writer: asyncio.StreamWriter, frames: Sequence[Frame], notes: Sequence[LineNote]
 ) -> None:
     """Send the past in pieces, so that the line has its turns in between; the first is empty."""

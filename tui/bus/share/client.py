@@ -16,22 +16,23 @@ from ..model import LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from .carried import Polled
+from .heartbeat import Heartbeat
 from .messages import (
     VERSION,
     Alive,
     Answer,
     AnyMessage,
-    AskedFor,
-    Denied,
+    DriveRequested,
     Facts,
     Failed,
     Goodbye,
-    Granting,
     Hello,
     News,
     NoMessage,
     Notified,
     PollWish,
+    RequestDenied,
+    RequestGranted,
     StopGiven,
     TurnedAway,
     Welcome,
@@ -42,9 +43,8 @@ from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .polls import PollsSubmitted
+from .publishers import LinePublisher, give_up_own, tell_own
 from .requested import RequestsAsked
-from .signs import Heartbeat
-from .voices import LineVoice, give_up_own, tell_own
 
 log = logging.getLogger(__name__)
 
@@ -134,7 +134,7 @@ class ShareClient:
     def _greet(self) -> None:
         facts = self._inside.facts
         # first: what is given from here on is told by itself, what was before in the greeting
-        facts.voice = LineVoice(self._soon, self._owner.socket)
+        facts.voice = LinePublisher(self._soon, self._owner.socket)
         given, times = facts.stops.plain, facts.stops.late_times
         self._tell(Hello(VERSION, facts.me, label(self._inside.link), given, times))
 
@@ -251,12 +251,12 @@ class ShareClient:
                 facts.stops.note(program.id, devices, counts, who, message.when)
                 facts.hear_stop(devices, by, program)
                 inside.dispatcher.void()
-            case Denied(device=device, holder=holder):
+            case RequestDenied(device=device, holder=holder):
                 facts.note_commander(device, holder.id)
                 facts.hear_denied(device, f"Drive {device} is commanded by {holder.text}.")
-            case AskedFor(device=device, program=program):
+            case DriveRequested(device=device, program=program):
                 facts.hear_question(device, program)
-            case Granting(device=device, yes=yes, why=why):
+            case RequestGranted(device=device, yes=yes, why=why):
                 facts.hear_reply(device, why, yes=yes)
             case _:
                 log.error("the owner says %s", type(message).__name__)

@@ -8,16 +8,16 @@ from dataclasses import replace
 from ..keep_alive import KeepAlive
 from ..leases import WriteLease
 from ..program import Program
-from ..shared_facts import SharedFacts, commanded_by
+from ..shared_state import SharedState, commanded_by
 from .attached import Client
 from .messages import (
     AnyMessage,
     Armed,
-    AskedFor,
     Claim,
-    Denied,
-    Granting,
+    DriveRequested,
     PollPause,
+    RequestDenied,
+    RequestGranted,
 )
 
 
@@ -26,7 +26,7 @@ class Commanding:
 
     def __init__(
         self,
-        facts: SharedFacts,
+        facts: SharedState,
         clients: Mapping[str, Client],
         tell_facts: Callable[[], None],
     ) -> None:
@@ -40,9 +40,9 @@ class Commanding:
         match message:
             case Claim():
                 self.claimed(program, message)
-            case AskedFor(device=device):
+            case DriveRequested(device=device):
                 self.drive_requested(program, device)
-            case Granting():
+            case RequestGranted():
                 self.replied(program, message)
             case PollPause(device=device, why=why):
                 facts.note_pause(device, program.id, why)
@@ -82,7 +82,7 @@ class Commanding:
             other = facts.program(holder or "")
             client = self._clients.get(program.id)
             if other is not None and client is not None:
-                client.say(Denied(device, other))
+                client.say(RequestDenied(device, other))
                 return
         if take or holder == program.id:
             facts.note_commander(device, program.id if take else None)
@@ -95,9 +95,9 @@ class Commanding:
         if holder == facts.me.id:
             facts.hear_question(device, program)
         elif holder is not None and (client := self._clients.get(holder)) is not None:
-            client.say(AskedFor(device, program))
+            client.say(DriveRequested(device, program))
 
-    def replied(self, program: Program, reply: Granting) -> None:
+    def replied(self, program: Program, reply: RequestGranted) -> None:
         """Hand an answer on to the program that asked; a yes frees the device."""
         facts = self._facts
         if reply.yes and facts.commanders.get(reply.device) == program.id:
@@ -107,4 +107,4 @@ class Commanding:
         if reply.program == facts.me.id:
             facts.hear_reply(reply.device, why, yes=reply.yes)
         elif (client := self._clients.get(reply.program)) is not None:
-            client.say(Granting(reply.device, reply.program, reply.yes, why))
+            client.say(RequestGranted(reply.device, reply.program, reply.yes, why))

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from ..bounds import MOST_PROGRAMS
 from ..link import label
 from ..schedule.inside import LineInside
-from ..shared_facts import SharedFacts
+from ..shared_state import SharedState
 from .attached import Client
 from .beside import (
     GIVEN,
@@ -27,7 +27,7 @@ from .beside import (
     STOP_HEAD,
     look_answer,
     plain_stop,
-    send_past,
+    send_directly,
 )
 from .messages import (
     LENGTH,
@@ -142,7 +142,7 @@ class Greeting:
             writer.write(look_answer(facts.programs, tally.use.shares, minute))
             return
         if head == PAST_HEAD:
-            await send_past(writer, around.trace.frames(), facts.notes.all)
+            await send_directly(writer, around.trace.frames(), facts.notes.all)
             return
         peer = peer_of(writer.get_extra_info("socket"))
         stop = await plain_stop(reader, self._inside.devices.known, peer)
@@ -178,7 +178,7 @@ class Listening:
     """Listens for programs of one line; lives in the line's loop."""
 
     def __init__(
-        self, place: SharePlace, lock: OwnerLock, facts: SharedFacts, line: str, welcome: TakeIn
+        self, place: SharePlace, lock: OwnerLock, facts: SharedState, line: str, welcome: TakeIn
     ) -> None:
         self._place = place
         self._line = line

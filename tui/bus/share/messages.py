@@ -42,7 +42,7 @@ from ..program import Program
 from ..trace import Frame, FrameDirection
 from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 
-VERSION = 7
+VERSION = 8
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; a longer message is invalid."""
@@ -178,22 +178,22 @@ class Armed(Message, frozen=True):
     """The care for the device; empty if that has not changed."""
 
 
-class Denied(Message, frozen=True):
+class RequestDenied(Message, frozen=True):
     """Another program commands the device."""
 
     device: DeviceId
     holder: Program
 
 
-class AskedFor(Message, frozen=True):
+class DriveRequested(Message, frozen=True):
     """A program asks the one that commands a device to leave it."""
 
     device: DeviceId
     program: Program
 
 
-class Granting(Message, frozen=True):
-    """The answer to a AskedFor, to `program`."""
+class RequestGranted(Message, frozen=True):
+    """The answer to a DriveRequested, to `program`."""
 
     device: DeviceId
     program: ProgramId
@@ -265,8 +265,8 @@ class Goodbye(Message, frozen=True):
 
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
-    | Alive | Pulse | Claim | Denied | AskedFor | Granting | Notified | PollPause | PollWish
-    | Facts | News | Goodbye | Armed | LineNote | KeepAlive | Subscribe
+    | Alive | Pulse | Claim | RequestDenied | DriveRequested | RequestGranted | Notified | PollPause
+    | PollWish | Facts | News | Goodbye | Armed | LineNote | KeepAlive | Subscribe
     | Unsubscribe | Polled
 )  # fmt: skip
 

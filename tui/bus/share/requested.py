@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable
 from contextlib import suppress
 
-from ..errors import UNKNOWN_FATE, LineClosed, LineLost, NoAnswer, RequestRefused
+from ..errors import OUTCOME_UNKNOWN, LineClosed, LineLost, NoAnswer, RequestRefused
 from ..limits import Limits
 from ..model import Priority
 from ..requests import BROADCAST
@@ -84,7 +84,7 @@ class RequestsAsked:
     def _failed(self, job: Job, message: Failed) -> None:
         if message.error == "LineClosed":
             # the owner's end is not this program's
-            self._give_up(job, sent=UNKNOWN_FATE in message.form.text)
+            self._give_up(job, sent=OUTCOME_UNKNOWN in message.form.text)
         else:
             job.fail(error_of(message.error, message.form))
 
@@ -104,14 +104,14 @@ class RequestsAsked:
                 request = job.request
                 job.fail(NoAnswer(request.device, request.function, request.register, why))
             else:
-                job.fail(LineLost(why + (UNKNOWN_FATE if job.request.changes else "")))
+                job.fail(LineLost(why + (OUTCOME_UNKNOWN if job.request.changes else "")))
 
     def give_up_all(self, *, closing: bool) -> None:
         """The owner is gone, or `closing`: this program leaves it."""
         requested, self._requested = self._requested, {}
         for job in requested.values():
             if closing and job.request.changes:
-                job.fail(LineClosed(f"The line was closed during the request.{UNKNOWN_FATE}"))
+                job.fail(LineClosed(f"The line was closed during the request.{OUTCOME_UNKNOWN}"))
             else:
                 self._give_up(job, sent=True)
 
@@ -125,7 +125,7 @@ class RequestsAsked:
                 self._inside.dispatcher.put_back(job)
             return
         text = (
-            f"{OWNER_ENDED} during the request.{UNKNOWN_FATE}"
+            f"{OWNER_ENDED} during the request.{OUTCOME_UNKNOWN}"
             if sent
             else f"{OWNER_ENDED}; this was not sent."
         )

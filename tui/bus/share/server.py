@@ -18,6 +18,7 @@ from .attached import Client
 from .carried import Subscribe, Unsubscribe
 from .commanding import Commanding
 from .greeting import Greeting, Listening
+from .heartbeat import HeartbeatSender, programs_back
 from .messages import (
     Alive,
     AnyMessage,
@@ -35,8 +36,7 @@ from .messages import (
 )
 from .place import OwnerLock, SharePlace, has_ended
 from .polls import PollsServed
-from .signs import SignsOfLife, programs_back
-from .voices import LineVoice
+from .publishers import LinePublisher
 
 if TYPE_CHECKING:
     from .sharing import Sharing
@@ -58,7 +58,7 @@ class ShareServer:
         self._listening = Listening(place, lock, inside.facts, label(inside.link), self._welcome)
         self._commanding = Commanding(inside.facts, self._clients, self._tell_facts)
         self._polls = PollsServed(inside)
-        self._signs = SignsOfLife(inside, self._all, self._tell_news)
+        self._signs = HeartbeatSender(inside, self._all, self._tell_news)
         self._gone_before: set[str] = set()  # looked after
         self._handling: set[asyncio.Task[None]] = set()
         self._stops_left: list[Job] = []
@@ -68,7 +68,7 @@ class ShareServer:
         """Listen. Raises OSError where no socket can be made."""
         facts = self._inside.facts
         facts.set_programs((facts.me,))
-        facts.voice = LineVoice(self._say)
+        facts.voice = LinePublisher(self._say)
         await self._listening.start()
         self._signs.start()
         self._miss_departed(ended=True)

@@ -12,7 +12,6 @@ import click
 from ..running.holding import Holding, keep_polling
 from ..shared.devices import several_devices_option
 from ..shared.errors import LINE_TROUBLE, Failure, reported, status_of
-from ..shared.left_alone import timeout_json
 from ..shared.options import (
     Target,
     connect_drive,
@@ -23,6 +22,7 @@ from ..shared.options import (
     profile_option,
     read_only_option,
 )
+from ..shared.pending_timeouts import timeout_json
 from ..shared.say import say
 from .orders import complain
 

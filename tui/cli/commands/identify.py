@@ -13,7 +13,6 @@ from tui.drive.plain import plain
 from ..shared.devices import several_devices_option
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, REFUSED_HERE, Failure, reported
-from ..shared.left_alone import look_after
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import (
     Target,
@@ -23,6 +22,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.pending_timeouts import look_after
 from ..shared.say import say_row
 
 if TYPE_CHECKING:

@@ -86,7 +86,7 @@ def listen(
         raise click.UsageError("--raw and --force require --pcap FILE.")
     named = profiles_named(profile_ids)
     from tui.bus.errors import LineError
-    from tui.session.connect.strangers import known_profiles
+    from tui.session.connect.address_prober import known_profiles
     from tui.session.listening.families import Families, remembered_families
     from tui.session.listening.place import line_to_listen
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..plant.broker import Broker, broker_of, mqtt_password_option
-from ..plant.wish import check_names
+from ..plant.publish_options import check_names
 from ..shared.completion import complete_line_or_code
 from ..shared.errors import reported
 from ..shared.numbers import check_rate

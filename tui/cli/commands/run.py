@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..running.motor import Wish, run_motor
+from ..running.motor import RunOptions, run_motor
 from ..shared.errors import reported
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
@@ -66,7 +66,7 @@ def run(
     So do all other signals that end a program, a closed standard output and the end of --for.
     """
     need_arming(arm, "run starts the motor")
-    wish = Wish(
+    wish = RunOptions(
         "reverse" if reverse else "forward",
         reference,
         seconds,

@@ -92,8 +92,8 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
     """Which settings are tried; raises UsageError and Failure where others cannot be."""
     from tui.bus.link import SerialLink
     from tui.bus.transport.ports import is_pseudo_terminal
-    from tui.session.connect.setting_costs import setting_costs
-    from tui.session.connect.strangers import settings_worth_a_try
+    from tui.session.connect.address_prober import settings_worth_a_try
+    from tui.session.connect.scan_estimate import scan_estimate
 
     line, here = scan.opened.line, scan.setting
     if not all_settings:
@@ -110,7 +110,7 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
     parity = not is_pseudo_terminal(line.link.path)
     scan.settings = await asyncio.to_thread(settings_worth_a_try, here, parity=parity)
     scan.costs = await asyncio.to_thread(
-        setting_costs,
+        scan_estimate,
         line.link,
         line.timing.scan_timeout,
         scan.settings,

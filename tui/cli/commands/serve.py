@@ -13,7 +13,13 @@ from typing import Any
 import click
 
 from ..plant.broker import mqtt_password_option
-from ..plant.wish import PlantWish, check_drives, check_names, plant_wish, read_drives
+from ..plant.publish_options import (
+    PublishOptions,
+    check_drives,
+    check_names,
+    publish_options,
+    read_drives,
+)
 from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
 from ..shared.completion import complete_line
@@ -103,7 +109,7 @@ def serve(
     the settings file, of LINE@1,2, and of -d.
     """
     served = served_lines(_words(lines))
-    plant = plant_wish(metrics, mqtt, password_file, every)
+    plant = publish_options(metrics, mqtt, password_file, every)
     if bool(devices) != (profile_id is not None):
         raise click.UsageError("-d names drives, -p their profile: both, or none.")
     if tcp is None:
@@ -198,7 +204,7 @@ def _wish(
     return GatewayWish(host, port, units, GatewayRules(fresh, writes, allow_commands))
 
 
-def _opened(stack: ExitStack, served: ServedLine, plant: PlantWish | None) -> OpenedLine:
+def _opened(stack: ExitStack, served: ServedLine, plant: PublishOptions | None) -> OpenedLine:
     """A line, opened for as long as this runs."""
     from tui.session.connect.open_line import open_line
 

@@ -17,7 +17,6 @@ from ..running.stop_targets import (
 )
 from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, reported
-from ..shared.left_alone import LeftAlone, look_after
 from ..shared.left_behind import forget_start
 from ..shared.options import (
     Target,
@@ -28,6 +27,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.output import print_json
+from ..shared.pending_timeouts import PolledDrive, look_after
 from .orders import close_journal, complain, journal_document
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
     who = f"Device {session.device}" + ("" if session.guessed else f", {found.name}")
     report = await ended(stopper, session.device, lambda text: complain(f"{who}: {text}"))
     if telling.as_json:
-        await LeftAlone(session, "", goes_on=True).learn()
+        await PolledDrive(session, "", goes_on=True).learn()
     if report.phase is Phase.STOPPED:
         lacks = "" if way == order else f" (it has no {order}: ramp stop)"
         telling.stopped(session, f"{who}: {report.text}{lacks}.")

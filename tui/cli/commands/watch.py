@@ -30,8 +30,8 @@ from ..shared.several_lines import LineWish, further_lines, lines_argument, line
 from ..shared.watch_outputs import (
     CsvOutput,
     JsonOutput,
+    LabelsNeeded,
     Output,
-    Several,
     WatchedDrive,
     csv_titles,
     csv_units,
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class CsvWish:
+class CsvOptions:
     """The file that is wanted, and the one that is written once the drives are known."""
 
     path: Path | None
@@ -63,7 +63,7 @@ class CsvWish:
             raise click.UsageError("Either --append or --force.")
         refuse_unasked(self.path, append=self.append, force=self.force)
 
-    def opened(self, watched: Sequence[WatchedDrive], several: Several) -> CsvOutput | None:
+    def opened(self, watched: Sequence[WatchedDrive], several: LabelsNeeded) -> CsvOutput | None:
         """The file with the columns of these drives; None where none is wanted."""
         if self.path is None:
             return None
@@ -125,7 +125,7 @@ def watch(
     """
     more, codes = further_lines(codes)
     wishes = lines_wished(target, more)
-    wish = CsvWish(csv_path, append, force, rotate)
+    wish = CsvOptions(csv_path, append, force, rotate)
     wish.check()
     seen = CyclesSeen()
 
@@ -136,7 +136,7 @@ def watch(
         drives = sum(len(one.on(opened)) for opened, one in pairs)
         for opened, one in pairs:
             check_rate(opened.line.link, every, len(one.on(opened)))
-        several = Several(lines=len(wishes) > 1, drives=drives > 1)
+        several = LabelsNeeded(lines=len(wishes) > 1, drives=drives > 1)
         with ExitStack() as stack:
             outputs: list[Output] = [
                 JsonOutput(several)
@@ -173,7 +173,7 @@ class CyclesSeen:
     missing: int = 0
     """The highest status of the drives that were not there at the start."""
 
-    def at_the_end(self, wish: CsvWish) -> str:
+    def at_the_end(self, wish: CsvOptions) -> str:
         """Return the summary in a sentence."""
         count = wish.file.rows if wish.file is not None else 0
         rows = f"; {count} rows written to {wish.path}" if wish.path is not None else ""

@@ -98,8 +98,8 @@ async def _looked_after(
     from tui.session.drive import DriveSession
     from tui.session.timeout_report import Timeout
 
-    from ..shared.left_alone import look_after
     from ..shared.output import drive_json
+    from ..shared.pending_timeouts import look_after
 
     identity: DriveIdentity | None = None
     if profile is None:
@@ -136,11 +136,11 @@ def _unopened(target: Target, named: Profile | None, error: Exception) -> Diagno
 
     from tui.bus.errors import LineError
     from tui.bus.link import parse_link
-    from tui.session.diagnosis.asking import sight_of_port
+    from tui.session.diagnosis.asking import evidence_of_port
     from tui.session.diagnosis.diagnosis import diagnosed
 
     assert isinstance(error, LineError)
-    seen = sight_of_port(parse_link(target.line_text), target.device, error)
+    seen = evidence_of_port(parse_link(target.line_text), target.device, error)
     return diagnosed(replace(seen, profile=named))
 
 

@@ -14,7 +14,7 @@ from ..shared.cycles import Cycles
 from ..shared.errors import failure_of
 from ..shared.options import Target, connect_drive
 from ..shared.say import say
-from .sights import DriveSight, LineSight, drive_sight
+from .status import DriveStatus, LineReport, drive_status_of
 
 if TYPE_CHECKING:
     from tui.bus.api import Contact
@@ -57,11 +57,11 @@ class PlantLine:
     opened: OpenLine
     drives: tuple[PlantDrive, ...]
 
-    def sight(self, now: float) -> LineSight:
+    def sight(self, now: float) -> LineReport:
         """Return the state of the line; `now` is on the monotonic clock."""
         line = self.opened.line
         drives = tuple(one.sight(now) for one in self.drives)
-        return LineSight(self.name, self.opened.text, line.state, line.counters, drives)
+        return LineReport(self.name, self.opened.text, line.state, line.counters, drives)
 
     async def run(self) -> None:
         """Read its drives until this is cancelled.
@@ -137,11 +137,11 @@ class PlantDrive:
         self._contact: Contact = "not_polled"
         self._good = 0.0
 
-    def sight(self, now: float) -> DriveSight:
+    def sight(self, now: float) -> DriveStatus:
         """Return the state of the drive; `now` is on the monotonic clock."""
         if self.cycle is None:
-            return DriveSight(self.device, self._session, None, self._error, self._contact)
-        return drive_sight(self.device, self._session, self.cycle, now)
+            return DriveStatus(self.device, self._session, None, self._error, self._contact)
+        return drive_status_of(self.device, self._session, self.cycle, now)
 
     async def run(self, search: DriveSearch) -> None:
         """Find it, read it until it is lost, and again; ends by being cancelled only."""
@@ -225,11 +225,11 @@ class PlantDrive:
     async def _read(self, session: DriveSession) -> None:
         """Hand on its cycles until it was silent for long."""
         from tui.session.monitor.monitor import Monitor
-        from tui.session.sharing.bystander import Bystander
+        from tui.session.sharing.observer_poller import ObserverPoller
 
         codes, loop = self._shown(session), asyncio.get_running_loop()
         monitor = Monitor(session)
-        looks_on = Bystander(session, partial(self._sign, self.device), lambda: monitor.latest)
+        looks_on = ObserverPoller(session, partial(self._sign, self.device), lambda: monitor.latest)
         looks_on.orphan = await asyncio.to_thread(_is_orphan, session)
         monitor.held_back, monitor.freely = looks_on.held_back, looks_on.freely
         leave = monitor.listen(partial(self._take, Cycles(session, codes), loop))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, get_args
 from tui.bus.api import TURNAROUND_EDGES, Contact, DeviceCounters, LineStatus
 from tui.drive.profile.schema import StateKind
 
-from .sights import DriveSight, LineSight
+from .status import DriveStatus, LineReport
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -117,7 +117,7 @@ METRICS: Mapping[str, MetricHead] = {
 """All metrics but those of values with a unit, in the order of output."""
 
 
-def metrics_text(lines: Sequence[LineSight], version: str, now: float) -> str:
+def metrics_text(lines: Sequence[LineReport], version: str, now: float) -> str:
     """All that is known of lines and drives; `now` is on the monotonic clock."""
     by_metric: dict[str, list[MetricSample]] = {name: [] for name in METRICS}
     for sample in _samples(lines, version, now):
@@ -156,7 +156,7 @@ def _escaped(text: str) -> str:
     return text.replace("\\", r"\\").replace("\n", r"\n").replace('"', r"\"")
 
 
-def _samples(lines: Iterable[LineSight], version: str, now: float) -> Iterator[MetricSample]:
+def _samples(lines: Iterable[LineReport], version: str, now: float) -> Iterator[MetricSample]:
     yield MetricSample("build_info", {"version": version}, 1)
     for line in lines:
         yield from _line_samples(line)
@@ -166,7 +166,7 @@ def _samples(lines: Iterable[LineSight], version: str, now: float) -> Iterator[M
             yield from _drive_samples(where, drive, now)
 
 
-def _line_samples(line: LineSight) -> Iterator[MetricSample]:
+def _line_samples(line: LineReport) -> Iterator[MetricSample]:
     where, counted = {"line": line.name}, line.counters
     yield MetricSample("line_connected", where, line.state.status is LineStatus.CONNECTED)
     for name, number in (
@@ -210,7 +210,7 @@ def _counter_samples(where: Labels, counted: DeviceCounters | None) -> Iterator[
     yield MetricSample("drive_turnaround_seconds", where, total, "_count")
 
 
-def _drive_samples(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSample]:
+def _drive_samples(where: Labels, drive: DriveStatus, now: float) -> Iterator[MetricSample]:
     yield MetricSample("drive_up", where, drive.cycle is not None and drive.contact == "answers")
     for contact in get_args(Contact):
         yield MetricSample("drive_contact", {**where, "contact": contact}, contact == drive.contact)

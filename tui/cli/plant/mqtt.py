@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from ..shared.say import say
 from .broker import Broker
-from .sights import LineSight
+from .status import LineReport
 from .topics import OFFLINE, ONLINE, drive_messages, line_messages, status_topic
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ LOOKED_EVERY = 2.0
 """Seconds after which is looked without anything new: what was read last may be too old by now."""
 LAST_WORD_WITHIN = 3.0
 
-Sights = Callable[[], Sequence[LineSight]]
+Sights = Callable[[], Sequence[LineReport]]
 
 
 class MqttPublisher:

@@ -16,8 +16,8 @@ from .broker import Broker
 from .drives import PlantLine
 from .metrics import metrics_text
 from .metrics_server import PATH, MetricsServer
-from .sights import LineSight
-from .wish import warn_of_plain_password, warn_of_strangers
+from .publish_options import warn_of_plain_password, warn_of_strangers
+from .status import LineReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ class Changes:
         self.listener()
 
 
-def sights_of(lines: Sequence[PlantLine]) -> list[LineSight]:
+def sights_of(lines: Sequence[PlantLine]) -> list[LineReport]:
     """Return the current state of each line."""
     now = time.monotonic()
     return [line.sight(now) for line in lines]

@@ -18,7 +18,7 @@ from .broker import level
 if TYPE_CHECKING:
     from tui.bus.api import LineCounters, LineState
 
-    from .sights import DriveSight, LineSight
+    from .status import DriveStatus, LineReport
 
 ONLINE, OFFLINE = "online", "offline"
 LINE_COUNTS = (
@@ -43,7 +43,7 @@ def line_topics(root: str, names: Iterable[str]) -> Mapping[str, str]:
     return found
 
 
-def drive_messages(root: str, lines: Sequence[LineSight]) -> dict[str, str]:
+def drive_messages(root: str, lines: Sequence[LineReport]) -> dict[str, str]:
     """The message of each drive, by its topic."""
     return {
         f"{root}/{level(line.name)}/{drive.device}": json_text(_drive(line, drive))
@@ -52,7 +52,7 @@ def drive_messages(root: str, lines: Sequence[LineSight]) -> dict[str, str]:
     }
 
 
-def line_messages(root: str, lines: Sequence[LineSight]) -> dict[str, str]:
+def line_messages(root: str, lines: Sequence[LineReport]) -> dict[str, str]:
     """The message of each line, by its topic."""
     return {
         f"{root}/{level(line.name)}/line": json_text(_line(line.text, line.state, line.counters))
@@ -72,7 +72,7 @@ def _line(text: str, state: LineState, counters: LineCounters) -> dict[str, Any]
     }
 
 
-def _drive(line: LineSight, drive: DriveSight) -> dict[str, Any]:
+def _drive(line: LineReport, drive: DriveStatus) -> dict[str, Any]:
     if drive.session is None or drive.cycle is None:
         profile = drive.session.profile.id if drive.session is not None else None
         return {

@@ -29,7 +29,7 @@ from ..shared.errors import DRIVE_REFUSED, ENDED_AFTER_WRITING, REFUSED_HERE, Fa
 from ..shared.options import Target
 from .ending import Ending
 from .telling import RunTelling
-from .voice import Voice
+from .voice import BufferedOutput
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -47,7 +47,7 @@ STOPS_THAT_MAY_FAIL = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class RunOptions:
     """Options of `run`; `seconds` is the duration."""
 
     order: OrderId
@@ -66,7 +66,7 @@ class Run:
 
     fleet: Fleet
     console: DriveConsole
-    wish: Wish
+    wish: RunOptions
     telling: RunTelling
     ending: Ending
     watch: TimeoutWatch | None = None
@@ -242,7 +242,7 @@ class Run:
             await asyncio.sleep(RUN_POLL_INTERVAL)
 
 
-async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
+async def run_motor(opened: OpenLine, target: Target, wish: RunOptions) -> None:
     """Run a motor as wished, to its end."""
     loop, ending = asyncio.get_running_loop(), Ending()
 
@@ -250,7 +250,7 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
         with suppress(RuntimeError):  # the loop has ended: nothing runs any more
             loop.call_soon_threadsafe(ending.end, "its output is no longer read")
 
-    voice = Voice(gone)
+    voice = BufferedOutput(gone)
     starts = StartKeeper("run")
     starts.unrecorded, starts.left_running = wish.unrecorded, wish.leave_running
     with ending.by_signals():

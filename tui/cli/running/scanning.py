@@ -12,16 +12,16 @@ from tui.bus.errors import PortRefused
 from tui.drive.finding import LineSetting
 
 from ..shared.errors import REFUSED_HERE, Failure
-from ..shared.left_alone import left_alone, look_after
 from ..shared.line_argument import mind_the_drive
+from ..shared.pending_timeouts import left_alone, look_after
 from .asking import may_ask, says_yes
 from .scan_telling import Hit, Progress, ScanTelling
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
     from tui.session.connect.open_line import OpenLine
+    from tui.session.connect.scan_estimate import ScanEstimate
     from tui.session.connect.search import Search
-    from tui.session.connect.setting_costs import SettingCosts
     from tui.session.diagnosis.remarks import LineRemarks
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
@@ -41,7 +41,7 @@ class Scan:
     tell: ScanTelling
     settings: list[LineSetting] = field(default_factory=list)
     """Those to be tried, that of the line first; none over a network."""
-    costs: SettingCosts | None = None
+    costs: ScanEstimate | None = None
     """Estimate for other settings; None if none is tried."""
     yes: bool = False
     """True if other settings are tried although drives that were found may act meanwhile."""
@@ -60,7 +60,7 @@ class Scan:
     async def run(self) -> None:
         """Listen, then search. Raises Failure before anything is sent, and the line's errors."""
         from tui.drive.finding import watching_families
-        from tui.session.connect.strangers import known_profiles
+        from tui.session.connect.address_prober import known_profiles
         from tui.session.diagnosis.asking import FRAMES_COME_WITHIN
         from tui.session.diagnosis.remarks import LineRemarks
 
@@ -105,12 +105,12 @@ class Scan:
 
     async def _at_this_setting(self, remarks: LineRemarks, *, last: bool) -> bool:
         """Ask all addresses; whether other settings may be tried, with what is found held on."""
-        from tui.session.connect.other_masters import MasterLookout
+        from tui.session.connect.other_masters import MasterDetector
         from tui.session.connect.search import Search
 
         if (setting := self.setting) is not None:
             self.tried.append(setting)
-        masters = MasterLookout(self.opened.line)
+        masters = MasterDetector(self.opened.line)
 
         def look() -> None:
             masters.look()

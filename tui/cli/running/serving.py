@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..commands.orders import close_journal, journal_document
-from ..plant.wish import PlantWish, is_loopback
+from ..plant.publish_options import PublishOptions, is_loopback
 from ..shared.errors import LINE_TROUBLE, Failure
 from ..shared.host_port import why_not_served, written_host_port
-from ..shared.left_alone import say_farewells
 from ..shared.line_argument import mind_the_drive
 from ..shared.numbers import check_rate
 from ..shared.options import Target
+from ..shared.pending_timeouts import say_farewells
 from ..shared.say import say
 from .ending import Ending
 from .line_pulse import LinePulse
@@ -68,7 +68,7 @@ Ready = Callable[[ServedAt], str]
 async def served_until_signal(
     lines: Sequence[OpenedLine],
     gateway: GatewayWish | None,
-    plant: PlantWish | None,
+    plant: PublishOptions | None,
     service: Service,
     ready: Ready,
 ) -> int:
@@ -93,7 +93,7 @@ async def _served(
     stack: AsyncExitStack,
     lines: Sequence[OpenedLine],
     wish: GatewayWish | None,
-    plant: PlantWish | None,
+    plant: PublishOptions | None,
     journal: Journal,
 ) -> ServedAt:
     """Begin all that is wanted; it ends with the stack, the gateway with its motors first."""
@@ -112,7 +112,7 @@ async def _served(
 async def _published(
     stack: AsyncExitStack,
     lines: Sequence[OpenedLine],
-    plant: PlantWish,
+    plant: PublishOptions,
     gates: Sequence[GatewayLine],
 ) -> ServedAt:
     """Read the drives, and hand their values out."""

@@ -66,12 +66,12 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
     from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import ExchangeError, NoAnswer
     from tui.drive.first_stop import families_beside
-    from tui.drive.profile.stop_facts import stop_facts
+    from tui.drive.profile.stop_profile import stop_profile
     from tui.session.command.first_stop import stop_first
     from tui.session.connect.identify import DriveIdentity, identify_drive
 
     opened, typed = wish.opened, wish.typed
-    families = await asyncio.to_thread(stop_facts)
+    families = await asyncio.to_thread(stop_profile)
     if typed is not None:
         families = families_beside(families, typed)
     known = {typed, *(one.id for one in families)}

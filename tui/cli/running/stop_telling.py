@@ -10,7 +10,7 @@ from tui.session.connect.addresses import addresses_text
 
 from ..commands.orders import complain
 from ..shared.errors import DONE
-from ..shared.left_alone import timeout_json
+from ..shared.pending_timeouts import timeout_json
 from ..shared.say import say
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..commands.orders import complain
 from ..shared.drive_status import shown_values, values_json
-from ..shared.left_alone import timeout_json
+from ..shared.pending_timeouts import timeout_json
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession

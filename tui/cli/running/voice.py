@@ -19,7 +19,7 @@ HEARD_OUT = 2.0
 """Seconds that the reader has for the last lines."""
 
 
-class Voice:
+class BufferedOutput:
     """Lines for standard output, in a thread: a reader that takes none must not hold up a stop."""
 
     def __init__(self, gone: Callable[[], None]) -> None:

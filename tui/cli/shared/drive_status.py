@@ -188,9 +188,9 @@ def _channels(
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.held_back import held_back, state_refusal
+    from tui.drive.command_blocked import held_back, state_refusal
     from tui.drive.orders import chart_in_force
-    from tui.session.command.way_out import block_reason_text
+    from tui.session.command.unblock_hint import block_reason_text
 
     raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
@@ -208,8 +208,8 @@ def _refused(session: DriveSession) -> str:
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
-    from .left_alone import timeout_json
     from .output import drive_json
+    from .pending_timeouts import timeout_json
 
     state, watch = status.state, status.watch
     return {

@@ -20,7 +20,7 @@ async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any
     Raises Exit with 128 and the number of a signal that ended it; one that comes once the work is
     done ends only what is said of the drives.
     """
-    from .left_alone import say_farewells
+    from .pending_timeouts import say_farewells
     from .signals import BY_SIGNAL, cancelled_by_signal
 
     task = asyncio.current_task()

@@ -9,7 +9,7 @@ from .say import say
 
 if TYPE_CHECKING:
     from tui.drive.read_plan import ReadRequest
-    from tui.session.listening.families import Families, TakenFamily
+    from tui.session.listening.families import AssumedProfile, Families
     from tui.session.listening.listener import ToldExchange
     from tui.session.listening.summary import DriveSummary, ListeningSummary
     from tui.session.listening.tally import ReadTally, WriteTally
@@ -166,7 +166,7 @@ def _drive_json(drive: DriveSummary) -> dict[str, Any]:
     }
 
 
-def _family_json(family: TakenFamily | None) -> dict[str, Any]:
+def _family_json(family: AssumedProfile | None) -> dict[str, Any]:
     return {
         "profile": family.profile.id if family is not None else None,
         "how": family.how if family is not None else None,

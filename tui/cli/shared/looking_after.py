@@ -28,9 +28,9 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     """
     # imported now: the package may be replaced by an upgrade before this program holds the line
     from tui.session.journal import Journal
-    from tui.session.sharing.guardian import Guardian
+    from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
-    guardian, facts = Guardian(opened.line, Journal()), opened.line.facts
+    guardian, facts = OrphanMotorGuard(opened.line, Journal()), opened.line.facts
     tell = partial(_tell, f"{name}: " if name else "")
     facts.on_text(tell)
     if facts.unkept:

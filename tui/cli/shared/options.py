@@ -220,7 +220,7 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     from tui.session.connect.identify import identify_drive
     from tui.session.drive import DriveSession
 
-    from .left_alone import look_after
+    from .pending_timeouts import look_after
 
     if target.profile_id is not None:
         profile = library.load(target.profile_id)

@@ -90,7 +90,7 @@ def drive_json(line: str, session: DriveSession) -> dict[str, Any]:
     """Which drive, on which line as it was typed: how every document about one begins."""
     from tui.session.monitor.timeout import timeout_now
 
-    from .left_alone import timeout_json
+    from .pending_timeouts import timeout_json
 
     about = {"line": line, "device": session.device, "profile": session.profile.id}
     return {**about, "timeout": timeout_json(timeout_now(session))}

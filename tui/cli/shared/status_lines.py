@@ -24,7 +24,7 @@ from .output import print_json
 from .say import say, say_row
 from .several_lines import LineWish, connected
 from .silence import silence_hint
-from .watch_outputs import Several
+from .watch_outputs import LabelsNeeded
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
@@ -102,7 +102,7 @@ def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:
     if wanted.every:
         say_in_a_line(status, f"{plain(name):<{width}}  ")
     else:
-        several = Several(lines=True, drives=True)
+        several = LabelsNeeded(lines=True, drives=True)
         say(f"{several.named(name, status.session.device)}:")
         say_status(status)
 

@@ -34,7 +34,7 @@ class WatchedDrive:
 
 
 @dataclass(frozen=True, slots=True)
-class Several:
+class LabelsNeeded:
     """There are several of them, so each is named."""
 
     lines: bool
@@ -70,7 +70,7 @@ class Output(Protocol):
 class JsonOutput:
     """One object a line on standard output; trouble goes to standard error when it begins."""
 
-    def __init__(self, several: Several) -> None:
+    def __init__(self, several: LabelsNeeded) -> None:
         self._several = several
         self._in_trouble: set[WatchedDrive] = set()
 
@@ -117,7 +117,7 @@ def late_text(snapshot: Snapshot) -> str:
 class LineOutput:
     """One line of text a cycle, for a file or another program."""
 
-    def __init__(self, several: Several) -> None:
+    def __init__(self, several: LabelsNeeded) -> None:
         self._several = several
 
     def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
@@ -132,7 +132,7 @@ class LineOutput:
 class TableOutput:
     """A table for each drive that stays in its place on a terminal."""
 
-    def __init__(self, live: Live, watched: Sequence[WatchedDrive], several: Several) -> None:
+    def __init__(self, live: Live, watched: Sequence[WatchedDrive], several: LabelsNeeded) -> None:
         self._live = live
         self._several = several
         self._latest: dict[WatchedDrive, Snapshot | None] = dict.fromkeys(watched)
@@ -158,7 +158,7 @@ class TableOutput:
 class CsvOutput:
     """Engineering values in a CSV file; a cell without a good value is empty."""
 
-    def __init__(self, file: CsvFile, units: Mapping[str, str], several: Several) -> None:
+    def __init__(self, file: CsvFile, units: Mapping[str, str], several: LabelsNeeded) -> None:
         self._file = file
         self._units = units
         self._several = several
@@ -188,7 +188,7 @@ def csv_units(watched: Sequence[WatchedDrive]) -> dict[str, str]:
 
 
 def csv_titles(
-    watched: Sequence[WatchedDrive], units: Mapping[str, str], several: Several
+    watched: Sequence[WatchedDrive], units: Mapping[str, str], several: LabelsNeeded
 ) -> list[str]:
     """The titles of the columns; a taught scale is marked."""
     taught = {code for one in watched for code in one.session.profile.taught}
@@ -198,7 +198,7 @@ def csv_titles(
 
 
 @contextmanager
-def text_output(watched: Sequence[WatchedDrive], several: Several) -> Iterator[Output]:
+def text_output(watched: Sequence[WatchedDrive], several: LabelsNeeded) -> Iterator[Output]:
     """Yield the output for standard output: a table on a terminal, else lines."""
     if not sys.stdout.isatty():
         yield LineOutput(several)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tui.bus.program import Program
 
     from ..dialogs.confirm import Confirm
-    from ..dialogs.now import MotorsNow
+    from ..dialogs.now import MotorStates
 
 NOT_ARMED = "Not armed. Press a to arm this drive."
 ARMED_AFTER_ALL = "Armed for 60 s. Each key press restarts the 60 s."
@@ -41,11 +41,11 @@ class ArmingKeys(PanelScreen):
         """Show on this screen why something was not done."""
         raise NotImplementedError
 
-    def motor_now(self) -> MotorsNow:
+    def motor_state_text(self) -> MotorStates:
         """Return the motor's present state, for a question about this drive."""
-        from ..dialogs.now import MotorsNow
+        from ..dialogs.now import MotorStates
 
-        return MotorsNow(self.app, [self.session])
+        return MotorStates(self.app, [self.session])
 
     def _ask(
         self,
@@ -77,7 +77,7 @@ class ArmingKeys(PanelScreen):
                 self._refuse(str(refusal))
             self.look()
 
-        now = self.motor_now()
+        now = self.motor_state_text()
         requested = Confirm(
             question, follows, yes=yes, no=no, loses=True, now=now, by_itself=by_itself
         )

@@ -175,7 +175,7 @@ class OrderKeys(TeachKeys):
             if code is not None:
                 self.ask_look(code)
 
-        self.app.push_screen(PickWord(self.console, codes, self.motor_now()), chosen)
+        self.app.push_screen(PickWord(self.console, codes, self.motor_state_text()), chosen)
 
     def action_reference_by(self) -> None:
         """Let a taught preset take the reference, or no more, after saying what that means."""
@@ -208,7 +208,7 @@ class OrderKeys(TeachKeys):
             if choice is not None:
                 self._give(lambda: self.commander.choose_option(*choice, stamp))
 
-        self.app.push_screen(OptionsScreen(chart.options, raws, self.motor_now()), chosen)
+        self.app.push_screen(OptionsScreen(chart.options, raws, self.motor_state_text()), chosen)
 
     def _give(self, order: Callable[[], object]) -> None:
         try:

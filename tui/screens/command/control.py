@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.drive.held_back import held_back
+from tui.drive.command_blocked import held_back
 from tui.drive.orders import chart_in_force
 from tui.drive.profile.profile import Profile
-from tui.session.command.way_out import way_by_key
+from tui.session.command.unblock_hint import way_by_key
 from tui.session.work import Outcome
 
 

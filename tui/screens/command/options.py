@@ -18,7 +18,7 @@ from tui.widgets.plain import Plain, entry
 from ..dialogs.question import KeyQuestion, hint
 
 if TYPE_CHECKING:
-    from ..dialogs.now import MotorsNow
+    from ..dialogs.now import MotorStates
 
 OPTION_HINT = hint(("Up, Down", "choose"), ("y", "write it"), ("Esc or q", "write nothing"))
 
@@ -32,7 +32,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
         self,
         options: Sequence[CommandOption],
         raws: Mapping[str, int],
-        now: MotorsNow | None = None,
+        now: MotorStates | None = None,
     ) -> None:
         super().__init__(now)
         self._choices = [

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.teaching.teacher import Teacher
 
-    from ..dialogs.now import MotorsNow
+    from ..dialogs.now import MotorStates
 
 HOW = "Type it with its unit: 50.3Hz, 8.4A, 1450rpm. The word is read when Enter is pressed."
 WORD_NAME_WIDTH = 30
@@ -57,7 +57,7 @@ class TeachKeys(ArmingKeys):
             about=f"{_known(self.console, code)} {HOW}",
             takes="read the word and learn",
             number=True,
-            now=self.motor_now(),
+            now=self.motor_state_text(),
         )
 
         def reported(text: str | None) -> None:
@@ -121,7 +121,7 @@ class PickWord(KeyQuestion[str | None]):
 
     BINDINGS: ClassVar = []
 
-    def __init__(self, console: DriveConsole, codes: Sequence[str], now: MotorsNow) -> None:
+    def __init__(self, console: DriveConsole, codes: Sequence[str], now: MotorStates) -> None:
         super().__init__(now)
         self._drive_console, self._codes = console, codes
 

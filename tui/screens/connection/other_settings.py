@@ -17,7 +17,7 @@ from .line_keys import LineKeys
 if TYPE_CHECKING:
     from tui.bus.link import SerialLink
     from tui.drive.finding import LineSetting
-    from tui.session.connect.setting_costs import SettingCosts
+    from tui.session.connect.scan_estimate import ScanEstimate
 
 
 class OtherSettings(LineKeys):
@@ -83,7 +83,7 @@ class OtherSettings(LineKeys):
         """The settings that are left, likely ones first; all of them where none is left."""
         from tui.bus.transport.ports import is_pseudo_terminal
         from tui.drive.finding import LineSetting
-        from tui.session.connect.strangers import settings_worth_a_try
+        from tui.session.connect.address_prober import settings_worth_a_try
 
         here = LineSetting(link.baud, link.format)
         known = settings_worth_a_try(here, parity=not is_pseudo_terminal(link.path))
@@ -95,15 +95,15 @@ class OtherSettings(LineKeys):
 
     def _costs(
         self, link: SerialLink, settings: Sequence[LineSetting], addresses: int
-    ) -> SettingCosts:
+    ) -> ScanEstimate:
         """Return the duration of the settings; reads files."""
-        from tui.session.connect.setting_costs import setting_costs
+        from tui.session.connect.scan_estimate import scan_estimate
 
         opened = self.app.opened
         wait = opened.line.timing.scan_timeout if opened is not None else 0.0
-        return setting_costs(link, wait, settings, addresses)
+        return scan_estimate(link, wait, settings, addresses)
 
-    def _tell_slow(self, settings: Sequence[LineSetting], costs: SettingCosts) -> None:
+    def _tell_slow(self, settings: Sequence[LineSetting], costs: ScanEstimate) -> None:
         """Before the first of the slow settings: how long they take, and who can have them."""
         self.app.events.add("told", costs.before_slow(settings, "Esc"))
 
@@ -112,7 +112,7 @@ class OtherSettings(LineKeys):
         link: SerialLink,
         devices: Sequence[int],
         settings: Sequence[LineSetting],
-        costs: SettingCosts,
+        costs: ScanEstimate,
     ) -> None:
         """Search at each setting until somebody answers."""
         self.forget_drives()

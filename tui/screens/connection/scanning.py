@@ -55,7 +55,7 @@ class Scanning(LineView):
         `typed` is remembered as the addresses of this line. A search made `once` is one of several
         settings: the caller that tries them reports the result.
         """
-        from tui.session.connect.other_masters import MasterLookout, OtherMaster
+        from tui.session.connect.other_masters import MasterDetector, OtherMaster
         from tui.session.connect.search import Search
 
         fleet = self.app.fleet
@@ -63,7 +63,7 @@ class Scanning(LineView):
             return
         opened = self.app.opened
         patient = opened is not None and opened.simulation is not None
-        look = MasterLookout(fleet.line).look
+        look = MasterDetector(fleet.line).look
         now = fleet.clock.monotonic
         search = fleet.search = Search(devices, patient=patient, once=once, between=look, now=now)
         if not once:
@@ -284,7 +284,7 @@ class Scanning(LineView):
 def _families() -> str:
     """Name the families with a line timeout from the first request, in a sentence; reads files."""
     from tui.drive.finding import watching_families, watching_text
-    from tui.session.connect.strangers import known_profiles
+    from tui.session.connect.address_prober import known_profiles
 
     text = watching_text(watching_families(known_profiles()))
     return f"{text} Drives found are polled while the line is open." if text else ""

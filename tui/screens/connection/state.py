@@ -181,7 +181,7 @@ class LineView(PanelScreen):
         faults += [row.device for row in rows.values() if row.kind == "fault"]
         order = in_order(rows, list(dict.fromkeys(faults)))
         lines = {device: wall_line(row, columns) for device, row in rows.items()}
-        self.drives.fill(lines, order, sort=self._hands_are_quiet())
+        self.drives.fill(lines, order, sort=self._is_user_idle())
         width = self.query_one("#drives-title").size.width
         self.put("drives-title", self._drives_title(width, rows))
         self.put("columns", [column_heads(columns)] if rows else [])
@@ -204,7 +204,7 @@ class LineView(PanelScreen):
         self._typed_at = self.app.clock.monotonic()
         super().on_key(event)
 
-    def _hands_are_quiet(self) -> bool:
+    def _is_user_idle(self) -> bool:
         return self.app.clock.monotonic() - self._typed_at >= QUIET
 
     # The titles

@@ -15,7 +15,7 @@ from tui.widgets.plain import Plain
 from .question import Question, hint
 
 if TYPE_CHECKING:
-    from .now import MotorsNow
+    from .now import MotorStates
 
 TextCheck = Callable[[str], str]
 """Check of a text: its error, or nothing."""
@@ -37,7 +37,7 @@ class Ask(Question[str | None]):
         about: str = "",
         takes: str = "accept",
         number: bool = False,
-        now: MotorsNow | None = None,
+        now: MotorStates | None = None,
     ) -> None:
         super().__init__(now)
         self._field = NumberInput if number else Field

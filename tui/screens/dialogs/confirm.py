@@ -15,7 +15,7 @@ from tui.widgets.plain import Plain
 from .question import KeyQuestion, hint
 
 if TYPE_CHECKING:
-    from .now import MotorsNow
+    from .now import MotorStates
 
 
 class Confirm(KeyQuestion[bool]):
@@ -39,7 +39,7 @@ class Confirm(KeyQuestion[bool]):
         yes: str,
         no: str,
         loses: bool,
-        now: MotorsNow | None = None,
+        now: MotorStates | None = None,
         by_itself: bool = False,
     ) -> None:
         super().__init__(now)

@@ -13,7 +13,7 @@ from tui.widgets.plain import Plain
 from .question import KeyQuestion, hint
 
 if TYPE_CHECKING:
-    from .now import MotorsNow
+    from .now import MotorStates
 
 LeaveChoice = Literal["stop", "leave", "stay"]
 
@@ -28,7 +28,7 @@ class Leave(KeyQuestion[LeaveChoice]):
         Binding("l", "choose('leave')", show=False),
     ]
 
-    def __init__(self, follows: str, now: MotorsNow | None = None) -> None:
+    def __init__(self, follows: str, now: MotorStates | None = None) -> None:
         super().__init__(now)
         self._follows = follows
 

@@ -17,7 +17,7 @@ DRIVES_TOLD = 4
 """Drives that are reported; more are counted."""
 
 
-class MotorsNow:
+class MotorStates:
     """Shows in a line a drive what its motor does, as known at the moment of the call."""
 
     def __init__(self, app: Panel, sessions: Sequence[DriveSession]) -> None:
@@ -31,7 +31,7 @@ class MotorsNow:
     def __call__(self) -> Text:
         """The lines as they are now; where there are several drives, with their addresses."""
         # here: the app's first picture needs none of what tells the state of a drive
-        from tui.widgets.motor_now import motor_now
+        from tui.widgets.motor_state_text import motor_state_text
 
         fleet = self._app.fleet
         looks = fleet.line_watch.looks if fleet else {}
@@ -44,7 +44,7 @@ class MotorsNow:
             look = looks.get(session.device)
             latest = console.latest if console else None
             period = console.monitor.period if console else 0.0
-            text.append_text(motor_now(session.profile, latest, period, look, now))
+            text.append_text(motor_state_text(session.profile, latest, period, look, now))
         if (more := len(self._sessions) - DRIVES_TOLD) > 0:
             text.append(f"\nand {more} more", FAINT)
         return text

@@ -27,7 +27,7 @@ from ..frame import Framed
 if TYPE_CHECKING:
     from tui.screens.app_port import Panel
 
-    from .now import MotorsNow
+    from .now import MotorStates
 
 T = TypeVar("T")
 
@@ -75,7 +75,7 @@ class Question(Framed, ModalScreen[T]):
         cls.BINDINGS = own
         super().__init_subclass__(**how)
 
-    def __init__(self, now: MotorsNow | None = None) -> None:
+    def __init__(self, now: MotorStates | None = None) -> None:
         super().__init__()
         self._now = now
         self._drawn: float | None = None

@@ -85,7 +85,7 @@ class CounterKeys(PanelScreen):
             self.app.tell("Not armed. Press a on Monitor to arm this drive.")
             return
         from ..dialogs.confirm import Confirm
-        from ..dialogs.now import MotorsNow
+        from ..dialogs.now import MotorStates
 
         stamp = self.session.work.stops
 
@@ -103,7 +103,7 @@ class CounterKeys(PanelScreen):
             yes="reset them",
             no="leave them",
             loses=True,
-            now=MotorsNow(self.app, [self.session]),
+            now=MotorStates(self.app, [self.session]),
         )
         self.app.push_screen(requested, reported)
 

@@ -25,7 +25,7 @@ from ..dialogs.question import KeyQuestion, Question, hint
 from .value_text import factory_text, limits_now, step_text, value_text
 
 if TYPE_CHECKING:
-    from ..dialogs.now import MotorsNow
+    from ..dialogs.now import MotorStates
 
 ROUNDED = "rounded to what the drive can hold"
 STAGES_NOTHING = ("Esc", "cancel")
@@ -41,7 +41,9 @@ class EditNumber(Question[str | None]):
         Binding("pagedown", "step(-10)", "ten steps down", show=False),
     ]
 
-    def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
+    def __init__(
+        self, editor: Editor, parameter: Parameter, now: MotorStates | None = None
+    ) -> None:
         super().__init__(now)
         self._editor, self._parameter = editor, parameter
 
@@ -139,7 +141,9 @@ def about_number(editor: Editor, parameter: Parameter) -> str:
 class PickValue(KeyQuestion[int | None]):
     """One of the names of an enumeration."""
 
-    def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
+    def __init__(
+        self, editor: Editor, parameter: Parameter, now: MotorStates | None = None
+    ) -> None:
         super().__init__(now)
         self._editor, self._parameter = editor, parameter
         profile, values = editor.session.profile, editor.values
@@ -189,7 +193,9 @@ class EditBits(KeyQuestion[int | None]):
         Binding("s", "take", "stage", show=False),
     ]
 
-    def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
+    def __init__(
+        self, editor: Editor, parameter: Parameter, now: MotorStates | None = None
+    ) -> None:
         super().__init__(now)
         self._parameter = parameter
         staged = editor.staging.edits.get(parameter.code)
@@ -241,7 +247,7 @@ Dialog = EditNumber | PickValue | EditBits
 
 
 def dialog_for(
-    editor: Editor, parameter: Parameter, now: MotorsNow | None = None
+    editor: Editor, parameter: Parameter, now: MotorStates | None = None
 ) -> Callable[[], Dialog]:
     """The dialog that fits a parameter; a stop of the drives of `now` ends it."""
     from tui.drive.values import is_enumeration

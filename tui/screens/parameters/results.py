@@ -20,7 +20,7 @@ from tui.widgets.plain import Plain
 from ..dialogs.question import KeyQuestion, hint
 
 if TYPE_CHECKING:
-    from ..dialogs.now import MotorsNow
+    from ..dialogs.now import MotorStates
 
 OUTCOME_WORDS = {
     EditOutcome.DONE: "written",
@@ -69,7 +69,7 @@ class RestQuestion(KeyQuestion[bool]):
     by_itself = True
     BINDINGS: ClassVar = [Binding("y", "yes", show=False)]
 
-    def __init__(self, applied: Applied, now: MotorsNow) -> None:
+    def __init__(self, applied: Applied, now: MotorStates) -> None:
         super().__init__(now)
         self._applied = applied
 

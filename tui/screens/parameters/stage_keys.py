@@ -32,7 +32,7 @@ class StageKeys(ParameterKeys):
                 self._stage(code, answer)
 
         # a stop of the drive ends the dialog too: it is about its motor, whatever it stages
-        now = self.motor_now()
+        now = self.motor_state_text()
         dialog = dialog_for(self.editor, self.session.profile[code], now)()
         self.app.push_screen(dialog, reported)
 
@@ -139,7 +139,7 @@ class StageKeys(ParameterKeys):
             yes="the keypad shows the same",
             no="not confirmed",
             loses=True,
-            now=self.motor_now(),
+            now=self.motor_state_text(),
         )
         self.app.push_screen(requested, reported)
 
@@ -189,7 +189,7 @@ class StageKeys(ParameterKeys):
             yes="drop them",
             no="keep them",
             loses=True,
-            now=self.motor_now(),
+            now=self.motor_state_text(),
         )
         self.app.push_screen(requested, reported)
 

@@ -92,7 +92,7 @@ class WriteKeys(ParameterKeys):
                 self.note(f"{len(applied.waits)} not written; they stay staged.")
             self.look()
 
-        self.app.push_screen(RestQuestion(applied, self.motor_now()), reported)
+        self.app.push_screen(RestQuestion(applied, self.motor_state_text()), reported)
 
     def offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""
@@ -117,7 +117,7 @@ class WriteKeys(ParameterKeys):
             yes="follows it",
             no="stay",
             loses=len(self.app.fleet.sessions if self.app.fleet else ()) > 1,
-            now=self.motor_now(),
+            now=self.motor_state_text(),
             by_itself=True,
         )
         self.app.push_screen(requested, reported)

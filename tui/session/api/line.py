@@ -20,7 +20,7 @@ from ..fleet import Fleet
 from ..journal import Journal
 from ..read.order_check import check_byte_order
 from ..read.reader import Reader
-from ..sharing.guardian import Guardian
+from ..sharing.orphan_motors import OrphanMotorGuard
 from ..teaching.teacher import Teacher
 from .drive import Drive
 from .work import waited
@@ -57,7 +57,7 @@ class DriveLine:
         self._opened = opened
         self._journal = Journal(on_trouble=_warn)
         self._fleet = Fleet(opened.line, self._journal)
-        self._guardian = Guardian(opened.line, self._journal)
+        self._guardian = OrphanMotorGuard(opened.line, self._journal)
 
     def drive(self, address: int = 1, profile: str | None = None) -> Drive:
         """The drive at an address, by its own word for what it is, or by a profile's id.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from tui.drive.blocks.assignment import Assignment, describe, slot_target
 from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.blocks.wire_cost import reach
-from tui.drive.held_back import held_back
+from tui.drive.command_blocked import held_back
 from tui.drive.orders import chart_in_force, deciding_codes, interlock_codes
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, is_order

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tui.bus.errors import DeviceException, LineError, RequestRefused, without_fate
+from tui.bus.errors import DeviceException, LineError, RequestRefused, strip_outcome_note
 from tui.drive.blocks.assignment import Assignment, MappingError, SlotChange, describe, steps
 from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.orders import OrderRefused
@@ -165,7 +165,7 @@ class _Writing:
         if now is None:
             raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost
         if now != step.new:
-            text = f"{step.slot} was not taken: {without_fate(lost)}"
+            text = f"{step.slot} was not taken: {strip_outcome_note(lost)}"
             raise AssignmentRefused(self.so_far(text)) from lost
 
     def _changed(self, slot: str, old: int | None, now: int) -> AssignmentRefused:

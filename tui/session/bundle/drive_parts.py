@@ -10,7 +10,7 @@ from tui.bus.errors import LineError
 from tui.drive.settings.parameter_set import ParameterSet, dump_set
 
 from ..counters.watch import CounterWatch
-from ..diagnosis.asking import sight_of_port
+from ..diagnosis.asking import evidence_of_port
 from ..diagnosis.diagnosis import Diagnosis, diagnosed
 from ..diagnosis.examining import examine_line
 from ..drive import DriveSession
@@ -89,7 +89,7 @@ class _Drive:
         profile = await in_own_thread(lambda: subject.expected_profile(device))
         if subject.opened is None:
             link, trouble = subject.link, subject.trouble
-            seen = await in_own_thread(lambda: sight_of_port(link, device, trouble))
+            seen = await in_own_thread(lambda: evidence_of_port(link, device, trouble))
             return diagnosed(replace(seen, profile=profile))
         known = subject.opened.known
         changed = known.text if known is not None else ""

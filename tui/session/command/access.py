@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tui.bus.api import Priority
 from tui.drive.chart import state_codes, state_now
-from tui.drive.held_back import held_back
+from tui.drive.command_blocked import held_back
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
@@ -26,8 +26,8 @@ from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
 from ..work import Permit
-from .given import GivenCommands
-from .way_out import block_reason_text
+from .command_history import CommandHistory
+from .unblock_hint import block_reason_text
 
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
@@ -44,7 +44,7 @@ class CommandAccess:
 
     session: DriveSession
     journal: Journal
-    given: GivenCommands
+    given: CommandHistory
     permit: Permit
 
     @property

@@ -6,8 +6,8 @@ from decimal import Decimal
 
 from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, state_of
+from tui.drive.command_blocked import held_back, state_refusal
 from tui.drive.fault_reset import no_fault, not_in_command
-from tui.drive.held_back import held_back, state_refusal
 from tui.drive.orders import STOP_ORDERS, OrderRefused, chart_in_force, choose, order_target
 from tui.drive.profile.schema import CommandOption, Order, OrderId
 from tui.drive.values import from_words
@@ -22,7 +22,7 @@ from .reference import (
     step_in,
     within_limits,
 )
-from .way_out import block_reason_text
+from .unblock_hint import block_reason_text
 
 STILL_IN_FAULT = "sent, but the drive is still in fault, as long as its cause is there"
 

@@ -31,8 +31,8 @@ from .carry_out import (
     set_option,
     step_reference,
 )
+from .command_history import CommandHistory
 from .control_source import configure
-from .given import GivenCommands
 
 CommandWork = Callable[[CommandAccess], Coroutine[Any, Any, str]]
 """A command; it returns what was done."""
@@ -46,7 +46,7 @@ class Commander:
         self.journal = journal
         self.last_run: tuple[OrderId, str | None] | None = None
         """The run command that was given last, with its reference."""
-        self.given = GivenCommands(session)
+        self.given = CommandHistory(session)
         """Commands given by this program, and whether the drive still holds them."""
         self._lock = threading.Lock()
         self._steps = Decimal(0)

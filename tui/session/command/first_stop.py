@@ -17,7 +17,7 @@ from tui.drive.first_stop import FirstWord, StopPlace, first_word, followers, st
 from tui.drive.orders import stop_alike
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
-from tui.drive.profile.stop_facts import StopFacts, stop_facts_of
+from tui.drive.profile.stop_profile import StopProfile, stop_profile_of
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
@@ -82,20 +82,20 @@ class _Look:
     raws: dict[int, int]
 
 
-def unlike_families(session: DriveSession) -> tuple[StopFacts, ...]:
+def unlike_families(session: DriveSession) -> tuple[StopProfile, ...]:
     """Families of which a guessed drive may be, if the word that stops one may start another."""
     ids = session.known_identity.candidates if session.guessed else ()
     profiles = [library.load(one) for one in ids]
     if not profiles or stop_alike(profiles):
         return ()
-    return tuple(stop_facts_of(one, names_itself=False) for one in profiles)
+    return tuple(stop_profile_of(one, names_itself=False) for one in profiles)
 
 
 async def stop_first(
     line: ModbusLine,
     device: int,
     journal: Journal,
-    families: Sequence[StopFacts],
+    families: Sequence[StopProfile],
     named: Sequence[str],
     wanted: OrderId,
 ) -> FirstStop:

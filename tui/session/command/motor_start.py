@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tui.drive.channel import reference_channel
 from tui.drive.chart import ENABLED_KINDS, read_chart
-from tui.drive.held_back import state_refusal
+from tui.drive.command_blocked import state_refusal
 from tui.drive.orders import OrderRefused, choose, walk
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter
 

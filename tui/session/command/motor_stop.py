@@ -22,7 +22,7 @@ from tui.drive.orders import (
     with_options,
 )
 from tui.drive.profile.schema import Chart, Order, OrderId
-from tui.drive.profile.stop_facts import StopFacts
+from tui.drive.profile.stop_profile import StopProfile
 from tui.drive.values import from_words
 
 from ..connect.limits import limits_of
@@ -102,7 +102,7 @@ class MotorStop:
         self.answered = None  # should it be tried again
         return await self._follow(chart, chosen)
 
-    async def _stop_any(self, families: Sequence[StopFacts]) -> str | None:
+    async def _stop_any(self, families: Sequence[StopProfile]) -> str | None:
         """Send the word that stops every family; none of them can follow the motor."""
         session, ids = self.session, [one.id for one in families]
         try:

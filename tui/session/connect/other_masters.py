@@ -102,7 +102,7 @@ async def listen_first(
     return Overheard(loose=found.loose + line.counters.bytes_in - before - framed)
 
 
-class MasterLookout:
+class MasterDetector:
     """Looks for requests of other masters while drives are searched for."""
 
     def __init__(self, line: ModbusLine) -> None:

@@ -9,7 +9,7 @@ from tui.bus.api import ModbusLine
 from tui.bus.prepared import PreparedWrite, prepared_write
 from tui.drive.first_stop import blind_stops
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.stop_facts import stop_facts_of
+from tui.drive.profile.stop_profile import stop_profile_of
 
 from .limits import limits_of
 
@@ -24,7 +24,7 @@ def prepared_stop(
     Empty if there is no such word; an error of its own must not keep a drive from being opened.
     """
     try:
-        words = blind_stops([stop_facts_of(one) for one in families])
+        words = blind_stops([stop_profile_of(one) for one in families])
         limits = limits_of(families[0])
         return tuple(
             prepared_write(line.link, limits, device, one.address, [one.word]) for one in words

@@ -14,8 +14,8 @@ from tui.bus.expectation import IDENTIFY
 from tui.drive.finding import PresenceProbe
 
 from ..clock import REAL_CLOCK
+from .address_prober import AddressProber, probers_of
 from .identify import ScanResult, find_drive
-from .strangers import Strangers, strangers_of
 
 REST = 2.0
 """A search beside regular polls rests so many times as long as it waited in vain."""
@@ -115,7 +115,7 @@ class Search:
                 self.ended = "done"
                 return
             wait = line.timing.scan_timeout
-            how = await asyncio.to_thread(strangers_of, line.link, wait, patient=self._patient)
+            how = await asyncio.to_thread(probers_of, line.link, wait, patient=self._patient)
             self.cost = how.cost
             self._cost_again = _cost_again(how, line)
             first = partial(self._round, line, how, found)
@@ -165,7 +165,7 @@ class Search:
     async def _round(
         self,
         line: ModbusLine,
-        how: Strangers,
+        how: AddressProber,
         found: Found,
         devices: Sequence[int],
         priority: Priority,
@@ -221,7 +221,7 @@ class _SilentTimes(NamedTuple):
         return _SilentTimes(self.times + 1, self.seconds + seconds)
 
 
-def _cost_again(how: Strangers, line: ModbusLine) -> float:
+def _cost_again(how: AddressProber, line: ModbusLine) -> float:
     """Seconds that a silent address costs that is asked once more."""
     if how.within is None:
         return line.timing.patient_timeout * len(how.probes)

@@ -26,8 +26,8 @@ from ..clock import REAL_CLOCK
 from ..connect.identify import status_words_without_identification
 from ..connect.known_lines import line_name, load_memory
 from ..connect.limits import limits_of
+from .evidence import SAME_ADAPTER, AdapterSeen, DiagnosticEvidence
 from .heard import Heard, heard_by_errors, heard_of
-from .sight import SAME_ADAPTER, AdapterSeen, Sight
 
 ASKED = 3
 """Reads of a drive that answers, up to one that it does not."""
@@ -41,10 +41,12 @@ LATE_WITHIN = 1.0
 Asks = Callable[[], Awaitable[object]]
 
 
-def sight_of_port(link: Link, device: int, trouble: LineError | None = None) -> Sight:
+def evidence_of_port(
+    link: Link, device: int, trouble: LineError | None = None
+) -> DiagnosticEvidence:
     """Return the evidence about a line without sending on it; reads files of the system."""
     port = see_port(link.path) if isinstance(link, SerialLink) else None
-    return Sight(link, device, trouble=trouble, port=port, adapter=adapter_of(link))
+    return DiagnosticEvidence(link, device, trouble=trouble, port=port, adapter=adapter_of(link))
 
 
 def adapter_of(link: Link) -> AdapterSeen:
@@ -70,9 +72,9 @@ async def sight_of_drive(
     *,
     changed: str = "",
     neighbors: Sequence[int] = (),
-) -> Sight:
+) -> DiagnosticEvidence:
     """Send a drive on an open line a few requests, and see their results."""
-    seen = await asyncio.to_thread(sight_of_port, line.link, device)
+    seen = await asyncio.to_thread(evidence_of_port, line.link, device)
     seen = replace(seen, profile=profile, changed=changed, neighbors=tuple(neighbors))
     if _attached(line) and seen.port is not None:
         # the program that owns the line has the port, as it should

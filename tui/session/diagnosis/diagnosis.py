@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .rungs import LADDER
+from .checks import LADDER
+from .evidence import DiagnosticEvidence
 from .sick import CERTAIN
-from .sight import Sight
 
 ANSWERS = "answers"
 """The rung of a drive that answers, with nothing wrong on the way."""
@@ -23,7 +23,7 @@ class Diagnosis:
     rung: str
     text: str
     steps: tuple[str, ...]
-    sight: Sight
+    sight: DiagnosticEvidence
     certainty: str = CERTAIN
     """Certainty of the verdict: `certain`, `likely` or `possible`."""
     others: tuple[str, ...] = field(default=())
@@ -35,7 +35,7 @@ class Diagnosis:
         return self.rung == ANSWERS
 
 
-def diagnosed(sight: Sight) -> Diagnosis:
+def diagnosed(sight: DiagnosticEvidence) -> Diagnosis:
     """The first rung of the ladder that fails."""
     for rung in LADDER:
         if rung.fails(sight):

@@ -22,11 +22,11 @@ from ..clock import REAL_CLOCK
 from ..connect.identify import DriveIdentity, identify_drive
 from ..connect.limits import limits_of
 from ..connect.other_masters import LISTEN, overheard
-from .asking import FRAMES_COME_WITHIN, last_time, sight_of_drive, sight_of_port
+from .asking import FRAMES_COME_WITHIN, evidence_of_port, last_time, sight_of_drive
+from .evidence import DiagnosticEvidence
 from .gateway_probe import GATEWAY_REFUSALS, gateway_codes, probed
 from .measure import measure_of
 from .short_reads import ShortReads
-from .sight import Sight
 
 SHORT_READS = 200
 MEASURE_WITHIN = 6.0
@@ -52,7 +52,7 @@ async def examine_line(
     changed: str = "",
     answering: Sequence[int] = (),
     reads: int = SHORT_READS,
-) -> Sight:
+) -> DiagnosticEvidence:
     """Everything that is seen of a drive and its line."""
     behind = [ONE_BEHIND in line.state.reason]
     end = line.on_state(lambda state: behind.append(ONE_BEHIND in state.reason))
@@ -71,10 +71,10 @@ async def _examined(
     answering: Sequence[int],
     reads: int,
     behind: Sequence[bool],
-) -> Sight:
+) -> DiagnosticEvidence:
     ready = line.state.status is LineStatus.CONNECTED
     if ready and not isinstance(line.link, TcpLink) and (others := await _others(line)):
-        seen = await asyncio.to_thread(sight_of_port, line.link, device)
+        seen = await asyncio.to_thread(evidence_of_port, line.link, device)
         return replace(seen, profile=profile, changed=changed, overheard=others)
     sight = await sight_of_drive(line, device, profile, changed=changed, neighbors=answering)
     cut = isinstance(sight.trouble, LineLost) and ready
@@ -104,7 +104,7 @@ async def _others(line: ModbusLine) -> str:
     return heard.text if heard.requests or not ours else ""
 
 
-async def _measured(line: ModbusLine, sight: Sight, reads: int) -> Sight:
+async def _measured(line: ModbusLine, sight: DiagnosticEvidence, reads: int) -> DiagnosticEvidence:
     """The sight with the shares of many reads."""
     device, since, profile, identity = sight.device, last_time(line.trace), sight.profile, None
     if profile is None:

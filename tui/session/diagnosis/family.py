@@ -8,7 +8,7 @@ from tui.bus.link import SerialLink
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import LinkSetting
 
-from .sight import Sight
+from .evidence import DiagnosticEvidence
 
 WIRED = ("polarisation", "termination")
 NAMED = "names of"
@@ -19,7 +19,7 @@ USED_PINS = ("d0", "d1", "common", "rx", "tx", "0 v")
 BOTH_WAYS = "Makers call the two wires both ways round: change them over if nothing answers."
 
 
-def speed_hint(sight: Sight) -> str:
+def speed_hint(sight: DiagnosticEvidence) -> str:
     """A baud or a format of the line that the family does not have; empty where it has them."""
     link, profile = sight.link, sight.profile
     if profile is None or not isinstance(link, SerialLink):
@@ -33,7 +33,7 @@ def speed_hint(sight: Sight) -> str:
     return ""
 
 
-def address_hint(sight: Sight) -> str:
+def address_hint(sight: DiagnosticEvidence) -> str:
     """Return the likely cause of an address: off, a group's, or out of the family's range."""
     if sight.profile is None:
         return ""
@@ -49,7 +49,7 @@ def address_hint(sight: Sight) -> str:
     return f"Address: {setting}; it leaves the factory at {known.factory}."
 
 
-def as_factory(sight: Sight) -> bool:
+def as_factory(sight: DiagnosticEvidence) -> bool:
     """Return True if the line has the settings with which the drive leaves the factory."""
     profile, link = sight.profile, sight.link
     if profile is None or not isinstance(link, SerialLink):
@@ -57,7 +57,7 @@ def as_factory(sight: Sight) -> bool:
     return (link.baud, link.format) == (profile.data.link.baud, profile.data.link.format)
 
 
-def settings_hints(sight: Sight) -> Iterator[str]:
+def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
     """Baud and format: those that the drive leaves the factory with, beside those of the line."""
     profile, link = sight.profile, sight.link
     if profile is None:
@@ -76,7 +76,7 @@ def settings_hints(sight: Sight) -> Iterator[str]:
             yield f"{port}: {setting.choices[0].text} only, whatever the other port has."
 
 
-def wiring_hints(sight: Sight, *, answers: bool = False) -> Iterator[str]:
+def wiring_hints(sight: DiagnosticEvidence, *, answers: bool = False) -> Iterator[str]:
     """Polarity, pins, polarisation and termination, as the family's manual names them.
 
     The wires of a drive that answers are the right ones: then nothing of polarity and pins.

@@ -6,7 +6,7 @@ from math import log
 
 from tui.bus.link import SerialLink
 
-from .sight import Sight
+from .evidence import DiagnosticEvidence
 
 USUAL_BAUDS = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 USUAL_FORMATS = ("8E1", "8N1", "8N2", "8O1")
@@ -14,7 +14,7 @@ SAME_SPEED = 1.3
 """Times by which the bytes that came may differ from those due where the speed is the same."""
 
 
-def speed_text(sight: Sight) -> str:
+def speed_text(sight: DiagnosticEvidence) -> str:
     """Return the conclusion from the number of bytes: a receiver at half the speed gets half."""
     came, due = sight.heard.compared
     if not came or not due:
@@ -27,13 +27,13 @@ def speed_text(sight: Sight) -> str:
     return f"{counts}: the drive sends {'slower' if came > due else 'faster'}{at}"
 
 
-def same_speed(sight: Sight) -> bool:
+def same_speed(sight: DiagnosticEvidence) -> bool:
     """Return True if about as many bytes came as were due."""
     came, due = sight.heard.compared
     return bool(came and due) and 1 / SAME_SPEED < came / due < SAME_SPEED
 
 
-def other_formats(sight: Sight) -> tuple[str, ...]:
+def other_formats(sight: DiagnosticEvidence) -> tuple[str, ...]:
     """The formats of the family that the line does not have; none behind a device server."""
     if not isinstance(sight.link, SerialLink):
         return ()
@@ -41,7 +41,7 @@ def other_formats(sight: Sight) -> tuple[str, ...]:
     return tuple(one for one in known or USUAL_FORMATS if one != sight.link.format)
 
 
-def likely_baud(sight: Sight) -> int | None:
+def likely_baud(sight: DiagnosticEvidence) -> int | None:
     """The other baud of the family that the bytes fit best.
 
     None where the present one fits, and behind a device server.

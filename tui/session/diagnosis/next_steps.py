@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from tui.bus.errors import PortMissing
 from tui.bus.link import SerialLink
 
+from .evidence import DiagnosticEvidence
 from .family import address_hint, as_factory, settings_hints, speed_hint, wiring_hints
 from .garbled import likely_baud, other_formats, same_speed
-from .sight import Sight
 
 LATER = frozenset({5, 6})
 """Exceptions by which a request is put off."""
@@ -19,7 +19,7 @@ NOT_KNOWN = frozenset({1, 2, 3})
 NAME_A_FAMILY = "Name the drive's profile: then the advice of its manual is shown here."
 
 
-def find_adapter(sight: Sight) -> Iterator[str]:
+def find_adapter(sight: DiagnosticEvidence) -> Iterator[str]:
     """A port whose adapter has another number now."""
     if sight.adapter.now:
         yield f"Open {sight.adapter.now}, or {sight.adapter.was}, which no replugging changes."
@@ -29,12 +29,12 @@ def find_adapter(sight: Sight) -> Iterator[str]:
         yield from accept_change(sight)
 
 
-def accept_change(sight: Sight) -> Iterator[str]:
+def accept_change(sight: DiagnosticEvidence) -> Iterator[str]:
     """A line that answers, and is not the one that it was."""
     yield "Nothing but a stop is written meanwhile. If it is right, accept the line as it is now."
 
 
-def plug_in(sight: Sight) -> Iterator[str]:
+def plug_in(sight: DiagnosticEvidence) -> Iterator[str]:
     """A port that is not there."""
     ports = sight.trouble.ports if isinstance(sight.trouble, PortMissing) else ()
     yield f"Ports here: {', '.join(ports)}." if ports else "No serial port is here."
@@ -43,7 +43,7 @@ def plug_in(sight: Sight) -> Iterator[str]:
     yield "Plug the adapter in; dmesg shows if the system has detected it."
 
 
-def get_permission(sight: Sight) -> Iterator[str]:
+def get_permission(sight: DiagnosticEvidence) -> Iterator[str]:
     """A port that this user may not use."""
     port = sight.port
     group, user = (port.group, port.user) if port is not None else ("", "")
@@ -60,7 +60,7 @@ def get_permission(sight: Sight) -> Iterator[str]:
     yield f"sudo usermod -a -G {group or 'dialout'} {user or '$USER'}, then log in again."
 
 
-def free_port(sight: Sight) -> Iterator[str]:
+def free_port(sight: DiagnosticEvidence) -> Iterator[str]:
     """A port that another program has."""
     if sight.owner_frozen:
         yield "Let that program go on, or end it: kill -9 and its pid. Then the line is free."
@@ -68,12 +68,12 @@ def free_port(sight: Sight) -> Iterator[str]:
     yield "Close that program. Programs of Drive Panel share a line by themselves, others do not."
 
 
-def other_port(sight: Sight) -> Iterator[str]:
+def other_port(sight: DiagnosticEvidence) -> Iterator[str]:
     """A port that cannot be opened as it is to be."""
     yield "Try another adapter, or another baud and format: serial:PATH,BAUD,FORMAT."
 
 
-def reach_line(sight: Sight) -> Iterator[str]:
+def reach_line(sight: DiagnosticEvidence) -> Iterator[str]:
     """A line that was lost, or a host that is not reached."""
     if isinstance(sight.link, SerialLink):
         yield "Check the adapter's plug; the line reopens automatically."
@@ -81,19 +81,19 @@ def reach_line(sight: Sight) -> Iterator[str]:
     yield "Look at the gateway's supply and cable, its address, and the port that it listens on."
 
 
-def wait(sight: Sight) -> Iterator[str]:
+def wait(sight: DiagnosticEvidence) -> Iterator[str]:
     """A drive that is left alone on purpose."""
     yield "Ask again when that is over."
 
 
-def hurry_adapter(sight: Sight) -> Iterator[str]:
+def hurry_adapter(sight: DiagnosticEvidence) -> Iterator[str]:
     """An adapter that keeps bytes back."""
     name = os.path.basename(os.path.realpath(sight.path))
     yield f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
     yield "Nothing is wrong with the drive; each request costs that much more."
 
 
-def mend_settings(sight: Sight) -> Iterator[str]:
+def mend_settings(sight: DiagnosticEvidence) -> Iterator[str]:
     """A baud or a format that is not the drive's."""
     if hint := speed_hint(sight):
         yield hint
@@ -108,7 +108,7 @@ def mend_settings(sight: Sight) -> Iterator[str]:
     yield from wiring_hints(sight)
 
 
-def end_silence(sight: Sight) -> Iterator[str]:
+def end_silence(sight: DiagnosticEvidence) -> Iterator[str]:
     """Nobody answers: the drive's address and settings, its port, its wires."""
     if hint := speed_hint(sight):
         yield hint
@@ -126,24 +126,24 @@ def end_silence(sight: Sight) -> Iterator[str]:
     yield from wiring_hints(sight)
 
 
-def search(sight: Sight) -> Iterator[str]:
+def search(sight: DiagnosticEvidence) -> Iterator[str]:
     """That the panel itself can look for the drive elsewhere."""
     settings = ", --all-settings at other baud rates" if isinstance(sight.link, SerialLink) else ""
     yield f"drivepanel scan, or s on Line, looks for it at other addresses{settings}."
 
 
-def wait_longer(sight: Sight) -> Iterator[str]:
+def wait_longer(sight: DiagnosticEvidence) -> Iterator[str]:
     """A drive or a gateway that takes longer than is waited."""
     yield "Write ,timeout=2 behind the line, seconds up to 30; a gateway may add much."
 
 
-def end_echo(sight: Sight) -> Iterator[str]:
+def end_echo(sight: DiagnosticEvidence) -> Iterator[str]:
     """An adapter that repeats what is sent, and nobody else."""
     yield "The adapter is right: it hears its own sending, so the wires up to it are not cut."
     yield from end_silence(sight)
 
 
-def end_damage(sight: Sight) -> Iterator[str]:
+def end_damage(sight: DiagnosticEvidence) -> Iterator[str]:
     """Answers that arrive broken."""
     if sight.broken:
         yield "A format that differs by its parity or stop bits breaks some characters only."
@@ -153,7 +153,7 @@ def end_damage(sight: Sight) -> Iterator[str]:
     yield from wiring_hints(sight, answers=True)
 
 
-def sort_addresses(sight: Sight) -> Iterator[str]:
+def sort_addresses(sight: DiagnosticEvidence) -> Iterator[str]:
     """Somebody else answers."""
     others = ", ".join(map(str, sight.heard.others))
     yield f"Ask for address {others}; or its answer is late: ,timeout=2 behind the line."
@@ -162,13 +162,13 @@ def sort_addresses(sight: Sight) -> Iterator[str]:
         yield hint
 
 
-def find_second_master(sight: Sight) -> Iterator[str]:
+def find_second_master(sight: DiagnosticEvidence) -> Iterator[str]:
     """The drive answers somebody else's question."""
     yield "Another master on this line asks the same drive: a line has one."
     yield "Or two drives have this address: switch one off and ask again."
 
 
-def ask_gateway(sight: Sight) -> Iterator[str]:
+def ask_gateway(sight: DiagnosticEvidence) -> Iterator[str]:
     """A gateway that did not reach the drive."""
     if 10 in sight.heard.exceptions:
         yield f"In the gateway: is address {sight.device} routed to its serial side?"
@@ -178,7 +178,7 @@ def ask_gateway(sight: Sight) -> Iterator[str]:
     yield from end_silence(sight)
 
 
-def ask_otherwise(sight: Sight) -> Iterator[str]:
+def ask_otherwise(sight: DiagnosticEvidence) -> Iterator[str]:
     """A drive that refuses a read."""
     code = sight.heard.exceptions[-1]
     if code in LATER:
@@ -200,20 +200,20 @@ def _any(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]
 
 
-def one_master(sight: Sight) -> Iterator[str]:
+def one_master(sight: DiagnosticEvidence) -> Iterator[str]:
     """Another master on the line."""
     if details := sight.overheard.partition(". ")[2]:
         yield f"It asks {details[:1].lower()}{details[1:]}"
     yield "Stop the other master, or join it: a line has one. drivepanel listen shows what it asks."
 
 
-def open_what_works(sight: Sight) -> Iterator[str]:
+def open_what_works(sight: DiagnosticEvidence) -> Iterator[str]:
     """A gateway that speaks another protocol."""
     assert sight.works is not None
     yield f"Close the line and open {sight.works.line}, or set the gateway to Modbus TCP."
 
 
-def set_unit(sight: Sight) -> Iterator[str]:
+def set_unit(sight: DiagnosticEvidence) -> Iterator[str]:
     """A gateway that answers one unit only."""
     assert sight.works is not None
     yield f"Close the line and open {sight.works.line}. The only drive is device 1 there."
@@ -223,34 +223,34 @@ def set_unit(sight: Sight) -> Iterator[str]:
     )
 
 
-def restart_converter(_sight: Sight) -> Iterator[str]:
+def restart_converter(_sight: DiagnosticEvidence) -> Iterator[str]:
     """A converter that is one reply behind."""
     yield "Do not use this line: each value shown may be that of another register."
     yield "Restart the converter; set its receive timeout longer than the drive takes to reply."
 
 
-def part_drives(sight: Sight) -> Iterator[str]:
+def part_drives(sight: DiagnosticEvidence) -> Iterator[str]:
     """Two drives at one address."""
     yield f"Switch one of the drives at address {sight.device} off, and give the other its own."
 
 
-def swap_bytes(_sight: Sight) -> Iterator[str]:
+def swap_bytes(_sight: DiagnosticEvidence) -> Iterator[str]:
     """Bytes that are swapped on the way."""
     yield "Send no command and no setting: in the gateway, switch the swapping of bytes off."
 
 
-def keep_connection(_sight: Sight) -> Iterator[str]:
+def keep_connection(_sight: DiagnosticEvidence) -> Iterator[str]:
     """A gateway that closes idle connections."""
     yield "Set the idle timeout of the gateway longer, or switch it off."
 
 
-def find_losses(_sight: Sight) -> Iterator[str]:
+def find_losses(_sight: DiagnosticEvidence) -> Iterator[str]:
     """Replies that do not come."""
     yield "Check the wires, their ends and the supply of the drive. Write ,timeout=2 after LINE."
     yield "Other work of the drive or gateway, or another master, makes it miss requests too."
 
 
-def end_copies(_sight: Sight) -> Iterator[str]:
+def end_copies(_sight: DiagnosticEvidence) -> Iterator[str]:
     """Replies that come twice."""
     yield "Check adapter, repeater and gateway: one of them sends each frame again."
     yield "Switch the drive off and run why again: a reply shows a second drive at its address."

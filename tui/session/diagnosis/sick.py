@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .evidence import DiagnosticEvidence
 from .measure import Measure
-from .sight import Sight
 
 CERTAIN, LIKELY, POSSIBLE = "certain", "likely", "possible"
 SURE_FROM, LIKELY_FROM = 5, 2
@@ -28,11 +28,11 @@ class SickFrames:
     text: str
     others: tuple[str, ...]
 
-    def fails(self, sight: Sight) -> bool:
+    def fails(self, sight: DiagnosticEvidence) -> bool:
         """True if most sick frames are of this kind."""
         return sight.measure is not None and sight.measure.worst == self.kind
 
-    def certainty(self, sight: Sight) -> str:
+    def certainty(self, sight: DiagnosticEvidence) -> str:
         """Certainty of the verdict."""
         assert sight.measure is not None
         return sureness(sight.measure.count(self.kind))
@@ -66,7 +66,7 @@ SICK_FRAMES = (
 )  # fmt: skip
 
 
-def says_sick(kind: SickFrames, sight: Sight) -> str:
+def says_sick(kind: SickFrames, sight: DiagnosticEvidence) -> str:
     """The verdict with its share, and the others beside it."""
     measure = _measure(sight)
     count = measure.count(kind.kind)
@@ -79,7 +79,7 @@ def says_sick(kind: SickFrames, sight: Sight) -> str:
     return f"In {measure.seconds:.1f} s, {count} of {measure.requested} {kind.text}{more}."
 
 
-def says_two_drives(sight: Sight) -> str:
+def says_two_drives(sight: DiagnosticEvidence) -> str:
     """The verdict of two drives at one address."""
     measure = _measure(sight)
     return (
@@ -88,13 +88,13 @@ def says_two_drives(sight: Sight) -> str:
     )
 
 
-def swapped(sight: Sight) -> bool:
+def swapped(sight: DiagnosticEvidence) -> bool:
     """True if values make sense with swapped bytes alone."""
     measure = sight.measure
     return measure is not None and measure.swapped >= SWAPPED_FROM and not measure.straight
 
 
-def says_swapped(sight: Sight) -> str:
+def says_swapped(sight: DiagnosticEvidence) -> str:
     """The verdict of swapped bytes."""
     return (
         f"The bytes of each word are swapped: {_measure(sight).swapped} settings make sense only"
@@ -102,6 +102,6 @@ def says_swapped(sight: Sight) -> str:
     )
 
 
-def _measure(sight: Sight) -> Measure:
+def _measure(sight: DiagnosticEvidence) -> Measure:
     assert sight.measure is not None
     return sight.measure

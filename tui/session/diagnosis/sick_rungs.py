@@ -7,9 +7,10 @@ from functools import partial
 from tui.bus.errors import ONE_BEHIND
 
 from . import next_steps as steps
+from .check import Check, first_sentence
+from .evidence import DiagnosticEvidence
 from .gateway_probe import Works
 from .measure import Measure
-from .rung import Rung, first_sentence
 from .sick import (
     LIKELY,
     POSSIBLE,
@@ -20,20 +21,19 @@ from .sick import (
     sureness,
     swapped,
 )
-from .sight import Sight
 
 
-def _measure(sight: Sight) -> Measure:
+def _measure(sight: DiagnosticEvidence) -> Measure:
     assert sight.measure is not None
     return sight.measure
 
 
-def _works(sight: Sight) -> Works:
+def _works(sight: DiagnosticEvidence) -> Works:
     assert sight.works is not None
     return sight.works
 
 
-def _is_behind(sight: Sight) -> bool:
+def _is_behind(sight: DiagnosticEvidence) -> bool:
     """True if the line or the reads say so; no line that is one behind has surplus replies."""
     count = sight.measure
     if count is None:
@@ -41,7 +41,7 @@ def _is_behind(sight: Sight) -> bool:
     return count.one_behind or (sight.behind and not count.two_drives)
 
 
-def _says_behind(sight: Sight) -> str:
+def _says_behind(sight: DiagnosticEvidence) -> str:
     count = sight.measure
     if sight.behind or count is None:
         return f"{ONE_BEHIND}: each request gets the reply to the one before."
@@ -49,7 +49,7 @@ def _says_behind(sight: Sight) -> str:
     return f"{ONE_BEHIND}: {many} got the reply to the request before."
 
 
-def _sureness_of_behind(sight: Sight) -> str:
+def _sureness_of_behind(sight: DiagnosticEvidence) -> str:
     count = sight.measure
     if sight.behind or count is None:
         return LIKELY
@@ -57,25 +57,25 @@ def _sureness_of_behind(sight: Sight) -> str:
 
 
 GATEWAY_RUNGS = (
-    Rung(
+    Check(
         "other-master",
         lambda s: bool(s.overheard),
         lambda s: first_sentence(s.overheard),
         steps.one_master,
     ),
-    Rung(
+    Check(
         "wrong-protocol",
         lambda s: s.works is not None and s.works.unit is None,
         lambda s: f"The gateway does not speak the protocol of this line: {_works(s).line} works.",
         steps.open_what_works,
     ),
-    Rung(
+    Check(
         "other-unit",
         lambda s: s.works is not None and s.works.unit is not None,
         lambda s: f"The gateway answers unit {_works(s).unit}, and not address {s.device}.",
         steps.set_unit,
     ),
-    Rung(
+    Check(
         "behind",
         _is_behind,
         _says_behind,
@@ -85,8 +85,8 @@ GATEWAY_RUNGS = (
     ),
 )
 """Found without a reply on the line itself."""
-SICK_RUNGS: tuple[Rung, ...] = (
-    Rung(
+SICK_RUNGS: tuple[Check, ...] = (
+    Check(
         "two-drives",
         lambda s: s.measure is not None and s.measure.two_drives,
         says_two_drives,
@@ -94,7 +94,7 @@ SICK_RUNGS: tuple[Rung, ...] = (
         lambda s: sureness(_measure(s).turns + _measure(s).second),
         ("Another master writes to the drive, and its frames collide.",),
     ),
-    Rung(
+    Check(
         "swapped",
         swapped,
         says_swapped,
@@ -103,7 +103,7 @@ SICK_RUNGS: tuple[Rung, ...] = (
         ("The drive is of another family than its profile.",),
     ),
     *(
-        Rung(
+        Check(
             kind.rung,
             kind.fails,
             partial(says_sick, kind),
@@ -113,7 +113,7 @@ SICK_RUNGS: tuple[Rung, ...] = (
         )
         for kind in SICK_FRAMES
     ),
-    Rung(
+    Check(
         "idle-close",
         lambda s: s.idle_closed,
         lambda s: f"The gateway closes a connection on which nothing is sent for {s.idle:.0f} s.",

@@ -11,7 +11,7 @@ from math import inf
 from tui.bus.api import LineState, LineStatus, ModbusLine, Priority
 from tui.bus.errors import BytesSwapped, LineError
 from tui.bus.limits import MAX_READ, Limits
-from tui.drive.foreign_write import WordKind, foreign_words
+from tui.drive.foreign_write import WordKind, classify_words
 from tui.drive.orders import chart_codes
 from tui.drive.profile import library
 from tui.drive.values import from_words, word_count
@@ -111,7 +111,7 @@ class GatewayDrives:
         stops = all(
             one.kind is WordKind.STOP
             for profile in profiles
-            for one in foreign_words(profile, words, {})
+            for one in classify_words(profile, words, {})
         )
         return DriveSession(self.line, device, profiles[0]) if profiles and stops else None
 

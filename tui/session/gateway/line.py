@@ -9,7 +9,7 @@ from types import MappingProxyType
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError
 from tui.drive.chart import read_chart
-from tui.drive.foreign_write import ForeignWord, WordKind, foreign_words, stop_deciding_codes
+from tui.drive.foreign_write import ExternalWord, WordKind, classify_words, stop_deciding_codes
 
 from ..command.stop_report import StopSummary
 from ..drive import DriveSession
@@ -55,16 +55,16 @@ class GatewayLine:
 
     async def identify_apart(
         self, host: str, session: DriveSession, words: Mapping[int, int]
-    ) -> list[ForeignWord]:
+    ) -> list[ExternalWord]:
         """Sort the words of a client by kind, by a read if necessary."""
-        found = foreign_words(session.profile, words, {})
+        found = classify_words(session.profile, words, {})
         codes = tuple(stop_deciding_codes(session.profile, words))
         if not codes or not any(one.kind is WordKind.COMMAND for one in found):
             return found
         hurry = self.turns.may_hurry(host)
         read = partial(self.drives.read_deciding, session, codes, hurry=hurry)
         raws = await self.turns.deciding(host, (session.device, codes), read)
-        found = foreign_words(session.profile, words, raws)
+        found = classify_words(session.profile, words, raws)
         if not any(one.kind is WordKind.STOP for one in found):
             self.turns.note_in_vain(host)
         return found

@@ -21,10 +21,10 @@ from tui.bus.gateway.pdu import (
 from tui.bus.gateway.server import TcpRequest
 from tui.drive.chart import read_chart
 from tui.drive.foreign_write import (
-    ForeignWord,
+    ExternalWord,
     StartDirection,
     WordKind,
-    foreign_words,
+    classify_words,
     parameters_at,
     setting_refusal,
     starts_by,
@@ -99,7 +99,7 @@ class GatewayWrite:
         """Return True if a stop may be in it, which no write before it turns into something
         else."""
         profile = self._session.profile
-        kinds = {one.kind for one in foreign_words(profile, self._requested.words, {})}
+        kinds = {one.kind for one in classify_words(profile, self._requested.words, {})}
         if WordKind.COMMAND not in kinds:
             return WordKind.STOP in kinds
         # the command before it tells the state, not what the word means
@@ -118,7 +118,7 @@ class GatewayWrite:
             return {}
         return self._session.image.fresh(JUST_READ)
 
-    async def _check(self, words: list[ForeignWord]) -> None:
+    async def _check(self, words: list[ExternalWord]) -> None:
         """Raise Unanswerable where the request is not allowed as a whole."""
         self._commands = any(one.kind is WordKind.COMMAND for one in words)
         if why := self._voided() or self._session.byte_order.text:
@@ -142,7 +142,7 @@ class GatewayWrite:
             if why:
                 self._refuse(BUSY, why)
 
-    async def _check_values(self, settings: list[ForeignWord]) -> None:
+    async def _check_values(self, settings: list[ExternalWord]) -> None:
         profile = self._session.profile
         parameters = parameters_at(settings)
         for one in parameters:
@@ -185,14 +185,14 @@ class GatewayWrite:
         self._line.commanding.stop(self._session.device, self._client)
         self._line.pending.stops_by(self._write)
 
-    async def _send_alone(self, one: ForeignWord) -> None:
+    async def _send_alone(self, one: ExternalWord) -> None:
         """Send one word that stops."""
         device = self._session.device
         word, send = (device, one.address, one.word), partial(self._send_alone_now, one)
         await self._line.turns.stopping(self._host, word, send)
         self._line.commanding.stopped_too(device, self._client)
 
-    async def _send_alone_now(self, one: ForeignWord) -> None:
+    async def _send_alone_now(self, one: ExternalWord) -> None:
         self._stop()
         answer = ENDED_BEFORE_ANSWER
         try:
@@ -222,7 +222,7 @@ class GatewayWrite:
         stops = priority is Priority.STOP
         if stops:
             self._stop()
-        parameters = parameters_at(foreign_words(self._session.profile, self._requested.words, {}))
+        parameters = parameters_at(classify_words(self._session.profile, self._requested.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
         answer = ENDED_BEFORE_ANSWER
         try:

@@ -13,7 +13,7 @@ from tui.bus.trace import Frame, Trace
 from tui.drive.profile.profile import Profile
 from tui.wire.heard.splitting import HeardFrame
 
-from ..connect.strangers import known_profiles
+from ..connect.address_prober import known_profiles
 from .families import Families, remembered_families
 from .hearing import Hearing
 from .listener import ToldExchange

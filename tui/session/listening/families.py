@@ -25,7 +25,7 @@ NO_SUCH_FUNCTION, NO_SUCH_ADDRESS = 1, 2
 
 
 @dataclass(frozen=True, slots=True)
-class TakenFamily:
+class AssumedProfile:
     """The profile that a drive is taken by, and why."""
 
     profile: Profile
@@ -78,22 +78,22 @@ class Families:
         self._named = named or {}
         self._remembered = remembered or {}
         self._evidence: dict[int, _Evidence] = {}
-        self._likely: dict[int, tuple[int, TakenFamily | None]] = {}
+        self._likely: dict[int, tuple[int, AssumedProfile | None]] = {}
         """By device, how much was known, and the result."""
         self.identities: dict[int, DriveIdentity] = {}
         """Drives that have identified themselves to any program."""
 
-    def family(self, device: int) -> TakenFamily | None:
+    def family(self, device: int) -> AssumedProfile | None:
         """Return the present guess of a drive's family; None if nothing indicates one."""
         named = self._named.get(device) or self._named.get(None)
         if named is not None:
-            return TakenFamily(named, "named")
+            return AssumedProfile(named, "named")
         identity = self.identities.get(device)
         if identity is not None and identity.profile in self._known:
-            return TakenFamily(self._known[identity.profile], "identified")
+            return AssumedProfile(self._known[identity.profile], "identified")
         remembered = self._remembered.get(device)
         if remembered in self._known:
-            return TakenFamily(self._known[remembered], "remembered")
+            return AssumedProfile(self._known[remembered], "remembered")
         return self._inferred(device)
 
     def note(self, exchange: HeardExchange) -> None:
@@ -117,7 +117,7 @@ class Families:
         elif exchange.exception == NO_SUCH_ADDRESS and len(words) == 1:
             evidence.lacking |= words
 
-    def _inferred(self, device: int) -> TakenFamily | None:
+    def _inferred(self, device: int) -> AssumedProfile | None:
         evidence = self._evidence.get(device)
         if evidence is None or not evidence.answered:
             return None
@@ -128,13 +128,13 @@ class Families:
         return found
 
 
-def _likeliest(evidence: _Evidence, known: Sequence[Profile]) -> TakenFamily | None:
+def _likeliest(evidence: _Evidence, known: Sequence[Profile]) -> AssumedProfile | None:
     scores = {profile.id: _score(evidence, profile) for profile in known}
     best = max(scores.values(), default=0.0)
     if best <= 0:
         return None
     first, *others = [profile for profile in known if scores[profile.id] == best]
-    return TakenFamily(first, "likely", tuple(profile.id for profile in others))
+    return AssumedProfile(first, "likely", tuple(profile.id for profile in others))
 
 
 def _score(evidence: _Evidence, profile: Profile) -> float:

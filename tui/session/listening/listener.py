@@ -9,7 +9,7 @@ from tui.drive.profile.profile import Profile
 from tui.wire.heard.pairing import HeardExchange, Pairing
 from tui.wire.heard.splitting import FrameSplitter, HeardFrame
 
-from .families import Families, TakenFamily
+from .families import AssumedProfile, Families
 from .tally import LineTally
 from .words import HeardValue, values_of
 
@@ -28,7 +28,7 @@ class ToldExchange:
     """An exchange in the words of its drive's family."""
 
     exchange: HeardExchange
-    family: TakenFamily | None
+    family: AssumedProfile | None
     values: tuple[HeardValue, ...]
 
     @property

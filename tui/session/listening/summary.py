@@ -10,7 +10,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import ReadRequest, WireTiming
 
 from .advice import Feeding, ShorterPlan, feeding, shorter_plan
-from .families import Families, TakenFamily
+from .families import AssumedProfile, Families
 from .listener import LineListener
 from .tally import DriveTally, LineTally, WriteTally
 
@@ -29,7 +29,7 @@ class DriveSummary:
     """One drive: what was counted, and what follows from it."""
 
     tally: DriveTally
-    family: TakenFamily | None
+    family: AssumedProfile | None
     pace: float | None
     """Requests a second."""
     feeding: Feeding | None
@@ -123,7 +123,7 @@ def _drive_lines(drive: DriveSummary) -> Iterator[str]:
         yield f"  {shorter_text(drive.shorter)}"
 
 
-def family_text(family: TakenFamily | None) -> str:
+def family_text(family: AssumedProfile | None) -> str:
     """A family, and how sure that is."""
     if family is None:
         return "family not known; -p names it"

@@ -15,7 +15,7 @@ from tui.bus.errors import LineClosed
 from tui.bus.keep_alive import KeepAlive
 from tui.drive.finding import presence_probes
 
-from ..connect.strangers import known_profiles
+from ..connect.address_prober import known_profiles
 from ..read.presence import UNKNOWN_TIMEOUT
 
 

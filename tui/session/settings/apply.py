@@ -17,7 +17,7 @@ from tui.bus.errors import (
     NoAnswer,
     RequestRefused,
     WrongReply,
-    without_fate,
+    strip_outcome_note,
 )
 from tui.drive.errors import DriveError
 from tui.drive.settings.dependence import builds_on
@@ -250,10 +250,10 @@ class _Work:
             text = f"{edit.code}: {edit.old_text} -> {edit.text} (its answer was lost)"
             return Result(edit, EditOutcome.DONE, text, held)
         if isinstance(error, LineLost):
-            text = f"{edit.code} was not written: {without_fate(error)}"
+            text = f"{edit.code} was not written: {strip_outcome_note(error)}"
             return Result(edit, EditOutcome.NOT_SENT, text, held)
         silent = " This family refuses by silence." if not self._refuses_aloud else ""
-        why = f"{without_fate(error)}{silent} The drive is {self.retrying.headline}."
+        why = f"{strip_outcome_note(error)}{silent} The drive is {self.retrying.headline}."
         text = f"{edit.code} was not taken: {why}"
         return Result(edit, EditOutcome.NOT_TAKEN, text, held)
 

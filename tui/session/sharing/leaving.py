@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .guardian import LONGEST_GRACE
+from .orphan_motors import LONGEST_GRACE
 
 if TYPE_CHECKING:
     from ..drive import DriveSession
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 OTHERS_ASK = "Other programs on the line ask"
 
 
-def left_to_others(session: DriveSession, *, on_purpose: bool) -> str:
+def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
     """Return the reaction of other programs to a motor that is left; empty if none.
 
     `on_purpose`: it is put on record as left running. Otherwise the owner of the line stops a motor
-    that was started here, by its Guardian.
+    that was started here, by its OrphanMotorGuard.
     """
     others, starts = session.line.facts.others, session.starts
     if not others:

@@ -18,7 +18,7 @@ from .starts import Starts
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.bus.program import ProcessKey
-    from tui.bus.shared_facts import SharedFacts
+    from tui.bus.shared_state import SharedState
     from tui.drive.profile.profile import Profile
 
     from ..connect.identify import DriveIdentity
@@ -226,7 +226,7 @@ class StartKeeper:
         self._starts.close()
 
 
-def pids_absent(facts: SharedFacts) -> frozenset[ProcessKey]:
+def pids_absent(facts: SharedState) -> frozenset[ProcessKey]:
     """The processes of programs that have left the line, frozen ones among them."""
     here = {one.process for one in facts.programs}
     return frozenset({one.process for one in facts.departed} - here)

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
-class LeftAlone:
+class PolledDrive:
     """A drive that a command asks, and what it does afterwards."""
 
     session: DriveSession
@@ -115,9 +115,9 @@ def timeout_json(found: Timeout) -> dict[str, Any] | None:
     }
 
 
-def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> LeftAlone:
+def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> PolledDrive:
     """Have it told at the end what a drive does then."""
-    found = LeftAlone(session, line_text, goes_on=opened.simulation is None)
+    found = PolledDrive(session, line_text, goes_on=opened.simulation is None)
     opened.farewells[session.device] = found
     return found
 

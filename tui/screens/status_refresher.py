@@ -20,7 +20,7 @@ FRAME_LOOK, HEALTH_LOOK = 0.25, 1.0
 WHAT_TO_DO = "Open it: Space stops it, T takes it over."
 
 
-class Lookout(Panel):
+class StatusRefresher(Panel):
     """Draws the frame of the screen on top, and says what must be heard wherever one is."""
 
     bell_rings = True

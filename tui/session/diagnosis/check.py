@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from .evidence import DiagnosticEvidence
 from .sick import CERTAIN
-from .sight import Sight
 
-Steps = Callable[[Sight], Iterable[str]]
+Steps = Callable[[DiagnosticEvidence], Iterable[str]]
 
 
 @dataclass(frozen=True, slots=True)
-class Rung:
+class Check:
     """One thing that may be wrong."""
 
     id: str
-    fails: Callable[[Sight], bool]
-    says: Callable[[Sight], str]
+    fails: Callable[[DiagnosticEvidence], bool]
+    says: Callable[[DiagnosticEvidence], str]
     """One sentence."""
     steps: Steps
-    certainty: Callable[[Sight], str] = lambda _: CERTAIN
+    certainty: Callable[[DiagnosticEvidence], str] = lambda _: CERTAIN
     others: tuple[str, ...] = ()
     """Other possible causes, if the verdict is not certain."""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from time import monotonic
 
 from ..schedule.inside import LineInside
-from .attached import SILENT_CLIENT, TOO_LATE, Client, stood_still
+from .attached import SILENT_CLIENT, TOO_LATE, Client, was_suspended
 from .messages import Alive, Pulse, packed
 from .place import reached
 
@@ -56,7 +56,7 @@ async def programs_back(
         left -= BACK_LOOK
 
 
-class SignsOfLife:
+class HeartbeatSender:
     """Reports to the clients of a line repeatedly that its owner is well; in the line's loop."""
 
     def __init__(
@@ -113,7 +113,7 @@ class SignsOfLife:
 
     async def _hear_stops(self) -> None:
         """This program stood still: what waits in it may have been stopped meanwhile."""
-        stood, why = self._stood, stood_still(self._stood)
+        stood, why = self._stood, was_suspended(self._stood)
         log.warning("%s", why)
         if stood > TOO_LATE:
             self._inside.dispatcher.void_older(self._inside.clock() - TOO_LATE, why)

@@ -6,7 +6,7 @@ from ..drive import DriveSession
 from .reference import Reference
 
 
-class GivenCommands:
+class CommandHistory:
     """State kept from one command to the next."""
 
     def __init__(self, session: DriveSession) -> None:

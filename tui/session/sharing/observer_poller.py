@@ -28,7 +28,7 @@ ACTED_AFTER = 1.0
 """Seconds beyond its timeout after which a drive has begun to act."""
 
 
-class Bystander:
+class ObserverPoller:
     """Looks on at one drive, and keeps no motor running whose commander has died.
 
     `sign` is the time of the last heartbeat of the program that started its motor (monotonic), or

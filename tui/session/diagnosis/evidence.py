@@ -33,7 +33,7 @@ SAME_ADAPTER = AdapterSeen()
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class DiagnosticEvidence:
     """Evidence for a diagnosis; times in seconds."""
 
     link: Link

@@ -25,7 +25,7 @@ JITTER = 0.002
 
 
 @dataclass(frozen=True, slots=True)
-class Strangers:
+class AddressProber:
     """First requests to the addresses of one line."""
 
     probes: tuple[PresenceProbe, ...]
@@ -48,7 +48,7 @@ def known_profiles() -> list[Profile]:
     return found
 
 
-def strangers_of(link: Link, network_wait: float, *, patient: bool = False) -> Strangers:
+def probers_of(link: Link, network_wait: float, *, patient: bool = False) -> AddressProber:
     """Return the first requests for the addresses of a line; reads files.
 
     A line over a network, or one whose timeout a person has set, is waited for `network_wait`
@@ -57,10 +57,12 @@ def strangers_of(link: Link, network_wait: float, *, patient: bool = False) -> S
     profiles = known_profiles()
     probes = presence_probes(profiles)
     if patient or not isinstance(link, SerialLink) or link.timeout is not None:
-        return Strangers(probes, None, network_wait, network_wait * len(probes))
+        return AddressProber(probes, None, network_wait, network_wait * len(probes))
     setting = LineSetting(link.baud, link.format)
     within = wait_for_reply(setting, longest_turnaround(profiles)) + JITTER
-    return Strangers(probes, within, PATIENCE * within, silent_cost(setting, within, len(probes)))
+    return AddressProber(
+        probes, within, PATIENCE * within, silent_cost(setting, within, len(probes))
+    )
 
 
 def settings_worth_a_try(first: LineSetting, *, parity: bool = True) -> list[LineSetting]:

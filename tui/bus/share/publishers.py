@@ -11,11 +11,11 @@ from .beside import send_plain_stop
 from .messages import AnyMessage, Armed, Claim, PollPause
 
 if TYPE_CHECKING:
-    from ..shared_facts import SharedFacts
+    from ..shared_state import SharedState
 
 
 @dataclass(eq=False, slots=True)
-class LineVoice:
+class LinePublisher:
     """The way to the other programs on a line; used in any thread."""
 
     send: Callable[[AnyMessage], None]
@@ -32,7 +32,7 @@ class LineVoice:
             send_plain_stop(Path(self.holder), devices)
 
 
-def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
+def tell_own(facts: SharedState, send: Callable[[AnyMessage], None]) -> None:
     """Send the holder of a line what this program has armed, commands, keeps or leaves alone.
 
     Of drives that it has armed before, how to stop them.
@@ -50,7 +50,7 @@ def tell_own(facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
             send(PollPause(device, why))
 
 
-def give_up_own(facts: SharedFacts, why: str) -> None:
+def give_up_own(facts: SharedState, why: str) -> None:
     """Command and write to no drive any more: this program was taken for gone."""
     me = facts.me.id
     for device in facts.leases.of(me):

@@ -22,7 +22,7 @@ HEADLINE_WIDTH = 18
 """Columns of the state's words, so that the numbers after them do not move."""
 
 
-def motor_now(
+def motor_state_text(
     profile: Profile, snapshot: Snapshot | None, period: float, look: Look | None, now: float
 ) -> Text:
     """State, frequency and current of the last cycle, or of the line watch's look at the drive.

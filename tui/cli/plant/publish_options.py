@@ -18,7 +18,7 @@ from .topics import line_topics
 
 
 @dataclass(frozen=True, slots=True)
-class PlantWish:
+class PublishOptions:
     """Destinations of values, and the rate of reading."""
 
     metrics: tuple[str, int] | None
@@ -26,9 +26,9 @@ class PlantWish:
     every: float
 
 
-def plant_wish(
+def publish_options(
     metrics: str | None, mqtt: str | None, password_file: Path | None, every: float | None
-) -> PlantWish | None:
+) -> PublishOptions | None:
     """Return the requested publication; None if none. Raises UsageError."""
     if password_file is not None and mqtt is None:
         raise click.UsageError("--mqtt-password-file requires --mqtt.")
@@ -38,7 +38,7 @@ def plant_wish(
         return None
     broker = broker_of(mqtt, password_file) if mqtt is not None else None
     place = host_port(metrics) if metrics is not None else None
-    return PlantWish(place, broker, every if every is not None else 1.0)
+    return PublishOptions(place, broker, every if every is not None else 1.0)
 
 
 def check_names(broker: Broker, names: list[str]) -> None:

@@ -30,7 +30,7 @@ _ODD = re.compile(r"^(?:function|mask|shift|type) = ", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
-class StopFacts:
+class StopProfile:
     """The charts of one family, and where the words lie that they speak of."""
 
     id: str
@@ -47,13 +47,13 @@ class StopFacts:
         return frozenset(self.places.values())
 
 
-def stop_facts() -> tuple[StopFacts, ...]:
+def stop_profile() -> tuple[StopProfile, ...]:
     """Those of every family whose file can be used, in the order of their ids."""
     found = (_facts(listing) for listing in library.listings() if not listing.fault)
     return tuple(one for one in found if one is not None)
 
 
-def _facts(listing: library.Listing) -> StopFacts | None:
+def _facts(listing: library.Listing) -> StopProfile | None:
     names_itself = library.mentions_function(listing, 43)
     if not listing.own and (quick := _quick(listing.path)) is not None:
         charts, places = quick
@@ -62,18 +62,18 @@ def _facts(listing: library.Listing) -> StopFacts | None:
             profile = library.load_file(listing.path)
         except ProfileError:
             return None
-        return stop_facts_of(profile, names_itself=names_itself)
-    return StopFacts(listing.id, listing.name, charts, places, names_itself)
+        return stop_profile_of(profile, names_itself=names_itself)
+    return StopProfile(listing.id, listing.name, charts, places, names_itself)
 
 
-def stop_facts_of(profile: Profile, *, names_itself: bool = True) -> StopFacts:
+def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfile:
     """Those of a family that is loaded."""
     places = {
         one.code: one.address
         for one in profile.parameters
         if one.function == 3 and one.type.endswith("16") and one.mask == 0xFFFF
     }
-    return StopFacts(profile.id, profile.name, tuple(profile.data.charts), places, names_itself)
+    return StopProfile(profile.id, profile.name, tuple(profile.data.charts), places, names_itself)
 
 
 def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:

@@ -44,7 +44,7 @@ class LineListeners(Generic[P]):
                 log.exception("a listener of the shared line failed")
 
 
-class FactsHeard:
+class StateListeners:
     """Listeners of one line."""
 
     def __init__(self) -> None:

@@ -14,31 +14,31 @@ from .profile.schema import Chart, OrderId
 
 IN_FAULT = "The drive is in fault: reset it first."
 
-WayOut = Literal["", "set-up", "take-control"]
+UnblockHint = Literal["", "set-up", "take-control"]
 """Remedies: none by Drive Panel, another control source, taking control."""
 
 
 @dataclass(frozen=True, slots=True)
-class HeldBack:
+class CommandBlocked:
     """Reason against a command now."""
 
     text: str
     remedy: str = ""
     """Remedy as a sentence."""
-    way: WayOut = ""
+    way: UnblockHint = ""
     by_channel: bool = False
     """True if somebody else commands the drive."""
 
 
 def held_back(
     profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]
-) -> HeldBack | None:
+) -> CommandBlocked | None:
     """Return the reason against a command, as far as known; an unknown deciding word is one."""
     if (lock := locked_by(chart, id, raws)) is not None:
         if lock.parameter not in raws:
-            return HeldBack(f"{lock.parameter} is not known, and it decides: {lock.text}")
+            return CommandBlocked(f"{lock.parameter} is not known, and it decides: {lock.text}")
         channel = _is_set_up(profile, lock.parameter)
-        return HeldBack(lock.text, lock.remedy, "set-up" if channel else "", channel)
+        return CommandBlocked(lock.text, lock.remedy, "set-up" if channel else "", channel)
     if id not in MOVING_ORDERS or not chart.orders:
         return None
     found = command_channel(profile, raws)
@@ -48,8 +48,8 @@ def held_back(
         value = profile.names(profile[when.parameter]).get(raws[when.parameter])
         shown = raws[when.parameter] if value is None else value
         text = f"The drive is not commanded by Modbus: {when.parameter} is {shown}."
-        way: WayOut = "take-control" if _takes_control(profile, chart, when.parameter) else ""
-        return HeldBack(text, "", way, by_channel=True)
+        way: UnblockHint = "take-control" if _takes_control(profile, chart, when.parameter) else ""
+        return CommandBlocked(text, "", way, by_channel=True)
     return None
 
 
@@ -68,18 +68,18 @@ def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str
     return ""
 
 
-def _by_others(profile: Profile, found: Channel) -> HeldBack:
+def _by_others(profile: Profile, found: Channel) -> CommandBlocked:
     """Somebody else commands, or who does is not known."""
     word = found.parameter
     if word is None:
-        return HeldBack("Who commands the drive is not known.", by_channel=True)
+        return CommandBlocked("Who commands the drive is not known.", by_channel=True)
     if found.by_line is None:
-        return HeldBack(f"{word.code} is not known, and it decides who commands the drive.")
+        return CommandBlocked(f"{word.code} is not known, and it decides who commands the drive.")
     counts = ", which counts," if found.is_several else ""
     name = f"{word.name[0].lower()}{word.name[1:]} ({word.code}){counts}"
     text = f"The drive is not commanded by Modbus: {name} is {found.text}."
-    way: WayOut = "set-up" if profile.data.control_sources else ""
-    return HeldBack(text, profile.data.channels.remedy, way, by_channel=True)
+    way: UnblockHint = "set-up" if profile.data.control_sources else ""
+    return CommandBlocked(text, profile.data.channels.remedy, way, by_channel=True)
 
 
 def _is_set_up(profile: Profile, code: str) -> bool:

@@ -9,11 +9,11 @@ from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefus
 from tui.bus.limits import STANDARD_EXCEPTIONS
 
 from . import next_steps as steps
+from .check import Check, first_sentence
+from .evidence import DiagnosticEvidence
 from .garbled import speed_text
 from .gateway_probe import GATEWAY_CODES, gateway_codes
-from .rung import Rung, first_sentence
 from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS
-from .sight import Sight
 
 HELD_BACK = 8
 """Milliseconds from which an adapter's latency is worth a word."""
@@ -21,24 +21,24 @@ SEEN_OF_IT = 0.75
 """Share of that time that the answers must be late by, to say that it is the adapter's."""
 
 
-def _not_there(sight: Sight) -> bool:
+def _not_there(sight: DiagnosticEvidence) -> bool:
     missing = isinstance(sight.trouble, PortMissing)
     gone = sight.port is not None and not sight.port.there
     return missing or (gone and not sight.heard.answered)
 
 
-def _renumbered(sight: Sight) -> bool:
+def _renumbered(sight: DiagnosticEvidence) -> bool:
     return bool(sight.adapter.was) and (bool(sight.adapter.now) or not _not_there(sight))
 
 
-def _says_renumbered(sight: Sight) -> str:
+def _says_renumbered(sight: DiagnosticEvidence) -> str:
     now = f"is {sight.adapter.now} now" if sight.adapter.now else "is not plugged in"
     if _not_there(sight):
         return f"{sight.path} is not there: the adapter that it was {now}."
     return f"{sight.path} is another adapter than it was; the one that it was {now}."
 
 
-def _busy(sight: Sight) -> bool:
+def _busy(sight: DiagnosticEvidence) -> bool:
     if isinstance(sight.trouble, PortBusy | NotShared) or sight.owner_frozen:
         return True
     port = sight.port
@@ -48,7 +48,7 @@ def _busy(sight: Sight) -> bool:
     return lost or (bool(port.others) and not sight.heard.answered)
 
 
-def _says_busy(sight: Sight) -> str:
+def _describe_busy(sight: DiagnosticEvidence) -> str:
     port = sight.port
     if isinstance(sight.trouble, PortBusy):
         by = sight.trouble.holder or (port.holder if port else "") or "another program"
@@ -60,12 +60,12 @@ def _says_busy(sight: Sight) -> str:
     return f"{sight.path} is in use by {port.holder}."
 
 
-def _forbidden(sight: Sight) -> bool:
+def _forbidden(sight: DiagnosticEvidence) -> bool:
     port = sight.port
     return port is not None and port.there and not port.permitted
 
 
-def _says_forbidden(sight: Sight) -> str:
+def _says_forbidden(sight: DiagnosticEvidence) -> str:
     port = sight.port
     assert port is not None
     if not port.group:
@@ -74,7 +74,7 @@ def _says_forbidden(sight: Sight) -> str:
     return f"{port.path} may be used by the group {port.group} alone, and {port.user} {why}."
 
 
-def _slow_adapter(sight: Sight) -> bool:
+def _slow_adapter(sight: DiagnosticEvidence) -> bool:
     held = sight.port.latency if sight.port is not None else None
     late = sight.turnaround
     if held is None or late is None or held < HELD_BACK or not sight.heard.answered:
@@ -82,7 +82,7 @@ def _slow_adapter(sight: Sight) -> bool:
     return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT
 
 
-def _says_slow(sight: Sight) -> str:
+def _says_slow(sight: DiagnosticEvidence) -> str:
     assert sight.port is not None
     assert sight.turnaround is not None
     return (
@@ -91,14 +91,14 @@ def _says_slow(sight: Sight) -> str:
     )
 
 
-def _garbled(sight: Sight) -> bool:
+def _garbled(sight: DiagnosticEvidence) -> bool:
     heard = sight.heard
     if heard.answered or heard.others or heard.exceptions or heard.functions or heard.misshapen:
         return False
     return bool(heard.garbage) or bool(sight.broken)
 
 
-def _says_garbled(sight: Sight) -> str:
+def _says_garbled(sight: DiagnosticEvidence) -> str:
     errors, reported = sight.errors, speed_text(sight)
     counted = [
         f"{count} {what}"
@@ -117,32 +117,32 @@ def _says_garbled(sight: Sight) -> str:
     )
 
 
-def _loose(sight: Sight) -> str:
+def _loose(sight: DiagnosticEvidence) -> str:
     return f"{sight.heard.garbage} bytes came back that form no frame"
 
 
-def _late(sight: Sight) -> bool:
+def _late(sight: DiagnosticEvidence) -> bool:
     return bool(sight.heard.late) and not sight.heard.answered
 
 
-def _silent(sight: Sight) -> bool:
+def _silent(sight: DiagnosticEvidence) -> bool:
     heard = sight.heard
     return bool(heard.requested) and heard.nothing and not heard.echoed
 
 
-def _says_silent(sight: Sight) -> str:
+def _says_silent(sight: DiagnosticEvidence) -> str:
     if sight.neighbors:
         others = ", ".join(map(str, sight.neighbors))
         return f"No device answers at address {sight.device}, while {others} on this line does."
     return f"No device answers at address {sight.device}: not one byte came back."
 
 
-def _damaged(sight: Sight) -> bool:
+def _damaged(sight: DiagnosticEvidence) -> bool:
     heard = sight.heard
     return bool(heard.damaged) or bool(heard.answered and (heard.garbage or sight.broken))
 
 
-def _says_damaged(sight: Sight) -> str:
+def _says_damaged(sight: DiagnosticEvidence) -> str:
     heard = sight.heard
     broken = f" ({sight.broken} characters the port itself saw broken)" if sight.broken else ""
     count = heard.damaged or 1
@@ -153,17 +153,17 @@ def _says_damaged(sight: Sight) -> str:
     )
 
 
-def _gateway_codes(sight: Sight) -> list[int]:
+def _gateway_codes(sight: DiagnosticEvidence) -> list[int]:
     """Codes of a gateway, unless the family means something of its own by them."""
     codes = gateway_codes(sight.profile)
     return [code for code in sight.heard.exceptions if code in codes]
 
 
-def _refused(sight: Sight) -> bool:
+def _refused(sight: DiagnosticEvidence) -> bool:
     return bool(sight.heard.exceptions) and not sight.heard.answered and not _gateway_codes(sight)
 
 
-def _says_refused(sight: Sight) -> str:
+def _says_refused(sight: DiagnosticEvidence) -> str:
     code = sight.heard.exceptions[-1]
     known = sight.profile.data.exceptions if sight.profile is not None else []
     meaning = next((e.meaning for e in known if e.code == code), STANDARD_EXCEPTIONS.get(code, ""))
@@ -171,42 +171,42 @@ def _says_refused(sight: Sight) -> str:
     return f"The drive is there, and refuses what is asked with exception {code}{why}."
 
 
-LADDER: tuple[Rung, ...] = (
-    Rung("renumbered", _renumbered, _says_renumbered, steps.find_adapter),
-    Rung(
+LADDER: tuple[Check, ...] = (
+    Check("renumbered", _renumbered, _says_renumbered, steps.find_adapter),
+    Check(
         "changed",
         lambda s: bool(s.changed) and bool(s.heard.answered),
         lambda s: first_sentence(s.changed),
         steps.accept_change,
     ),
-    Rung("no-port", _not_there, lambda s: f"There is no port {s.path}.", steps.plug_in),
-    Rung("no-permission", _forbidden, _says_forbidden, steps.get_permission),
+    Check("no-port", _not_there, lambda s: f"There is no port {s.path}.", steps.plug_in),
+    Check("no-permission", _forbidden, _says_forbidden, steps.get_permission),
     *GATEWAY_RUNGS,
-    Rung("busy", _busy, _says_busy, steps.free_port),
-    Rung(
+    Check("busy", _busy, _describe_busy, steps.free_port),
+    Check(
         "port-refused",
         lambda s: isinstance(s.trouble, PortRefused),
         lambda s: first_sentence(str(s.trouble)),
         steps.other_port,
     ),
-    Rung(
+    Check(
         "line-lost",
         lambda s: s.trouble is not None,
         lambda s: first_sentence(str(s.trouble)),
         steps.reach_line,
     ),
-    Rung("withheld", lambda s: bool(s.withheld), lambda s: first_sentence(s.withheld), steps.wait),
+    Check("withheld", lambda s: bool(s.withheld), lambda s: first_sentence(s.withheld), steps.wait),
     *SICK_RUNGS,
-    Rung("slow-adapter", _slow_adapter, _says_slow, steps.hurry_adapter),
-    Rung("wrong-settings", _garbled, _says_garbled, steps.mend_settings),
-    Rung("silence", _silent, _says_silent, steps.end_silence),
-    Rung(
+    Check("slow-adapter", _slow_adapter, _says_slow, steps.hurry_adapter),
+    Check("wrong-settings", _garbled, _says_garbled, steps.mend_settings),
+    Check("silence", _silent, _says_silent, steps.end_silence),
+    Check(
         "late",
         _late,
         lambda s: f"Address {s.device} answers, but after the time that is waited for it.",
         steps.wait_longer,
     ),
-    Rung(
+    Check(
         "echo",
         lambda s: bool(s.heard.echoed) and not s.heard.answered and s.heard.nothing,
         lambda s: (
@@ -214,8 +214,8 @@ LADDER: tuple[Rung, ...] = (
         ),
         steps.end_echo,
     ),
-    Rung("checksum", _damaged, _says_damaged, steps.end_damage),
-    Rung(
+    Check("checksum", _damaged, _says_damaged, steps.end_damage),
+    Check(
         "other-address",
         lambda s: bool(s.heard.others) and not s.heard.answered,
         lambda s: (
@@ -224,7 +224,7 @@ LADDER: tuple[Rung, ...] = (
         ),
         steps.sort_addresses,
     ),
-    Rung(
+    Check(
         "wrong-function",
         lambda s: bool(s.heard.functions or s.heard.misshapen),
         lambda s: (
@@ -237,12 +237,12 @@ LADDER: tuple[Rung, ...] = (
         ),
         steps.find_second_master,
     ),
-    Rung(
+    Check(
         "gateway",
         lambda s: bool(_gateway_codes(s)) and not s.heard.answered,
         lambda s: f"The gateway answers {GATEWAY_CODES[_gateway_codes(s)[-1]]}.",
         steps.ask_gateway,
     ),
-    Rung("exception", _refused, _says_refused, steps.ask_otherwise),
+    Check("exception", _refused, _says_refused, steps.ask_otherwise),
 )
 """Every rung, in the order in which they are tried; each test but the first ones' works alone."""

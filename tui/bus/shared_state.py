@@ -11,20 +11,28 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
-from .facts_heard import FactsHeard, HolderHeard
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
 from .notes import Notes
 from .program import KEEPER, Program
-from .share.messages import AnyMessage, AskedFor, Claim, Granting, Notified, PollPause, StopGiven
-from .share.voices import LineVoice
+from .share.messages import (
+    AnyMessage,
+    Claim,
+    DriveRequested,
+    Notified,
+    PollPause,
+    RequestGranted,
+    StopGiven,
+)
+from .share.publishers import LinePublisher
+from .state_listeners import HolderHeard, StateListeners
 from .stop_counts import GivenStops, StopCounts
 
 DEPARTED_KEPT = 16
 """Number of departed programs that are remembered."""
 
 
-class SharedFacts(FactsHeard):
+class SharedState(StateListeners):
     """The facts of one line. May be used from any thread; mappings are replaced, never changed.
 
     Listeners are called in the line's thread.
@@ -55,7 +63,7 @@ class SharedFacts(FactsHeard):
         """Hears what only the holder of the line learns."""
         self.departed: tuple[Program, ...] = ()
         """Programs that have left the line, the last ones last."""
-        self.voice: LineVoice | None = None
+        self.voice: LinePublisher | None = None
         """None while nobody else hears of it."""
         self._lock = threading.RLock()
         self.on_stop(lambda devices, _by, _program: self._leave_alone_no_more(devices))
@@ -195,13 +203,13 @@ class SharedFacts(FactsHeard):
 
     def ask_for(self, device: int) -> None:
         """Ask the program that commands a device to leave it."""
-        self._tell(AskedFor(device, self.me))
+        self._tell(DriveRequested(device, self.me))
 
     def answer(self, device: int, program: str, *, yes: bool, why: str = "") -> None:
         """Answer a program that asked for a device which is commanded from here."""
         if yes:
             self.release(device)
-        self._tell(Granting(device, program, yes, why[:MOST_TEXT]))
+        self._tell(RequestGranted(device, program, yes, why[:MOST_TEXT]))
 
     def hear_reply(self, device: int, why: str, *, yes: bool) -> None:
         """The program that commands a device has answered."""

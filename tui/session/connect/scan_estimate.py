@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from tui.bus.link import SerialLink
 from tui.drive.finding import LineSetting, families_at, names_text
 
-from .strangers import known_profiles, strangers_of
+from .address_prober import known_profiles, probers_of
 
 
 @dataclass(frozen=True, slots=True)
-class SettingCosts:
+class ScanEstimate:
     """Time of an empty address at each setting of a line, in seconds."""
 
     each: Mapping[LineSetting, float]
@@ -34,18 +34,18 @@ class SettingCosts:
         )
 
 
-def setting_costs(
+def scan_estimate(
     link: SerialLink,
     wait: float,
     settings: Iterable[LineSetting],
     addresses: int,
     *,
     patient: bool = False,
-) -> SettingCosts:
+) -> ScanEstimate:
     """Return the times at settings of a line; reads files. `wait` is that of a network, in
     seconds."""
     each = {}
     for one in settings:
         there = replace(link, baud=one.baud, format=one.format)
-        each[one] = strangers_of(there, wait, patient=patient).cost
-    return SettingCosts(each, addresses)
+        each[one] = probers_of(there, wait, patient=patient).cost
+    return ScanEstimate(each, addresses)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class DriveSight:
+class DriveStatus:
     """One drive: its last cycle, or why there is none."""
 
     device: int
@@ -27,7 +27,7 @@ class DriveSight:
 
 
 @dataclass(frozen=True, slots=True)
-class LineSight:
+class LineReport:
     """One line with its drives."""
 
     name: str
@@ -35,19 +35,19 @@ class LineSight:
     text: str
     state: LineState
     counters: LineCounters
-    drives: tuple[DriveSight, ...]
+    drives: tuple[DriveStatus, ...]
 
 
-def drive_sight(
+def drive_status_of(
     device: int, session: DriveSession | None, cycle: Snapshot, now: float
-) -> DriveSight:
+) -> DriveStatus:
     """A drive by its last cycle; one that is too old has no current value any more.
 
     `now` is on the monotonic clock.
     """
     if session is not None and cycle.is_stale(now):
         cycle = _outdated(session, cycle, now)
-    return DriveSight(device, session, cycle, cycle.error, cycle.contact)
+    return DriveStatus(device, session, cycle, cycle.error, cycle.contact)
 
 
 def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:

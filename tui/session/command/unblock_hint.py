@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tui.drive.held_back import HeldBack, WayOut
+from tui.drive.command_blocked import CommandBlocked, UnblockHint
 
-KEYS: Mapping[WayOut, str] = {
+KEYS: Mapping[UnblockHint, str] = {
     "set-up": "6 opens Control.",
     "take-control": "t takes the control.",
 }
 """Remedy by a key of the panel."""
 
 
-def way_by_key(held: HeldBack) -> str:
+def way_by_key(held: CommandBlocked) -> str:
     """The way out on a screen: its key, else what is to be done."""
     return KEYS.get(held.way, held.remedy)
 
 
-def block_reason_text(held: HeldBack) -> str:
+def block_reason_text(held: CommandBlocked) -> str:
     """Return the reason against a command with the remedy, for use outside the panel."""
     key = KEYS.get(held.way, "")
     return " ".join(

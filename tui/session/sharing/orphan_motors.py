@@ -53,7 +53,7 @@ ENDS_WITHIN = 0.5
 LOOK_INTERVAL = 0.05
 
 
-class Guardian:
+class OrphanMotorGuard:
     """Looks after the motors that other programs on one line have started."""
 
     def __init__(

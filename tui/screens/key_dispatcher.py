@@ -44,7 +44,7 @@ IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
 TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it again."
 
 
-class Hands(Panel):
+class KeyDispatcher(Panel):
     """Keys for the whole panel; their first part runs in the thread of the keys."""
 
     def __init__(self) -> None:
@@ -124,7 +124,7 @@ class Hands(Panel):
         """Facts about the key that has its effect now; None if there is none."""
         return self._typed.stroke
 
-    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
         """Report that keys came at once, or too late, and did nothing."""
         came = "came too late" if late else "came at once" if count > 1 else "did not come alone"
         keys = f"{count} keys {came} and were" if count > 1 else f"1 key {came} and was"
