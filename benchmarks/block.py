@@ -114,7 +114,7 @@ async def measured(
         monitor.stop()
         opened.close()
         simulation.stop()
-    good = [one for one in taken if not one.error]
+    good = [snapshot for snapshot in taken if not snapshot.error]
     gaps = [b.time - a.time for a, b in pairwise(good)]
     return Row(
         family=family,
@@ -126,7 +126,7 @@ async def measured(
         design_ms=counted.microseconds / 1000,
         cycle_ms=median(gaps) * 1000 if gaps else None,
         cycles=len(good),
-        used=sum(bool(one.block) for one in good) / len(good) if good else 0.0,
+        used=sum(bool(snapshot.block) for snapshot in good) / len(good) if good else 0.0,
     )
 
 

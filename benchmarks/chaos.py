@@ -58,7 +58,7 @@ COLUMNS = ("program", "end", "rounds", "stops of due", "stop s: median, worst",
 def planned(rounds: int, seed: int, only: str) -> list[Outcome]:
     """Rounds with all kinds of ends alike often, in random order."""
     chance = random.Random(seed)
-    kinds = [one for one in KINDS if re.search(only, ", ".join(one))]
+    kinds = [pair for pair in KINDS if re.search(only, ", ".join(pair))]
     order: list[tuple[str, str]] = []
     while len(order) < rounds:
         order += chance.sample(kinds, len(kinds))
@@ -74,16 +74,20 @@ def table_of(outcomes: Sequence[Outcome]) -> Table:
     """The rounds by kind of end."""
     table = Table(*COLUMNS, title=f"Ends of programs and keepers; a cycle takes {EVERY} s")
     for kind in KINDS:
-        rounds = [one for one in outcomes if (one.program, one.end) == kind and not one.failed]
-        due = [one for one in rounds if one.due is not None]
-        stops = [one.stop for one in due if one.stop is not None]
-        gaps = [one.gap for one in rounds]
+        rounds = [
+            outcome
+            for outcome in outcomes
+            if (outcome.program, outcome.end) == kind and not outcome.failed
+        ]
+        due = [outcome for outcome in rounds if outcome.due is not None]
+        stops = [outcome.stop for outcome in due if outcome.stop is not None]
+        gaps = [outcome.gap for outcome in rounds]
         if rounds:
             table.add_row(
                 *kind, str(len(rounds)), f"{len(stops)} of {len(due)}" if due else "-",
-                *(f"{median(one):.2f}, {max(one):.2f}" if one else "-" for one in (stops, gaps)),
-                *(str(sum(getattr(one, name) for one in rounds)) for name in COLUMNS[-4:-1]),
-                str(sum(bool(one.broken) for one in rounds)),
+                *(f"{median(row):.2f}, {max(row):.2f}" if row else "-" for row in (stops, gaps)),
+                *(str(sum(getattr(r, name) for r in rounds)) for name in COLUMNS[-4:-1]),
+                str(sum(bool(outcome.broken) for outcome in rounds)),
             )  # fmt: skip
     return table
 
@@ -109,11 +113,11 @@ def main() -> None:
     with ThreadPoolExecutor(options.lanes) as lanes:
         outcomes = list(lanes.map(play, planned(options.rounds, options.seed, options.only)))
     Console(width=150).print(table_of(outcomes))
-    broken = sum(bool(one.broken) for one in outcomes)
-    failed = sum(bool(one.failed) for one in outcomes)
+    broken = sum(bool(item.broken) for item in outcomes)
+    failed = sum(bool(item.failed) for item in outcomes)
     print(f"seed {options.seed}: {broken} rounds broke a requirement, {failed} could not be played")
     print(json.dumps({"benchmark": "chaos", "seed": options.seed,
-                      "rounds": [asdict(one) for one in outcomes]}))  # fmt: skip
+                      "rounds": [asdict(item) for item in outcomes]}))  # fmt: skip
     sys.exit(1 if broken else 0)
 
 

@@ -86,14 +86,14 @@ class LineRecord:
 
     def between(self, begun: float, end: float) -> list[Moment]:
         """The moments of some time, with the one before it and the one behind it."""
-        inside = [at for at, one in enumerate(self.moments) if begun <= one.at <= end]
+        inside = [at for at, moment in enumerate(self.moments) if begun <= moment.at <= end]
         if not inside:
-            inside = [sum(one.at < begun for one in self.moments)]
+            inside = [sum(moment.at < begun for moment in self.moments)]
         return self.moments[max(0, inside[0] - 1) : inside[-1] + 2]
 
     def turns(self, at: float) -> bool:
         """True if the motor turned then."""
-        return any(abs(one.hertz) > TURNS for one in self.between(at, at)[-1:])
+        return any(abs(moment.hertz) > TURNS for moment in self.between(at, at)[-1:])
 
 
 class ChaosLine:
@@ -108,7 +108,7 @@ class ChaosLine:
         reported = self._worker.ask()
         return LineRecord(
             [(at, word) for at, word in reported["commands"]],
-            [Moment(*one) for one in reported["moments"]],
+            [Moment(*item) for item in reported["moments"]],
         )
 
     def plug(self, *, plugged: bool) -> None:
@@ -231,7 +231,7 @@ class ProgramOnTerminal:
 
     def shows(self, *words: str) -> None:
         """Wait until all these words stand on the terminal."""
-        wait_until(lambda: all(one in self.picture for one in words), f"{words} shown")
+        wait_until(lambda: all(word in self.picture for word in words), f"{words} shown")
 
     def press(self, key: str) -> None:
         """Type a key."""
@@ -316,7 +316,7 @@ class Observer:
 
     def good(self) -> list[float]:
         """When it had good values of drive 2, which never trips."""
-        return [at for at, one in self.lines if one.get("device") == 2 and _is_good(one)]
+        return [at for at, row in self.lines if row.get("device") == 2 and _is_good(row)]
 
     def close(self) -> None:
         """End it."""
@@ -344,8 +344,8 @@ def wrong_values(observer: Observer, record: LineRecord) -> list[str]:
             if code == COUNTER and device == 2:
                 low, high = truth[0].count, truth[-1].count
             elif code == "RFR" and device == 1:
-                low = round(10 * min(one.hertz for one in truth)) - 2
-                high = round(10 * max(one.hertz for one in truth)) + 2
+                low = round(10 * min(moment.hertz for moment in truth)) - 2
+                high = round(10 * max(moment.hertz for moment in truth)) + 2
             elif code == COUNTER:
                 continue
             if not low <= raw <= high:
@@ -357,7 +357,7 @@ def wrong_values(observer: Observer, record: LineRecord) -> list[str]:
 
 def _is_good(line: dict[str, Any]) -> bool:
     values = (line.get("values") or {}).values()
-    return line["error"] is None and all(one["quality"] == "good" for one in values)
+    return line["error"] is None and all(value["quality"] == "good" for value in values)
 
 
 def _seconds(text: str) -> float:
@@ -405,7 +405,7 @@ class Stage:
 
     def start(self, *arguments: str, module: str = "tui") -> ProgramOnTerminal:
         """Start a program; the LINE takes the place of `LINE`."""
-        words = [self.line.text if one == "LINE" else one for one in arguments]
+        words = [self.line.text if argument == "LINE" else argument for argument in arguments]
         program = ProgramOnTerminal(words, self.environment, module)
         self.programs.append(self._open.enter_context(closing(program)))
         return program
@@ -430,8 +430,8 @@ class Stage:
 
     def output(self) -> str:
         """What all programs said, with the log and the journal."""
-        texts = [one.output for one in self.programs]
-        texts += [one.read_text("utf-8") for one in self.state.glob("*.[lj]*") if one.is_file()]
+        texts = [program.output for program in self.programs]
+        texts += [path.read_text("utf-8") for path in self.state.glob("*.[lj]*") if path.is_file()]
         return "\n".join(texts) + (self.observer.output if self.observer else "")
 
     def send(self, pid: int, number: signal.Signals) -> None:
@@ -447,7 +447,7 @@ class Stage:
             program.send(signal.SIGTERM)
         if self.observer:
             self.observer.close()
-        late = [one for one in self.programs if not one.ends_within(ENDS)]
+        late = [terminal for terminal in self.programs if not terminal.ends_within(ENDS)]
         return not late and not (self.observer and self.observer.was_killed)
 
     def left(self) -> int:

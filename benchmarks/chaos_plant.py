@@ -185,7 +185,7 @@ class PlantStage(Stage):
 
     def output(self) -> str:
         """What all programs said, with the logs and journals of all users."""
-        logs = [one.read_text("utf-8", "replace") for one in self.folder.glob("state-*/*.[lj]*")]
+        logs = [path.read_text("utf-8", "replace") for path in self.folder.glob("state-*/*.[lj]*")]
         return "\n".join([super().output(), *logs])
 
     def end_programs(self) -> bool:
@@ -193,7 +193,7 @@ class PlantStage(Stage):
         (self.folder / LOGGED_IN).unlink(missing_ok=True)
         for service in self.services:
             service.send(signal.SIGTERM)
-        return all(one.ends_within(40.0) for one in self.services) & super().end_programs()
+        return all(item.ends_within(40.0) for item in self.services) & super().end_programs()
 
 
 _box_lock = threading.Lock()

@@ -209,7 +209,7 @@ class Round:
     def _judge_values(self, record: LineRecord, begun: float) -> None:
         outcome, observer = self._outcome, self._stage.observer
         assert observer is not None
-        around = [one for one in observer.good() if one > begun - 2 * EVERY]
+        around = [value for value in observer.good() if value > begun - 2 * EVERY]
         last = time.time() - around[-1] if around else self._after
         outcome.gap = max([last, *(b - a for a, b in pairwise(around))])
         if last > 5.0:

@@ -200,10 +200,11 @@ def examine(case: Case, folder: Path, seed: int) -> Result:
 def table_of(results: list[Result]) -> Table:
     """The results as a table."""
     table = Table("trouble", "verdict", "certainty", "right", "s", "frames", "writes")
-    for one in results:
+    for result in results:
         table.add_row(
-            one.case.name, one.verdict, one.certainty or "-", "yes" if one.right else "NO",
-            f"{one.seconds:.1f}", str(one.frames), str(one.writes),
+            result.case.name, result.verdict, result.certainty or "-",
+            "yes" if result.right else "NO", f"{result.seconds:.1f}", str(result.frames),
+            str(result.writes),
         )  # fmt: skip
     return table
 
@@ -227,16 +228,16 @@ def run(only: str, seed: int) -> dict[str, Any]:
                 results.append(examine(case, Path(folder), seed))
                 print(".", end="", file=sys.stderr, flush=True)
     Console(width=120).print(table_of(results))
-    sick = [one for one in results if one.case in CASES]
+    sick = [result for result in results if result.case in CASES]
     return {
         "troubles": len(sick),
-        "right": sum(one.right for one in sick),
-        "false_alarms": sum(not one.right for one in results if one.case in WELL),
-        "confidently_wrong": sum(one.confidently_wrong for one in results),
-        "seconds": round(max((one.seconds for one in results), default=0.0), 1),
-        "frames": max((one.frames for one in results), default=0),
-        "writes": sum(one.writes for one in results),
-        "verdicts": {one.case.name: one.verdict for one in results},
+        "right": sum(result.right for result in sick),
+        "false_alarms": sum(not result.right for result in results if result.case in WELL),
+        "confidently_wrong": sum(result.confidently_wrong for result in results),
+        "seconds": round(max((result.seconds for result in results), default=0.0), 1),
+        "frames": max((result.frames for result in results), default=0),
+        "writes": sum(result.writes for result in results),
+        "verdicts": {result.case.name: result.verdict for result in results},
     }
 
 

@@ -68,7 +68,7 @@ def watch() -> None:
     line = Line(parse_link(first["text"]))
     line.open(wait=5.0)
     drives = {int(address): family for address, family in first["drives"].items()}
-    monitors = {a: Monitor(DriveSession(line, a, load(one))) for a, one in drives.items()}
+    monitors = {a: Monitor(DriveSession(line, a, load(item))) for a, item in drives.items()}
     for monitor in monitors.values():
         monitor.start(period=first["period"])
     print(json.dumps({}), flush=True)
@@ -85,8 +85,12 @@ def _state(line: Line, monitors: Mapping[int, Monitor]) -> dict[str, object]:
     return {
         "time": time.monotonic(),
         "cpu": used.ru_utime + used.ru_stime,
-        "cycles": {address: one.cycle if one else 0 for address, one in latest.items()},
-        "failing": [address for address, one in latest.items() if one is None or one.error],
+        "cycles": {
+            address: snapshot.cycle if snapshot else 0 for address, snapshot in latest.items()
+        },
+        "failing": [
+            address for address, snapshot in latest.items() if snapshot is None or snapshot.error
+        ],
         "counters": {
             name: count
             for name, count in asdict(line.counters).items()
@@ -145,7 +149,7 @@ def _values(record: Record, drives: Mapping[int, str]) -> Counter[int]:
         first = int.from_bytes(exchange.request[2:4], "big")
         last = first + (exchange.size - 5) // 2
         device = exchange.request[0]
-        values[device] += sum(first <= one < last for one in addresses[drives[device]])
+        values[device] += sum(first <= address < last for address in addresses[drives[device]])
     return values
 
 
@@ -240,7 +244,7 @@ def followed(
                 for labels, value in seen["drive_contact"]
                 if value
             )
-            not_read.append({one: n for one, n in contacts.items() if one != "answers"})
+            not_read.append({text: n for text, n in contacts.items() if text != "answers"})
             for labels, value in seen["drive_cycle_seconds"]:
                 cycles.setdefault(labels, []).append(value)
         time.sleep(max(0.0, now + 1.0 - time.monotonic()))
@@ -251,8 +255,8 @@ def followed(
         "first_read": min(first.values(), default=None),
         "last_read": max(first.values(), default=None),
         "looks": len(not_read),
-        "looks_with_all_read": sum(not one for one in not_read),
-        "not_read": dict(sum((Counter(one) for one in not_read), Counter())),
+        "looks_with_all_read": sum(not row for row in not_read),
+        "not_read": dict(sum((Counter(row) for row in not_read), Counter())),
         "cycle": {"least": min(last), "median": median(last), "most": max(last)} if last else None,
     }
 
@@ -287,26 +291,26 @@ def show(console: Console, stretches: Sequence[dict[str, Any]], title: str) -> N
     table.add_column("all answer", justify="right")
     table.add_column("one dead", justify="right")
     rows: dict[str, Callable[[dict[str, Any]], str]] = {
-        "values a second": lambda one: f"{one['values_a_second']:.1f}",
-        "of these by the others": lambda one: f"{one['others_values_a_second']:.1f}",
-        "limit for the same requests": lambda one: f"{one['limit_of_same_requests']:.1f}",
-        "share of the limit": lambda one: f"{one['line_use']:.3f}",
-        "others: fewest / most cycles": lambda one: (
-            f"{one['fewest_cycles']} / {one['most_cycles']}"
+        "values a second": lambda row: f"{row['values_a_second']:.1f}",
+        "of these by the others": lambda row: f"{row['others_values_a_second']:.1f}",
+        "limit for the same requests": lambda row: f"{row['limit_of_same_requests']:.1f}",
+        "share of the limit": lambda row: f"{row['line_use']:.3f}",
+        "others: fewest / most cycles": lambda row: (
+            f"{row['fewest_cycles']} / {row['most_cycles']}"
         ),
-        "CPU, share of a core": lambda one: f"{one['cpu_share']:.3f}",
-        "requests": lambda one: str(one["counters"]["requests"]),
-        "replies": lambda one: str(one["counters"]["replies"]),
-        "timeouts": lambda one: str(one["counters"]["timeouts"]),
-        "refusals": lambda one: str(one["counters"]["exceptions"]),
-        "drives failing at the end": lambda one: str(len(one["failing"])),
-        "request to request / theory": lambda one: f"{one['request_median']:.3f}",
-        "least silence / 3.5 characters": lambda one: f"{one['smallest_silence']:.2f}",
-        "silences broken": lambda one: str(one["broken_silences"]),
-        "simulator late, ms": lambda one: f"{one['simulator_late_ms']['median']:.2f}",
+        "CPU, share of a core": lambda row: f"{row['cpu_share']:.3f}",
+        "requests": lambda row: str(row["counters"]["requests"]),
+        "replies": lambda row: str(row["counters"]["replies"]),
+        "timeouts": lambda row: str(row["counters"]["timeouts"]),
+        "refusals": lambda row: str(row["counters"]["exceptions"]),
+        "drives failing at the end": lambda row: str(len(row["failing"])),
+        "request to request / theory": lambda row: f"{row['request_median']:.3f}",
+        "least silence / 3.5 characters": lambda row: f"{row['smallest_silence']:.2f}",
+        "silences broken": lambda row: str(row["broken_silences"]),
+        "simulator late, ms": lambda row: f"{row['simulator_late_ms']['median']:.2f}",
     }
     for name, text in rows.items():
-        table.add_row(name, *(text(one) for one in stretches))
+        table.add_row(name, *(text(stretch) for stretch in stretches))
     console.print(table)
 
 
@@ -358,7 +362,7 @@ def main() -> None:
         wire.close()
     title = f"{given.drives} drives at {given.baud} baud, a cycle wished each {given.period} s"
     show(console, stretches, title)
-    others = [one["others_values_a_second"] for one in stretches]
+    others = [row["others_values_a_second"] for row in stretches]
     change = others[1] / others[0] - 1
     console.print(f"Whole monitoring sets alone would bring {limit:.1f} values a second.")
     console.print(f"Drive {chosen} dead: values a second of the others {100 * change:+.1f} %.")

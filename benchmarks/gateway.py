@@ -139,19 +139,19 @@ def beside_polls(wire: WireLine, seconds: float) -> dict[str, dict[str, float]]:
             stops = asyncio.run(stop_times(port, max(2, int(2 * seconds))))
             record = wire.take()
             found[f"stop, {beside}"] = _of_times([end - begun for begun, end in stops]) | {
-                "most_exchanges": max(_up_to_stop(record, *one) for one in stops)
+                "most_exchanges": max(_up_to_stop(record, *stop) for stop in stops)
             }
-    for name, one in found.items():
+    for name, row in found.items():
         base = found[name.replace("beside polls", "alone")]
-        one["median_to_alone"] = one["median"] / base["median"]
-        one["mean_to_alone"] = one["mean"] / base["median"]
+        row["median_to_alone"] = row["median"] / base["median"]
+        row["mean_to_alone"] = row["mean"] / base["median"]
     return found
 
 
 def _up_to_stop(record: Sequence[Exchange], sent: float, answered: float) -> int:
     """Exchanges from the sending of a stop word to its reply: that in flight, and its own, too."""
-    there = [one for one in record if one.ended > sent and one.began < answered]
-    word = next(at for at, one in enumerate(there) if one.request[1:6] == STOP_WORD[7:12])
+    there = [exchange for exchange in record if exchange.ended > sent and exchange.began < answered]
+    word = next(at for at, exchange in enumerate(there) if exchange.request[1:6] == STOP_WORD[7:12])
     return word + 1
 
 
@@ -187,7 +187,7 @@ def measured(wire: WireLine, seconds: float, *, with_mbpoll: bool) -> dict[str, 
     found: dict[str, dict[str, float]] = {}
 
     def note(name: str, reads: int, span: float) -> None:
-        exchanges = [one for one in wire.take() if one.size]
+        exchanges = [exchange for exchange in wire.take() if exchange.size]
         gaps = [gap / wire.times.silence for gap in Record(wire.times, exchanges).gaps()]
         found[name] = {
             "reads_a_second": reads / span,
@@ -235,11 +235,11 @@ def main() -> None:
         wire.close()
     figures = {}
     for name in rounds[0]:
-        each = {key: [one[name][key] for one in rounds] for key in rounds[0][name]}
+        each = {key: [row[name][key] for row in rounds] for key in rounds[0][name]}
         figures[name] = {key: median(values) for key, values in each.items()}
         reads = figures[name]["reads_a_second"]
         figures[name]["of_the_limit"] = reads / limit
-        alone = [one[ALONE]["reads_a_second"] for one in rounds] if with_mbpoll else []
+        alone = [row[ALONE]["reads_a_second"] for row in rounds] if with_mbpoll else []
         mine = each["reads_a_second"]
         ratios = [a / b for a, b in zip(mine, alone, strict=True)] if alone else []
         figures[name]["to_mbpoll"] = median(ratios) if ratios else 0.0
@@ -248,21 +248,21 @@ def main() -> None:
     )
     for title in ("who", "reads/s", "to mbpoll alone", "of the limit", "on the line/s", "broken"):
         table.add_column(title)
-    for name, one in figures.items():
+    for name, row in figures.items():
         table.add_row(
-            name, f"{one['reads_a_second']:.1f}", f"{one['to_mbpoll']:.2f}",
-            f"{one['of_the_limit']:.3f}", f"{one['on_the_line']:.1f}",
-            f"{one['broken_silences']:.0f}",
+            name, f"{row['reads_a_second']:.1f}", f"{row['to_mbpoll']:.2f}",
+            f"{row['of_the_limit']:.3f}", f"{row['on_the_line']:.1f}",
+            f"{row['broken_silences']:.0f}",
         )  # fmt: skip
     console.print(table)
     table = Table(title=f"One client beside polls of {POLLED_DRIVES} drives each {EVERY:g} s, ms")
     for title in ("what", "median", "mean", "95 %", "median / alone", "mean / alone", "exchanges"):
         table.add_column(title)
-    for name, one in polled.items():
+    for name, row in polled.items():
         table.add_row(
-            name, *(f"{1000 * one[key]:.1f}" for key in ("median", "mean", "p95")),
-            f"{one['median_to_alone']:.2f}", f"{one['mean_to_alone']:.2f}",
-            f"{one['most_exchanges']:.0f}" if "most_exchanges" in one else "",
+            name, *(f"{1000 * row[key]:.1f}" for key in ("median", "mean", "p95")),
+            f"{row['median_to_alone']:.2f}", f"{row['mean_to_alone']:.2f}",
+            f"{row['most_exchanges']:.0f}" if "most_exchanges" in row else "",
         )  # fmt: skip
     console.print(table)
     all_found = {"limit_a_second": limit, "figures": figures, "beside_polls": polled}

@@ -93,9 +93,9 @@ def settle(panel: PtyPanel, seconds: float = QUIET, beside: PtyPanel | None = No
     """Take what the panels draw until nothing of a piece is under way any more."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        for one in (panel, beside):
-            if one is not None and not one.look(0.02):
-                raise SystemExit(f"the panel has ended:\n{one.text()}")
+        for pty_panel in (panel, beside):
+            if pty_panel is not None and not pty_panel.look(0.02):
+                raise SystemExit(f"the panel has ended:\n{pty_panel.text()}")
 
 
 def home(panel: PtyPanel) -> None:
@@ -287,8 +287,8 @@ def main() -> None:
     for name, counted_ends in ends.items():
         ends_table.add_row(name, *(f"{number:.3g}" for number in asdict(counted_ends).values()))
     Console().print(ends_table)
-    figures = {name: asdict(one) for name, one in found.items()}
-    print(json.dumps(figures | {name: asdict(one) for name, one in ends.items()}))
+    figures = {name: asdict(item) for name, item in found.items()}
+    print(json.dumps(figures | {name: asdict(endings) for name, endings in ends.items()}))
 
 
 if __name__ == "__main__":

@@ -79,16 +79,16 @@ def _cut(text: bytes, chance: random.Random) -> bytes:
 
 def _lines(text: bytes, chance: random.Random) -> bytes:
     lines = text.split(b"\n")
-    one, other = chance.randrange(len(lines)), chance.randrange(len(lines))
+    number, other = chance.randrange(len(lines)), chance.randrange(len(lines))
     match chance.randrange(4):
         case 0:
-            del lines[one]
+            del lines[number]
         case 1:
-            lines.insert(other, lines[one])
+            lines.insert(other, lines[number])
         case 2:
-            lines[one], lines[other] = lines[other], lines[one]
+            lines[number], lines[other] = lines[other], lines[number]
         case _:
-            del lines[one : one + chance.randrange(1, 40)]
+            del lines[number : number + chance.randrange(1, 40)]
     return b"\n".join(lines)
 
 
@@ -130,7 +130,7 @@ def no_commands(text: str) -> None:
 
 @lru_cache(maxsize=8)
 def _profile_text(family: str) -> bytes:
-    found = next(one for one in library.listings() if one.id == family)
+    found = next(listing for listing in library.listings() if listing.id == family)
     return found.path.read_bytes()
 
 
@@ -156,7 +156,7 @@ def _use(profile: Profile, chance: random.Random) -> None:
     """Show every parameter of a drive that holds anything, and its state."""
     from tui.drive.family_page import family_page, page_lines
 
-    raws = {one.code: chance.randrange(0x10000) for one in profile.parameters}
+    raws = {item.code: chance.randrange(0x10000) for item in profile.parameters}
     try:
         for parameter in profile.parameters:
             shown(profile, parameter, raws[parameter.code], raws, frozenset())
@@ -306,9 +306,9 @@ def _read_state(folder: Path, taught: Any) -> None:
         entries = [e for e in read_journal(Journal().files) if isinstance(e, Entry)]
     except OSError:
         entries = []
-    for one in selected(completed(entries), device=1, line="tcp:x:502"):
-        no_commands(printable(entry_line(one), "utf-8"))
-        no_commands(json_text(asdict(one)))
+    for entry in selected(completed(entries), device=1, line="tcp:x:502"):
+        no_commands(printable(entry_line(entry), "utf-8"))
+        no_commands(json_text(asdict(entry)))
     for found in Starts().all_found("tcp:x:502"):
         offer(found, DriveIdentity(1, "", "", "", "", None, ()), True)
     try:

@@ -151,11 +151,13 @@ def load_of(
 ) -> dict[str, float]:
     """Share of a core that a program takes with its keeper, and the memory of the holder."""
     run(WARM_UP)
-    pids = list(dict.fromkeys(one for one in (pid, keeper_of(bench.state)) if one is not None))
-    before, begun = [processor_seconds(one) for one in pids], time.monotonic()
+    pids = list(
+        dict.fromkeys(number for number in (pid, keeper_of(bench.state)) if number is not None)
+    )
+    before, begun = [processor_seconds(number) for number in pids], time.monotonic()
     run(seconds)
     taken = time.monotonic() - begun
-    used = [(processor_seconds(one) - b) / taken for one, b in zip(pids, before, strict=True)]
+    used = [(processor_seconds(number) - b) / taken for number, b in zip(pids, before, strict=True)]
     private, resident = memory(pids[-1])
     return {"together": sum(used), "holder": used[-1], "private": private, "rss": resident}
 
@@ -200,8 +202,8 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
     """All figures of one run, without and with a quota of the processor."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for one in ("state", "config"):
-            os.environ[f"DRIVEPANEL_{one.upper()}"] = str(folder / one)
+        for text in ("state", "config"):
+            os.environ[f"DRIVEPANEL_{text.upper()}"] = str(folder / text)
         os.environ.pop(NO_KEEPER, None)
         line = f"serial:{name}/line,19200,8N1"
         served = [*PROGRAM, "simulate", *DRIVES, "--pty", f"{name}/line", "--real-time"]

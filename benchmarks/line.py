@@ -119,8 +119,8 @@ def measured(cell: Cell, contestants: Sequence[Contestant], rounds: int) -> dict
     }
 
 
-def _ratio(one: float | None, other: float | None) -> float | None:
-    return one / other if one and other else None
+def _ratio(value: float | None, other: float | None) -> float | None:
+    return value / other if value and other else None
 
 
 # What is printed
@@ -139,20 +139,20 @@ COLUMNS = (
 )
 
 
-def show(console: Console, one: dict[str, Any]) -> None:
+def show(console: Console, item: dict[str, Any]) -> None:
     """Print the table of one family at one baud."""
     table = Table(
-        title=f"{one['family']} at {one['baud']} baud: {one['values']} values in {one['requests']}"
-        f" requests, limit {one['limit_ms']:.1f} ms",
-        caption=f"The simulator itself ended replies {one['simulator_late_ms']['median']:.2f} ms"
-        f" late (99 %: {one['simulator_late_ms']['99']:.2f} ms),"
-        f" {100 * one['simulator_late_share']:.1f} % of the limit; nothing is subtracted.",
+        title=f"{item['family']} at {item['baud']} baud: {item['values']} values"
+        f" in {item['requests']} requests, limit {item['limit_ms']:.1f} ms",
+        caption=f"The simulator itself ended replies {item['simulator_late_ms']['median']:.2f} ms"
+        f" late (99 %: {item['simulator_late_ms']['99']:.2f} ms),"
+        f" {100 * item['simulator_late_share']:.1f} % of the limit; nothing is subtracted.",
     )
     table.add_column("contestant", no_wrap=True)
     for _, title, _ in COLUMNS:
         table.add_column(title, justify="right")
     table.add_column("broken", justify="right")
-    for row in one["contestants"]:
+    for row in item["contestants"]:
         cells = [form.format(row[key]) if row[key] else "-" for key, _, form in COLUMNS]
         broken = f"{row['broken_silences']} of {row['silences']}"
         table.add_row(row["contestant"], *cells, broken)
@@ -167,10 +167,10 @@ def show_blocks(console: Console, cells: Sequence[dict[str, Any]]) -> None:
     )
     for title in ("family", "baud", "by the limit", OURS, "panel's cycle"):
         table.add_column(title, justify="left" if title == "family" else "right")
-    for one in cells:
+    for cell in cells:
         keys = ("limit_to_one_a_value", "ours_to_one_a_value", "panel_to_one_a_value")
-        shares = (f"{one[key]:.2f}" if one[key] else "-" for key in keys)
-        table.add_row(one["family"], str(one["baud"]), *shares)
+        shares = (f"{cell[key]:.2f}" if cell[key] else "-" for key in keys)
+        table.add_row(cell["family"], str(cell["baud"]), *shares)
     console.print(table)
 
 
@@ -196,8 +196,8 @@ def main() -> None:
         for baud in map(int, given.bauds.split(",")):
             for family in given.families.split(","):
                 timing = LineTiming(baud, given.format, True)
-                one = cell(wire, family, timing, given.seconds)
-                cells.append(measured(one, contestants, given.rounds))
+                item = cell(wire, family, timing, given.seconds)
+                cells.append(measured(item, contestants, given.rounds))
                 show(console, cells[-1])
     finally:
         process.close()

@@ -103,22 +103,22 @@ def start(setup: Setup, program: Program, terminal: Terminal, logged_in: float) 
         come = next_come or come
 
 
-def press(terminal: Terminal, one: Press) -> tuple[float | None, float | None]:
+def press(terminal: Terminal, item: Press) -> tuple[float | None, float | None]:
     """Seconds from a key to the first changed cell of its answer, and to all of it."""
     before = terminal.picture.text()
-    sign, first, last = one.sign(before), None, None
-    pressed = terminal.press(one.key)
+    sign, first, last = item.sign(before), None, None
+    pressed = terminal.press(item.key)
     while (now := time.monotonic()) < pressed + LONGEST:
-        if last is not None and one.complete is None and now > pressed + last + QUIET:
+        if last is not None and item.complete is None and now > pressed + last + QUIET:
             return first, last
         come = terminal.look(QUIET)
         if come is None:
             continue
         text = terminal.picture.text()
-        if one.sign(text) != sign:
-            sign, last = one.sign(text), come - pressed
+        if item.sign(text) != sign:
+            sign, last = item.sign(text), come - pressed
             first = last if first is None else first
-        if one.complete is not None and one.complete(before, text):
+        if item.complete is not None and item.complete(before, text):
             return first, come - pressed
     return first, None
 
@@ -126,20 +126,20 @@ def press(terminal: Terminal, one: Press) -> tuple[float | None, float | None]:
 def press_all(terminal: Terminal, presses: Sequence[Press], rounds: int) -> Figures:
     """Times of every key of a walk, so many rounds of it, at irregular moments."""
     chance, end = random.Random(0), time.monotonic() + BUDGET
-    found: dict[str, list[tuple[float | None, float | None]]] = {one.name: [] for one in presses}
+    found: dict[str, list[tuple[float | None, float | None]]] = {item.name: [] for item in presses}
     for _ in range(rounds):
         if time.monotonic() > end:
             break
-        for one in presses:
+        for item in presses:
             terminal.run(chance.uniform(*GAPS))
-            found[one.name].append(press(terminal, one))
+            found[item.name].append(press(terminal, item))
     return {name: _times(times) for name, times in found.items()}
 
 
 def _times(times: Sequence[tuple[float | None, float | None]]) -> Figures:
     found: Figures = {"presses": len(times)}
     for name, ones in zip(("first", "complete"), zip(*times, strict=True), strict=True):
-        come = [one for one in ones if one is not None]
+        come = [item for item in ones if item is not None]
         found[name] = {
             "median_s": median(come) if come else None,
             "worst_s": max(come, default=None),
@@ -209,11 +209,11 @@ def measure(setup: Setup, program: Program) -> Figures:
             found["keys"] = press_all(terminal, program.keys, setup.options.presses)
             found["trips"] = trips(setup, terminal) if program.state is not None else None
             found["link_bytes"] = setup.host.proxy.down
-    names = sorted({name for one in starts for name in one})
+    names = sorted({name for row in starts for name in row})
     found["start"] = {
         name: {"median": median(times), "worst": max(times), "rounds": len(times)}
         for name in names
-        if (times := [one[name] for one in starts if name in one])
+        if (times := [row[name] for row in starts if name in row])
     }
     return found
 

@@ -55,9 +55,9 @@ def saying_none(*patterns: str) -> Shown:
     return lambda text: not any(pattern.search(text) for pattern in found)
 
 
-def both(one: Shown, other: Shown) -> Shown:
+def both(shown: Shown, other: Shown) -> Shown:
     """Whether both hold."""
-    return lambda text: one(text) and other(text)
+    return lambda text: shown(text) and other(text)
 
 
 def tabs(text: str) -> object:

@@ -230,7 +230,7 @@ def hello_as_much(bench: Bench, size: tuple[int, int]) -> Figures:
     with bench.open((*HELLO, str(texts), str(lines)), size) as terminal:
         terminal.see(TEXTS[0])
         terminal.run(SETTLED)
-        key = Key("w", lambda text: tuple(text.count(one) for one in TEXTS))
+        key = Key("w", lambda text: tuple(text.count(item) for item in TEXTS))
         return {"key": press_often(terminal, key, bench.options.presses // 2)}
 
 

@@ -52,9 +52,9 @@ class NoBox(Exception):
 def plant_box() -> Iterator[list[str]]:
     """The words before a command that run it there. Raises NoBox."""
     needed = ("unshare", "nsenter", "mount", "runuser", "setpriv", "loginctl", "useradd")
-    if missing := [one for one in needed if shutil.which(one) is None]:
+    if missing := [text for text in needed if shutil.which(text) is None]:
         raise NoBox(f"needs {', '.join(missing)}")
-    top = next((one for one in CONTROL_GROUPS if Path(one, "cgroup.controllers").exists()), None)
+    top = next((text for text in CONTROL_GROUPS if Path(text, "cgroup.controllers").exists()), None)
     if os.geteuid() != 0 or top is None or not Path("/lib/systemd/systemd").exists():
         raise NoBox("needs root, systemd and control groups of version 2")
     group = Path(top, f"drivepanel-box-{os.getpid()}")
@@ -106,9 +106,9 @@ def _set_up(enter: list[str]) -> None:
 def _remove(group: Path) -> None:
     end = time.monotonic() + ENDS_WITHIN
     while group.exists() and time.monotonic() < end:
-        for one in sorted(group.rglob("*/"), reverse=True):
+        for path in sorted(group.rglob("*/"), reverse=True):
             with suppress(OSError):
-                one.rmdir()
+                path.rmdir()
         with suppress(OSError):
             group.rmdir()
             return
@@ -127,8 +127,8 @@ def _begin(folder: Path) -> None:
     _mount("--make-rprivate", "/")
     _mount("-t", "tmpfs", "tmpfs", str(folder))
     upper, work, root = (folder / name for name in ("upper", "work", "root"))
-    for one in (upper, work, root):
-        one.mkdir()
+    for item in (upper, work, root):
+        item.mkdir()
     _mount("-t", "overlay", "overlay", "-o",
            f"lowerdir=/,upperdir={upper},workdir={work}", str(root))  # fmt: skip
     _mount("-t", "proc", "proc", str(root / "proc"))
@@ -148,8 +148,8 @@ def _begin(folder: Path) -> None:
     (root / "dev/fd").symlink_to("/proc/self/fd")
     _write_settings(root / "etc")
     for parent in (Path(sys.executable).resolve().parents, ROOT.parents):
-        for one in parent:  # every user runs the same Python
-            inside = root / one.relative_to("/")
+        for item in parent:  # every user runs the same Python
+            inside = root / item.relative_to("/")
             inside.chmod(inside.stat().st_mode | 0o011)
     subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
     subprocess.run(["hostname", "box"], check=True)
@@ -167,12 +167,12 @@ def _begin(folder: Path) -> None:
 
 def _write_settings(etc: Path) -> None:
     units = etc / "systemd/system"
-    for one in units.glob("*.wants"):
-        shutil.rmtree(one)
+    for path in units.glob("*.wants"):
+        shutil.rmtree(path)
     (units / "box.target").write_text(TARGET)
     (etc / "systemd/logind.conf.d").mkdir(parents=True, exist_ok=True)
     (etc / "systemd/logind.conf.d/box.conf").write_text(LOGIND)
-    unwanted = [*(f"{one}.service" for one in UNWANTED), *(f"{one}.mount" for one in MOUNTS)]
+    unwanted = [*(f"{text}.service" for text in UNWANTED), *(f"{mount}.mount" for mount in MOUNTS)]
     for name in unwanted:
         (units / name).unlink(missing_ok=True)
         (units / name).symlink_to(os.devnull)

@@ -70,7 +70,7 @@ def one_setting(wire: WireLine, setting: LineSetting, addresses: Sequence[int]) 
         seconds = asyncio.run(searched(opened, addresses))
     finally:
         opened.close()
-    taken = [one for one in wire.take() if one.request[0] != ELSEWHERE]
+    taken = [exchange for exchange in wire.take() if exchange.request[0] != ELSEWHERE]
     least = limit(setting)
     return {
         "setting": str(setting),
@@ -96,16 +96,16 @@ def all_settings(wire: WireLine, addresses: Sequence[int]) -> dict[str, Any]:
             ends.append(time.monotonic() - began)
     finally:
         opened.close()
-    least = [limit(one) * len(addresses) for one in settings]
+    least = [limit(item) * len(addresses) for item in settings]
     in_time = sum(end <= AIM_ALL for end in ends)
-    likely = sum(not one.slow for one in settings)
+    likely = sum(not item.slow for item in settings)
     return {
         "settings": len(settings),
         "seconds": ends[-1],
         "limit": sum(least),
         "within_60_s": in_time,
         "within_60_s_by_the_limit": sum(sum(least[: n + 1]) <= AIM_ALL for n in range(len(least))),
-        "not_within_60_s": [str(one) for one in settings[in_time:]],
+        "not_within_60_s": [str(item) for item in settings[in_time:]],
         "likely": likely,
         "likely_seconds": ends[likely - 1],
         "likely_limit": sum(least[:likely]),
@@ -130,9 +130,9 @@ def command(wire: WireLine, last: int) -> dict[str, Any]:
     process.wait()
     seconds = time.monotonic() - began
     first: dict[int, float] = {}
-    for one in wire.take():
-        if one.size and one.request[0] in families:
-            first.setdefault(one.request[0], one.ended)
+    for exchange in wire.take():
+        if exchange.size and exchange.request[0] in families:
+            first.setdefault(exchange.request[0], exchange.ended)
     late = {families[device]: shown[device] - first[device] for device in shown}
     return {"seconds": seconds, "found": len(shown), "hit_shown_after": late}
 
@@ -180,7 +180,7 @@ def main() -> None:
         show(console, rows)
         figures["command"] = reported = command(wire, given.addresses)
         late = ", ".join(
-            f"{one} {1000 * s:.0f} ms" for one, s in reported["hit_shown_after"].items()
+            f"{item} {1000 * s:.0f} ms" for item, s in reported["hit_shown_after"].items()
         )
         console.print(
             f"The command, with 1.5 s of listening: {reported['seconds']:.2f} s (aim {AIM_ONE:g}"

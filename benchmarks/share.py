@@ -85,7 +85,7 @@ def program() -> None:
                     monitor.start(period=job["period"])
                     monitors.append(monitor)
             case "cycles":
-                answer = {"cycles": [one.latest.cycle if one.latest else 0 for one in monitors]}
+                answer = {"cycles": [item.latest.cycle if item.latest else 0 for item in monitors]}
         print(json.dumps(answer), flush=True)
     line.close()
 
@@ -283,20 +283,20 @@ def main() -> None:
     table = Table(title="A stop while four programs fill the line, of the limit")
     for name in ("stop", "seen", "limit, ms", "median", "worst", "line use"):
         table.add_column(name)
-    for name, one in stops.items():
+    for name, row in stops.items():
         table.add_row(
-            name, f"{one['seen']:.0f} of {one['stops']:.0f}", f"{one['limit_ms']:.1f}",
-            f"{one['median_of_limit']:.2f}", f"{one['worst_of_limit']:.2f}",
-            f"{one['line_use']:.2f}",
+            name, f"{row['seen']:.0f} of {row['stops']:.0f}", f"{row['limit_ms']:.1f}",
+            f"{row['median_of_limit']:.2f}", f"{row['worst_of_limit']:.2f}",
+            f"{row['line_use']:.2f}",
         )  # fmt: skip
     console.print(table)
     table = Table(title="Monitors of 31 drives, a cycle each 10 s")
     for name in ("programs", "requests/s", "line use", "cycles/s median", "least"):
         table.add_column(name)
-    for one in watched:
+    for row in watched:
         table.add_row(
-            f"{one['programs']:.0f}", f"{one['requests_a_second']:.1f}", f"{one['line_use']:.2f}",
-            f"{one['cycles_a_second_median']:.3f}", f"{one['cycles_a_second_least']:.3f}",
+            f"{row['programs']:.0f}", f"{row['requests_a_second']:.1f}", f"{row['line_use']:.2f}",
+            f"{row['cycles_a_second_median']:.3f}", f"{row['cycles_a_second_least']:.3f}",
         )  # fmt: skip
     console.print(table)
     print(

@@ -147,7 +147,7 @@ class _Guest:
     def _note(self, what: str, device: int, address: int, got: list[int], due: list[int]) -> None:
         self.counts["good" if got == due else "wrong"] += 1
         if got != due:
-            whose = [(one, _address_of(one, got[0])) for one in DEVICES]
+            whose = [(number, _address_of(number, got[0])) for number in DEVICES]
             reported = (
                 f"{self._me.name} {what} {device}/{address}: {got}, not {due}; may be {whose}"
             )
@@ -220,7 +220,9 @@ class _Guests:
     def owner(self) -> subprocess.Popen[str] | None:
         """The one that owns the line."""
         found = owner_of(place_in(self.folder, self.path))
-        return next((one for one in self.there if found and one.pid == found.program.pid), None)
+        return next(
+            (process for process in self.there if found and process.pid == found.program.pid), None
+        )
 
 
 def strike(guests: _Guests, chance: random.Random, done: Counter[str]) -> None:

@@ -149,8 +149,8 @@ def measure(rounds: int, folder: Path) -> dict[str, dict[str, list[float]]]:
         kinds: dict[str, Start] = {"none": start}
         if group is not None:
             kinds["10 %"] = lambda command: start(command, group)
-        for one in (wire.text, NAME):  # compiles what is imported
-            start([*COMMAND, one]).wait(WITHIN)
+        for text in (wire.text, NAME):  # compiles what is imported
+            start([*COMMAND, text]).wait(WITHIN)
         for _ in range(rounds):
             for quota, started in kinds.items():
                 note(quota, "pass", seconds_of_nothing(started))
@@ -171,7 +171,7 @@ def table_of(found: dict[str, dict[str, list[float]]]) -> Table:
         for what, seconds in of_quota.items():
             middle, worst = median(seconds), max(seconds)
             figures = (middle, worst, middle - least, worst - least)
-            table.add_row(quota, what, *(f"{one:.3f}" for one in figures))
+            table.add_row(quota, what, *(f"{figure:.3f}" for figure in figures))
     return table
 
 

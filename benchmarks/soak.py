@@ -230,7 +230,7 @@ def sample(began: float) -> Sample:
 
 def growth(samples: Sequence[Sample]) -> float | None:
     """Mean memory of the last third over that of the middle third."""
-    memory = [one.memory for one in samples if one.memory is not None]
+    memory = [sample.memory for sample in samples if sample.memory is not None]
     third = len(memory) // 3
     return mean(memory[-third:]) / mean(memory[third:-third]) if third else None
 
@@ -299,22 +299,22 @@ def show(console: Console, found: Mapping[str, Any]) -> None:
     """Print the table."""
     table = Table(title=f"{found['minutes']:g} minutes, seed {found['seed']}")
     table.add_column("")
-    for one in found["lines"]:
-        table.add_column(one["line"], justify="right")
+    for item in found["lines"]:
+        table.add_column(item["line"], justify="right")
     for title, key in ROWS.items():
-        table.add_row(title, *(str(one[key]) for one in found["lines"]))
+        table.add_row(title, *(str(item[key]) for item in found["lines"]))
     for title, key in TIMES.items():
-        cells = ("-" if one[key] is None else f"{one[key]:.2f}" for one in found["lines"])
+        cells = ("-" if item[key] is None else f"{item[key]:.2f}" for item in found["lines"])
         table.add_row(title, *cells)
     for title, key in COUNTERS.items():
-        table.add_row(title, *(str(one["counters"][key]) for one in found["lines"]))
-    made = (", ".join(f"{k} {n}" for k, n in one["made"].items()) for one in found["lines"])
+        table.add_row(title, *(str(item["counters"][key]) for item in found["lines"]))
+    made = (", ".join(f"{k} {n}" for k, n in item["made"].items()) for item in found["lines"])
     table.add_row("made by the line", *made)
     console.print(table)
-    for one in found["lines"]:
-        for wrong in one["wrong_ones"]:
+    for item in found["lines"]:
+        for wrong in item["wrong_ones"]:
             reported = {key: value for key, value in wrong.items() if key != "frames"}
-            console.print(f"wrong on {one['line']}: {reported}", *wrong["frames"], sep="\n    ")
+            console.print(f"wrong on {item['line']}: {reported}", *wrong["frames"], sep="\n    ")
     show_memory(console, found)
 
 
@@ -323,7 +323,7 @@ def show_memory(console: Console, found: Mapping[str, Any]) -> None:
     samples = found["samples"]
     first, last = samples[0], samples[-1]
     if found["growth"] is not None:
-        reported = " ".join(f"{one['memory'] / 1e6:.1f}" for one in samples)
+        reported = " ".join(f"{sample['memory'] / 1e6:.1f}" for sample in samples)
         console.print(f"Memory, MB, every {samples[1]['second']:.0f} s: {reported}")
         console.print(f"Memory of the last third over the middle third: {found['growth']:.4f}.")
     console.print(
@@ -344,7 +344,7 @@ def main() -> None:
     result: dict[str, Any] = {"benchmark": "soak", "minutes": given.minutes, "seed": given.seed}
     try:
         with peers(given.peer, given.seed, prepared) as served:
-            lines = [Watched(one, prepared.values, given.seed) for one in served]
+            lines = [Watched(item, prepared.values, given.seed) for item in served]
             try:
                 for watched in lines:
                     watched.start()
@@ -360,7 +360,7 @@ def main() -> None:
         "checked": {str(device): len(own) for device, own in prepared.values.items()},
         "faults": soak_peers.fault_report(),
         "lines": [watched.figures() for watched in lines],
-        "samples": [asdict(one) for one in samples],
+        "samples": [asdict(sample) for sample in samples],
         "growth": growth(samples),
     }
     show(console, result)

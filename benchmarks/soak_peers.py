@@ -189,10 +189,10 @@ def cable() -> None:
         ready = select.select([sys.stdin, near, far], [], [])[0]
         if sys.stdin in ready:
             return
-        for one, other in ((near, far), (far, near)):
-            if one in ready:
+        for number, other in ((near, far), (far, near)):
+            if number in ready:
                 with suppress(BlockingIOError):  # a full terminal loses bytes, as a line does
-                    os.write(other, os.read(one, 4096))
+                    os.write(other, os.read(number, 4096))
 
 
 def fault_report() -> dict[str, object]:

@@ -314,9 +314,9 @@ def stop_all(wire: WireLine, fleet: Fleet) -> Wave:
     for exchange in wire.take():
         if exchange.began > pressed and exchange.request[0] and exchange.request[1] == 6:
             first.setdefault(exchange.request[0], exchange)
-    last = max((one.began for one in first.values()), default=pressed)
+    last = max((item.began for item in first.values()), default=pressed)
     took = last + 8 * wire.times.character - pressed
-    least = sum(wire.times.shortest(one) for one in first.values())
+    least = sum(wire.times.shortest(item) for item in first.values())
     return Wave(took, least, len(fleet.sessions) - len(first))
 
 
@@ -339,19 +339,23 @@ def table_of(results: Sequence[Result], drives: int) -> Table:
     )
     for name in names:
         table.add_column(name, justify="left" if name == "panel" else "right")
-    for one in results:
-        if not one.latencies:
+    for result in results:
+        if not result.latencies:
             figures = ["-"] * 4
         else:
-            values = (median(one.latencies), share(one.latencies, 0.95), max(one.latencies))
+            values = (
+                median(result.latencies),
+                share(result.latencies, 0.95),
+                max(result.latencies),
+            )
             figures = [f"{1000 * (value or 0):.1f}" for value in values]
-            figures.append(f"{max(one.latencies) / one.limit:.2f}")
+            figures.append(f"{max(result.latencies) / result.limit:.2f}")
         table.add_row(
-            one.name,
-            f"{one.busy:.0%}",
-            str(len(one.latencies) + one.unanswered),
-            str(one.unanswered),
-            f"{1000 * one.limit:.1f}",
+            result.name,
+            f"{result.busy:.0%}",
+            str(len(result.latencies) + result.unanswered),
+            str(result.unanswered),
+            f"{1000 * result.limit:.1f}",
             *figures,
         )
     return table
@@ -371,23 +375,23 @@ def main() -> None:
     finally:
         line.close()
     Console(width=110).print(table_of(results, options.drives))
-    ratios = sorted(one.took / one.least for one in waves)
-    missing = sum(one.missing for one in waves)
+    ratios = sorted(wave.took / wave.least for wave in waves)
+    missing = sum(wave.missing for wave in waves)
     print(
         f"stop all, last frame of the first wave / {options.drives} exchanges:"
         f" median {median(ratios):.2f}, worst {ratios[-1]:.2f}, drives without a frame: {missing}"
     )
     reported = [
         {
-            "case": one.name,
-            "busy": one.busy,
-            "unanswered": one.unanswered,
-            "limit_ms": 1000 * one.limit,
-            "median_ms": 1000 * median(one.latencies) if one.latencies else None,
-            "p95_ms": 1000 * (share(one.latencies, 0.95) or 0) if one.latencies else None,
-            "worst_ms": 1000 * max(one.latencies) if one.latencies else None,
+            "case": result.name,
+            "busy": result.busy,
+            "unanswered": result.unanswered,
+            "limit_ms": 1000 * result.limit,
+            "median_ms": 1000 * median(result.latencies) if result.latencies else None,
+            "p95_ms": 1000 * (share(result.latencies, 0.95) or 0) if result.latencies else None,
+            "worst_ms": 1000 * max(result.latencies) if result.latencies else None,
         }
-        for one in results
+        for result in results
     ]
     everything = {"ratios": ratios, "missing": missing}
     print(

@@ -318,4 +318,4 @@ def spread(times: Sequence[float]) -> Figures:
     """Median, 95th and 99th percentile and worst of times in s, told in ms."""
     found = {"median": median(times) if times else None, "worst": max(times, default=None)}
     found |= {"95": share(times, 0.95), "99": share(times, 0.99)}
-    return {f"{name}_ms": None if one is None else one * 1e3 for name, one in found.items()}
+    return {f"{name}_ms": None if value is None else value * 1e3 for name, value in found.items()}

@@ -166,7 +166,7 @@ async def ours(path: str, job: Job, place: SharePlace | None = None) -> Tally:
     line.open(wait=5.0)
     chance = random.Random(job.seed)
 
-    async def one(device: int, address: int, words: int) -> None:
+    async def exchange(device: int, address: int, words: int) -> None:
         answer = None
         if chance.random() < CANCELLED:
             with suppress(TimeoutError, LineError):
@@ -191,7 +191,7 @@ async def ours(path: str, job: Job, place: SharePlace | None = None) -> Tally:
             if chance.random() < WRITTEN:
                 await write(read[0], (4 * at + number) % 2000)
             else:
-                await one(*read)
+                await exchange(*read)
 
     reads = plan(job.seed, job.count)
     begun = time.monotonic()

@@ -110,8 +110,8 @@ def main() -> None:
     try:
         for family in FAMILIES:
             rounds = [measure(wire, family, options.baud) for _ in range(options.rounds)]
-            middle = median(one["seconds"] for one in rounds)
-            chosen = min(rounds, key=lambda one: abs(one["seconds"] - middle))
+            middle = median(row["seconds"] for row in rounds)
+            chosen = min(rounds, key=lambda item: abs(item["seconds"] - middle))
             rows.append({"family": family} | chosen | limits(wire, family))
     finally:
         wire.close()

@@ -12,8 +12,8 @@ class Adapters:
 
     def __init__(self, folder: Path) -> None:
         self.dev, self.links, self.system = folder / "dev", folder / "serial", folder / "tty"
-        for one in (self.dev, self.links / "by-id", self.links / "by-path", self.system):
-            one.mkdir(parents=True)
+        for path in (self.dev, self.links / "by-id", self.links / "by-path", self.system):
+            path.mkdir(parents=True)
         self._devices = folder / "devices"
 
     def use(self, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,8 +30,8 @@ def compile_tests() -> None:
             )
             for part in halves
         ]  # fmt: skip
-        for one in collecting:
-            one.wait()
+        for process in collecting:
+            process.wait()
 
 
 def is_compiled(path: Path) -> bool:
@@ -44,7 +44,7 @@ def dealt(paths: Sequence[Path], parts: int) -> list[list[Path]]:
     """The modules in so many parts that are about as long."""
     made: list[list[Path]] = [[] for _ in range(parts)]
     length = [0] * parts
-    for path in sorted(paths, key=lambda one: one.stat().st_size, reverse=True):
+    for path in sorted(paths, key=lambda item: item.stat().st_size, reverse=True):
         shortest = length.index(min(length))
         made[shortest].append(path)
         length[shortest] += path.stat().st_size

@@ -212,7 +212,7 @@ def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
         for copy in made:
             free.put(copy)
 
-        def one(defect: Defect) -> Planted:
+        def plant_one(defect: Defect) -> Planted:
             copy = free.get()
             try:
                 result = plant(defect, copy)
@@ -224,7 +224,7 @@ def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
             return result
 
         with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(one, defects))
+            return list(pool.map(plant_one, defects))
 
 
 def last_run() -> dict[str, Planted]:
@@ -233,14 +233,14 @@ def last_run() -> dict[str, Planted]:
         reported = json.loads(LAST_RUN.read_text("utf-8"))
     except (OSError, ValueError):
         return {}
-    return {name: Planted(**one) for name, one in reported.items()}
+    return {name: Planted(**item) for name, item in reported.items()}
 
 
 def remember(result: Planted) -> None:
     """Keep a result beside those of the defects that were planted before."""
     names = {defect.name for defect in DEFECTS}
     kept = {**last_run(), result.name: result}
-    reported = {name: asdict(one) for name, one in kept.items() if name in names}
+    reported = {name: asdict(planted) for name, planted in kept.items() if name in names}
     LAST_RUN.write_text(json.dumps(reported, indent=1), "utf-8")
 
 
@@ -248,11 +248,15 @@ def table(results: dict[str, Planted]) -> str:
     """All defects with what became of them, as Markdown."""
     lines = ["| defect | what a person would suffer | noticed by | s |", "|---|---|---|---:|"]
     for defect in DEFECTS:
-        one = results.get(defect.name)
-        by, seconds = ("not planted", "") if one is None else (one.noticed_by, f"{one.seconds:.0f}")
+        planted = results.get(defect.name)
+        by, seconds = (
+            ("not planted", "")
+            if planted is None
+            else (planted.noticed_by, f"{planted.seconds:.0f}")
+        )
         by = by.removeprefix("tests/").replace("|", "\\|")
         lines.append(f"| `{defect.name}` | {defect.suffers} | {by} | {seconds} |")
-    noticed = sum(one.noticed for one in results.values())
+    noticed = sum(result.noticed for result in results.values())
     return "\n".join([*lines, "", f"{noticed} of {len(DEFECTS)} defects are noticed."])
 
 
@@ -291,10 +295,10 @@ def main() -> int:
     if requested.list:
         return _listed(defects)
     results = plant_all(defects, min(requested.jobs, len(defects)))
-    missed = [one for one in results if not one.noticed]
+    missed = [result for result in results if not result.noticed]
     print(f"\n{'defect':42} {'s':>6}  noticed by")
-    for one in results:
-        print(f"{one.name:42} {one.seconds:6.1f}  {one.noticed_by}")
+    for result in results:
+        print(f"{result.name:42} {result.seconds:6.1f}  {result.noticed_by}")
     print(f"\n{len(results) - len(missed)} of {len(results)} defects are noticed.")
     return 1 if missed else 0
 

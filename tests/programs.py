@@ -88,7 +88,7 @@ def keepers(*folders: Path) -> list[int]:
     """Process ids of the keepers whose locks lie in these folders, or in those of the test."""
     places = folders or (Path(os.environ["DRIVEPANEL_STATE"], "lines"), group_folder())
     found = []
-    for lock in chain.from_iterable(one.glob("*.lock") for one in places):
+    for lock in chain.from_iterable(place.glob("*.lock") for place in places):
         owner = owner_of_lock(lock)
         if owner is not None and owner.program.name == KEEPER and not has_ended(owner.program):
             found.append(owner.program.pid)
@@ -193,5 +193,5 @@ def pty_pair() -> Iterator[tuple[str, str]]:
     finally:
         os.write(rope, b"x")
         cable.join()
-        for handle in (bell, rope, *(one for pair in pairs for one in pair)):
+        for handle in (bell, rope, *(number for pair in pairs for number in pair)):
             os.close(handle)

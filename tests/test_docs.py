@@ -83,12 +83,12 @@ def has_part(name: str, part: str) -> bool:
     """Whether a class, or one that it is made from, has a method or field of that name."""
     known, seen, waiting = tree(), {""}, [name]
     while waiting:
-        if (one := waiting.pop()) in seen:
+        if (text := waiting.pop()) in seen:
             continue
-        if part in known.classes.get(one, ()):
+        if part in known.classes.get(text, ()):
             return True
-        seen.add(one)
-        waiting += known.bases.get(one, ())
+        seen.add(text)
+        waiting += known.bases.get(text, ())
     return False
 
 
@@ -136,7 +136,7 @@ def _fault_of_path(span: str) -> str:
     if "/" in path and not (ROOT / top).is_dir():
         return ""  # a place in somebody's own folders, or on the line
     folders = [ROOT / tree for tree in (*TREES, "docs", "profiles")] if "/" not in path else []
-    if not any((*ROOT.glob(path), *(found for one in folders for found in one.rglob(path)))):
+    if not any((*ROOT.glob(path), *(found for folder in folders for found in folder.rglob(path)))):
         return "not there"
     if top == "tui" and path.endswith(".py") and "*" not in path:
         return "name the room and the class: files move"

@@ -71,16 +71,16 @@ def test_only_a_test_that_ran_and_failed_has_noticed(status: int, output: str, b
 
 
 def test_the_text_of_every_defect_stands_in_its_room() -> None:
-    for one in DEFECTS:
-        assert place_of(one, ROOT).is_file(), one.name
+    for defect in DEFECTS:
+        assert place_of(defect, ROOT).is_file(), defect.name
 
 
 def test_every_defect_has_a_name_a_sentence_and_tests_that_are_there() -> None:
-    assert len({one.name for one in DEFECTS}) == len(DEFECTS) >= 44
-    for one in DEFECTS:
-        assert one.suffers.endswith("."), one.name
-        assert one.old != one.new, one.name
-        assert one.tests, one.name
-        for test in one.tests:
+    assert len({defect.name for defect in DEFECTS}) == len(DEFECTS) >= 44
+    for defect in DEFECTS:
+        assert defect.suffers.endswith("."), defect.name
+        assert defect.old != defect.new, defect.name
+        assert defect.tests, defect.name
+        for test in defect.tests:
             file, _, function = test.partition("::")
             assert f"def {function}" in (ROOT / file).read_text("utf-8"), test

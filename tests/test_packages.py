@@ -79,7 +79,7 @@ def test_with_an_address_pictures_and_links_lead_to_their_version(tmp_path: Path
     paths = [target.partition(f"/v{version}/")[2] for target in led if target.startswith(ADDRESS)]
     assert paths
     assert [path for path in paths if not (ROOT / path.partition("#")[0]).exists()] == []
-    urls = dict(one.split(", ") for one in reported.get_all("Project-URL") or [])
+    urls = dict(text.split(", ") for text in reported.get_all("Project-URL") or [])
     assert urls == addresses(ADDRESS)
     assert {"Homepage", "Documentation", "Changelog", "Issues", "Source"} <= urls.keys()
 
@@ -92,7 +92,7 @@ def test_existing_link_stays() -> None:
 
 def test_nothing_is_named_as_supported_that_was_never_proved() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    systems = [one for one in project["classifiers"] if one.startswith("Operating System")]
+    systems = [item for item in project["classifiers"] if item.startswith("Operating System")]
     assert systems == ["Operating System :: POSIX :: Linux"]
     assert "Tested on Linux only" in README
 
@@ -154,7 +154,7 @@ def test_the_manual_page_has_every_command_and_option() -> None:
         assert section
         for param in command.params:
             if isinstance(param, click.Option) and not param.hidden:
-                assert all(_text(one) in section for one in param.opts), (name, param.opts)
+                assert all(_text(opt) in section for opt in param.opts), (name, param.opts)
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,13 @@ import pytest
 
 from .sources import PACKAGE, ROOT, modules, tree_of
 
-MOST_LINES = 310
+MOST_LINES = 400
 MOST_METHODS = 15
 """Public methods and properties of one class; those of its bases count there."""
 
 EXCEPTIONS: dict[str, tuple[int, str]] = {
     "bus/api.py:ModbusLine": (21, "the complete interface of a line; the fake has the same"),
     "bus/fake.py:FakeLine": (19, "the same interface, for tests"),
-    "bus/fake.py": (336, "a complete fake line in one module, with an example at the top"),
     "bus/line.py:Line": (16, "implements ModbusLine: one method for each kind of request"),
     "bus/shared_state.py:SharedState": (18, "all state that the programs on a line share"),
     "screens/app_port.py:Panel": (25, "the complete interface of the app for screens"),
@@ -88,7 +87,7 @@ def test_the_architecture_tells_what_is_past_its_size_and_how_far() -> None:
 @pytest.mark.parametrize(
     ("source", "reported"),
     [
-        ("x = 1\n" * (MOST_LINES + 1), ["m.py: 311, and 310 at most"]),
+        ("x = 1\n" * (MOST_LINES + 1), ["m.py: 401, and 400 at most"]),
         ("x = 1\n" * MOST_LINES, []),
         (
             "class Big:\n" + "".join(f"    def m{n}(self): ...\n" for n in range(16)),

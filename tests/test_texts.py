@@ -65,7 +65,8 @@ def _long(text: str) -> int:
     """Count sentences over 25 words, or with two colons or semicolons."""
     sentences = re.split(r"(?<=[.!?])\s+", text)
     return sum(
-        len(one.split()) > 25 or len(re.findall(r"[:;](?=\s|$)", one)) > 1 for one in sentences
+        len(sentence.split()) > 25 or len(re.findall(r"[:;](?=\s|$)", sentence)) > 1
+        for sentence in sentences
     )
 
 
@@ -119,6 +120,7 @@ CHECKS: dict[int, Check] = {
         0,
         "The line is open",
     ),
+    27: Check("N", of(r"^one$", 0), 0, "one"),
     26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), 0, "test_who_asks"),
 }  # fmt: skip
 
@@ -141,13 +143,13 @@ def texts_of(source: ast.Module, path: str, kinds: str = "USNL") -> Iterator[Tex
                 if kind in kinds:
                     yield Text(kind, path, node.lineno, text.strip() if kind == "S" else text)
             case ast.Assign(targets=[ast.Name(id="COMMANDS")], value=ast.Dict(values=rows)):
-                texts = [one.elts[-1] for one in rows if isinstance(one, ast.Tuple)]
+                texts = [row.elts[-1] for row in rows if isinstance(row, ast.Tuple)]
                 yield from (Text("L", path, t.lineno, text) for t in texts for text in _joined(t))
             case ast.Call(keywords=keywords) if "L" in kinds:
-                for one in keywords:
-                    if one.arg in ("help", "short_help"):
+                for keyword in keywords:
+                    if keyword.arg in ("help", "short_help"):
                         yield from (
-                            Text("L", path, node.lineno, text) for text in _joined(one.value)
+                            Text("L", path, node.lineno, text) for text in _joined(keyword.value)
                         )
         if "N" in kinds:
             yield from (Text("N", path, line, name) for line, name in _names(node))
@@ -223,13 +225,13 @@ def all_texts() -> tuple[Text, ...]:
 
 def hits(check: Check, texts: Iterable[Text]) -> Iterator[tuple[Text, int]]:
     """The texts that a check finds fault with, and how often in each."""
-    for one in texts:
-        if one.kind in check.kinds and (count := check.hits(one.text)):
-            yield one, count
+    for text in texts:
+        if text.kind in check.kinds and (count := check.hits(text.text)):
+            yield text, count
 
 
 def test_no_check_finds_more_than_before() -> None:
-    counts = Counter((one.kind, one.text) for one in all_texts())
+    counts = Counter((item.kind, item.text) for item in all_texts())
     found = {
         number: sum(
             times * check.hits(text)
@@ -262,7 +264,7 @@ def run(motor: int) -> None:
     raise ValueError(f"no {motor} here")
 '''
     found = list(texts_of(ast.parse(source), "m.py"))
-    by_kind = {kind: {one.text for one in found if one.kind == kind} for kind in "USNL"}
+    by_kind = {kind: {text.text for text in found if text.kind == kind} for kind in "USNL"}
     assert by_kind["S"] == {"Module.", "Attribute.", "Function."}
     assert {"on the screen", "--x", "no ", " here"} <= by_kind["U"]
     assert by_kind["N"] == {"LIMIT", "run", "motor"}
@@ -275,13 +277,13 @@ def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     page.write_text(
         "# Head\n\nOne\ntwo.\n\n```sh\ncode\n```\n- item\n- more\n\n  | a | b |\n", "utf-8"
     )
-    assert [one.text for one in _paragraphs(page) if one.text] == [
+    assert [paragraph.text for paragraph in _paragraphs(page) if paragraph.text] == [
         "# Head", "One two.", "- item", "- more", "a", "b",
     ]  # fmt: skip
 
 
 if __name__ == "__main__":
-    for wanted in [int(one) for one in sys.argv[1:]] or CHECKS:
+    for wanted in [int(item) for item in sys.argv[1:]] or CHECKS:
         listed = list(hits(CHECKS[wanted], all_texts()))
         print(f"{wanted}: {sum(c for _, c in listed)} hits, at most {CHECKS[wanted].most}")
         if sys.argv[1:]:

@@ -60,14 +60,14 @@ class SharedLines:
         self.opened.append(line)
         line.open(wait=wait)
         if wait is not None and len(self.opened) > 1:
-            everybody = [one for one in self.opened if one.state.status.value != "closed"]
-            eventually(lambda: all(knows(one, name) for one in everybody))
+            everybody = [item for item in self.opened if item.state.status.value != "closed"]
+            eventually(lambda: all(knows(item, name) for item in everybody))
         return line
 
     @property
     def left_behind(self) -> list[str]:
         """What lies in the folders of the meeting place, but for the lock."""
-        return [one.name for one in self.folder.rglob("*.s*")]
+        return [path.name for path in self.folder.rglob("*.s*")]
 
     def close(self) -> None:
         """Close all."""

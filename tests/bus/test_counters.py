@@ -38,20 +38,22 @@ async def test_each_device_has_its_own_counts(open_line: OpenLine) -> None:
         for device, address in ((1, 5), (1, 10), (1, 20), (2, 5), (2, 6), (1, 30)):
             with suppress(ExchangeError):
                 await line.read(device, address, priority=Priority.OPERATOR_READ)
-        one, other = line.counters.devices[1], line.counters.devices[2]
+        counters, other = line.counters.devices[1], line.counters.devices[2]
         # the damaged one and the silent one were asked twice
-        assert (one.requests, one.replies, one.repeats) == (6, 2, 2)
-        assert (one.checksum, one.timeouts, one.exceptions) == (2, 2, {2: 1})
-        assert one.bytes_out == 6 * READ_SIZE
-        assert one.bytes_in == 3 * REPLY_SIZE + REFUSAL_SIZE
-        assert sum(one.turnarounds) == one.replies
+        assert (counters.requests, counters.replies, counters.repeats) == (6, 2, 2)
+        assert (counters.checksum, counters.timeouts, counters.exceptions) == (2, 2, {2: 1})
+        assert counters.bytes_out == 6 * READ_SIZE
+        assert counters.bytes_in == 3 * REPLY_SIZE + REFUSAL_SIZE
+        assert sum(counters.turnarounds) == counters.replies
         assert replace(other, busy_seconds=0.0, turnarounds=()) == DeviceCounters(
             2, 2, bytes_out=2 * READ_SIZE, bytes_in=2 * REPLY_SIZE, turnarounds=(),
             minute=LastMinute(good=2),
         )  # fmt: skip
         assert line.counters.repeats == 2
-        assert one.busy_seconds + other.busy_seconds == pytest.approx(line.counters.busy_seconds)
-        assert one.busy_seconds > 2 * BRISK.first_timeout
+        assert counters.busy_seconds + other.busy_seconds == pytest.approx(
+            line.counters.busy_seconds
+        )
+        assert counters.busy_seconds > 2 * BRISK.first_timeout
 
 
 async def test_modbus_tcp_is_counted_too(open_line: OpenLine) -> None:

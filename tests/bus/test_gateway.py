@@ -363,8 +363,8 @@ async def test_connections_that_all_wait_for_writes_keep_no_client_out(
     await asyncio.sleep(0.1)
     # what they had sent is carried out, but for the oldest: each could send more and more
     assert sorted(done) == [1, 2, 3, 9]
-    for _, one in (*clients, (reader, writer)):
-        one.close()
+    for _, stream_writer in (*clients, (reader, writer)):
+        stream_writer.close()
     await gateway.close()
 
 
@@ -395,7 +395,7 @@ async def test_answers_for_who_has_gone_are_dropped_without_a_word(
     go_on.set()
     await asyncio.wait_for(gone.wait(), 30)
     await gateway.close()
-    assert not [one for one in caplog.records if one.name == "asyncio"]
+    assert not [record for record in caplog.records if record.name == "asyncio"]
 
 
 def test_the_address_with_the_most_connections_makes_room() -> None:

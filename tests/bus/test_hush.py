@@ -41,5 +41,5 @@ async def test_a_stop_ends_what_a_device_is_left_alone_for(share: Share, stopper
         programs[stopper].facts.give_stop([1], "the stop key")
         assert (await programs[stopper].read(1, 5)).words == (5,)
         await asyncio.to_thread(
-            eventually, lambda: all({*one.facts.paused} == {2} for one in programs.values())
+            eventually, lambda: all({*program.facts.paused} == {2} for program in programs.values())
         )

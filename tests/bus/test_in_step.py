@@ -104,7 +104,7 @@ async def test_replies_one_behind_are_named_and_no_value_is_wrong(
             await line.read(1, 100)
         with pytest.raises(LineLost, match="one behind"):
             await line.write(1, 100, [7])
-        assert 6 not in [one[1] for one in peer.requests]
+        assert 6 not in [request[1] for request in peer.requests]
 
 
 @pytest.mark.parametrize("kind", LIMITS)
@@ -149,7 +149,7 @@ def _stopped(line: Line, peer: PtyPeer) -> bool:
     """Send a stop; while the port is opened again, it may fail."""
     with suppress(LineError):
         asyncio.run(line.write(1, 1, [0], priority=Priority.STOP))
-    return any(one[1] == 6 for one in peer.requests)
+    return any(request[1] == 6 for request in peer.requests)
 
 
 async def test_stop_is_kept_while_a_line_that_is_behind_cannot_be_opened_again(
@@ -169,7 +169,7 @@ async def test_stop_is_kept_while_a_line_that_is_behind_cannot_be_opened_again(
         await line.write(1, 2, [7])
     with TcpPeer(honest, port=peer.port) as again:
         await asyncio.to_thread(again.await_requests, 2)
-        assert [one[1] for one in again.requests].count(6) == 1
+        assert [request[1] for request in again.requests].count(6) == 1
         assert again.requests[0][1:6] == bytes([6, 0, 1, 0, 0]), "before anything else"
 
 
@@ -232,7 +232,7 @@ async def test_write_is_not_sent_before_the_drive_has_proved_its_step(
         line = opened(open_line, peer.path, WIDE)
         with pytest.raises(LineError, match="Nothing was written"):
             await line.write(1, 1, [7])
-        assert 6 not in [one[1] for one in peer.requests]
+        assert 6 not in [request[1] for request in peer.requests]
 
 
 async def test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing(
@@ -345,7 +345,7 @@ class _Line:
         self.steps = InStep(self.devices, self.outcomes, lambda: self.now, timing, False, gateway)
 
     def note(self, job: Job, kind: ResultKind, *earlier: bytes, code: int = 0) -> None:
-        strays = [Piece(one, whole=True) for one in earlier]
+        strays = [Piece(data, whole=True) for data in earlier]
         result = ExchangeResult(kind, sent=self.now, strays=strays, exception=code)
         self.outcomes.hear_gateway(job, result)
         assert job.expectation is not None

@@ -74,7 +74,7 @@ def test_device_is_read_four_times_in_its_timeout(bench: Bench) -> None:
     bench.facts.keep_alives.keep(ONE)
     bench.wait(TIMEOUT + 0.1)
     times = [PERIOD, 2 * PERIOD, 3 * PERIOD, 4 * PERIOD]
-    assert bench.sent == [(one, 1, Priority.FEED) for one in times]
+    assert bench.sent == [(time, 1, Priority.FEED) for time in times]
 
 
 def test_device_that_programs_read_needs_no_reads(bench: Bench) -> None:
@@ -162,9 +162,9 @@ def test_malformed_message_is_refused(wrong: dict[str, float]) -> None:
 def test_odd_timeout_is_brought_within_bounds(timeout: float) -> None:
     facts = SharedState()
     facts.keep_alives.keep(KeepAlive(1, timeout, ADDRESS))
-    (one,) = facts.keep_alives.of(facts.me.id)
-    assert SHORTEST_TIMEOUT <= one.timeout <= LONGEST_TIMEOUT
-    assert unpacked(packed(one)[4:]) == one
+    (alive,) = facts.keep_alives.of(facts.me.id)
+    assert SHORTEST_TIMEOUT <= alive.timeout <= LONGEST_TIMEOUT
+    assert unpacked(packed(alive)[4:]) == alive
 
 
 # On a line
@@ -172,7 +172,10 @@ def test_odd_timeout_is_brought_within_bounds(timeout: float) -> None:
 
 def reads(peer: PtyPeer) -> int:
     """How often the register of the reads was read."""
-    return sum(one[1] == 3 and int.from_bytes(one[2:4], "big") == ADDRESS for one in peer.requests)
+    return sum(
+        request[1] == 3 and int.from_bytes(request[2:4], "big") == ADDRESS
+        for request in peer.requests
+    )
 
 
 async def more(peer: PtyPeer) -> None:

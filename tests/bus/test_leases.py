@@ -35,7 +35,7 @@ def slow(request: bytes, _count: int) -> Sequence[Step]:
 
 def written(peer: PtyPeer) -> list[int]:
     """The value of every single write on the wire."""
-    return [one[5] for one in peer.requests if one[1] == 6]
+    return [request[5] for request in peer.requests if request[1] == 6]
 
 
 async def refusal(line: Line) -> str:
@@ -54,8 +54,8 @@ def pair(share: Share, peer: PtyPeer) -> tuple[Line, Line]:
 async def test_only_a_stop_is_sent_to_a_drive_that_is_not_armed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        for one in (holder, program):
-            assert await refusal(one) == "Not sent: drive 1 is not armed by this program."
+        for line in (holder, program):
+            assert await refusal(line) == "Not sent: drive 1 is not armed by this program."
         assert written(peer) == []
         await program.write(1, 1, [STOP], priority=Priority.STOP)
         await program.read(1, 1)
@@ -65,11 +65,11 @@ async def test_only_a_stop_is_sent_to_a_drive_that_is_not_armed(share: Share) ->
 async def test_an_armed_drive_is_written_until_it_is_disarmed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        for one in (holder, program):
-            one.facts.leases.arm(1, 60.0, CARE)
-            await one.write(1, 1, [RUN])
-            one.facts.leases.disarm(1)
-            assert "drive 1 is not armed" in await refusal(one)
+        for line in (holder, program):
+            line.facts.leases.arm(1, 60.0, CARE)
+            await line.write(1, 1, [RUN])
+            line.facts.leases.disarm(1)
+            assert "drive 1 is not armed" in await refusal(line)
         program.facts.leases.arm(2, 60.0, CARE)
         assert "drive 1 is not armed by this program" in await refusal(program)
         assert written(peer) == [RUN, RUN]
@@ -127,12 +127,12 @@ async def test_the_next_holder_learns_of_it(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
         first, *others = (lines.open(name, gated=True) for name in ("first", "second", "third"))
-        for one in others:
-            one.facts.leases.arm(1, 60.0, CARE)
+        for other in others:
+            other.facts.leases.arm(1, 60.0, CARE)
         await asyncio.to_thread(first.close)
         await asyncio.to_thread(eventually, lambda: _meet(lines, others))
-        for one in others:
-            await one.write(1, 1, [RUN])
+        for other in others:
+            await other.write(1, 1, [RUN])
         assert written(peer) == [RUN, RUN]
 
 
@@ -156,8 +156,8 @@ async def test_the_next_holder_learns_how_to_stop_what_was_armed_before(share: S
         second.facts.leases.disarm(2)
         second.facts.release(2)
         await asyncio.to_thread(eventually, lambda: first.facts.commander(2) is None)
-        for one in (first, second):
-            one.facts.holder.on_care(hear)
+        for line in (first, second):
+            line.facts.holder.on_care(hear)
         await asyncio.to_thread(holder.close)
         await asyncio.to_thread(eventually, lambda: _meet(lines, [first, second]))
         # whichever holds the line hears how to stop what the other one has armed, and arms nothing
@@ -184,8 +184,8 @@ async def test_stop_stays_due_if_arming_ends_with_it(share: Share) -> None:
 
 
 def _meet(lines: SharedLines, programs: list[Line]) -> bool:
-    names = {one.facts.me.id for one in programs}
-    return all({each.id for each in one.facts.programs} == names for one in programs)
+    names = {program.facts.me.id for program in programs}
+    return all({each.id for each in program.facts.programs} == names for program in programs)
 
 
 async def test_it_ends_with_its_program(share: Share) -> None:

@@ -75,9 +75,9 @@ class TimedLine:
         sending.look()
         self.now += EXCHANGE
         later, self._later = self._later, []
-        for one in later:
-            self.ask(*one)
-        job = next(one for one in self._waiting if one.begun)
+        for pair in later:
+            self.ask(*pair)
+        job = next(item for item in self._waiting if item.begun)
         self._waiting.remove(job)
         self.sent.append(job)
         request = job.request
@@ -128,7 +128,7 @@ def test_all_kinds_at_once_have_their_minimum_shares() -> None:
         line.keep_asking(priority)
     line.serve(60.0)
     shares = line.shares()
-    assert all(shares[one] == pytest.approx(MINIMUM_SHARES[one], rel=0.1) for one in SHARED)
+    assert all(shares[item] == pytest.approx(MINIMUM_SHARES[item], rel=0.1) for item in SHARED)
     assert shares[Priority.FEED] == pytest.approx(1 - sum(MINIMUM_SHARES.values()), rel=0.1)
 
 
@@ -156,7 +156,7 @@ def test_repeated_stops_take_turns_with_all_that_waits() -> None:
     assert shares[Priority.STOP] == pytest.approx(0.5, rel=0.05)
     rest = 1 - sum(MINIMUM_SHARES.values())
     assert shares[Priority.FEED] == pytest.approx(0.5 * rest, rel=0.1)
-    assert all(shares[one] > 0 for one in SHARED)
+    assert all(shares[item] > 0 for item in SHARED)
 
 
 def test_stops_that_a_silent_drive_never_answers_take_turns() -> None:
@@ -180,7 +180,7 @@ def test_first_stop_waits_for_nothing_beside_repeated_ones() -> None:
         line.serve(2 * EXCHANGE)
         waiting = line.sent[before:]
         assert stop in waiting
-        assert all(one.priority is Priority.STOP for one in waiting[: waiting.index(stop)])
+        assert all(job.priority is Priority.STOP for job in waiting[: waiting.index(stop)])
 
 
 def test_repeated_stop_waits_for_one_exchange_at_most() -> None:

@@ -32,9 +32,9 @@ class Talk:
         self.path = os.ttyname(self.theirs)
 
     def close(self) -> None:
-        for one in (self.ours, self.theirs):
-            if one >= 0:
-                os.close(one)
+        for number in (self.ours, self.theirs):
+            if number >= 0:
+                os.close(number)
         self.ours = self.theirs = -1
 
 

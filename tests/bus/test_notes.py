@@ -21,9 +21,9 @@ def test_a_note_is_kept_for_ten_minutes_and_no_longer() -> None:
     bench.notes.keep(LineNote(1, "a", b"old"))
     bench.now += NOTES_KEPT - 1
     bench.notes.keep(LineNote(1, "a", b"new"))
-    assert [one.data for one in bench.notes.of(1, "a")] == [b"old", b"new"]
+    assert [note.data for note in bench.notes.of(1, "a")] == [b"old", b"new"]
     bench.now += 2
-    assert [one.data for one in bench.notes.of(1, "a")] == [b"new"]
+    assert [note.data for note in bench.notes.of(1, "a")] == [b"new"]
     assert NOTES_KEPT == 600
 
 
@@ -49,7 +49,7 @@ def test_the_oldest_notes_make_room_for_new_ones() -> None:
     for number in range(2 * MOST_NOTES // MOST_NOTE):
         bench.notes.keep(LineNote(1, "a", number.to_bytes(4, "big") * (MOST_NOTE // 4)))
     kept = bench.notes.all
-    assert sum(len(one.data) for one in kept) <= MOST_NOTES
+    assert sum(len(note.data) for note in kept) <= MOST_NOTES
     assert len(kept) > 100
     assert kept[-1].data.startswith((2 * MOST_NOTES // MOST_NOTE - 1).to_bytes(4, "big"))
 

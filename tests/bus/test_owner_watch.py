@@ -217,8 +217,8 @@ def test_the_process_at_the_other_end_is_killed(listener: Any) -> None:
 
 def test_nothing_but_a_known_keeper_at_the_other_end_is_killed(listener: Any) -> None:
     process, connection = listener
-    for one in (owner(process.pid, name="panel"), owner(process.pid, version=VERSION + 1)):
-        found = KeeperProcess(one, connection)
+    for item in (owner(process.pid, name="panel"), owner(process.pid, version=VERSION + 1)):
+        found = KeeperProcess(item, connection)
         assert not found.kill()
         assert found.remedy == BY_HAND.format(pid=process.pid)
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:

@@ -129,7 +129,7 @@ async def test_plain_stop_reaches_every_program_as_from_one_that_is_not_attached
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
-        before = {one: one.facts.stops.stamp(3) for one in (owner, other)}
+        before = {line: line.facts.stops.stamp(3) for line in (owner, other)}
         heard = [heard_by(owner), heard_by(other)]
         due: list[tuple[tuple[int, ...], str]] = []
         owner.facts.holder.on_stop_due(lambda *stop: due.append(stop))
@@ -141,10 +141,10 @@ async def test_plain_stop_reaches_every_program_as_from_one_that_is_not_attached
             assert program not in owner.facts.programs
         # no program carries it out, so the owner does
         assert due == [((3, 4), f"stop (pid {os.getpid()})")]
-        for one in (owner, other):
+        for line in (owner, other):
             # what was meant before is void, whoever meant it
-            assert "a stop came after it" in one.facts.refusal(one.facts.me.id, 3, before[one])
-            assert not one.facts.refusal(one.facts.me.id, 5, one.facts.stops.stamp(5))
+            assert "a stop came after it" in line.facts.refusal(line.facts.me.id, 3, before[line])
+            assert not line.facts.refusal(line.facts.me.id, 5, line.facts.stops.stamp(5))
         await voided_and_stopped(lines, peer, other, owner)
 
 
@@ -183,7 +183,7 @@ async def test_plain_stop_malformed_ends_its_connection_only(
             if form != b" 2\n3\n":
                 assert await asyncio.to_thread(give, lines, form) == b""
         assert not heard
-        assert [one.name for one in owner.facts.others] == ["watch"]
+        assert [program.name for program in owner.facts.others] == ["watch"]
         await voided_and_stopped(lines, peer, other, owner)
     assert "serving a program on the line failed" not in caplog.text
 
@@ -216,7 +216,7 @@ async def test_a_client_stops_by_a_connection_of_its_own(share: Share) -> None:
         assert client.facts.voice is not None
         await asyncio.to_thread(client.facts.voice.stop_directly, (1, 3))
         eventually(lambda: due == [(1, 3)])
-        eventually(lambda: [one[0] for one in heard] == [(1, 3)])
+        eventually(lambda: [pair[0] for pair in heard] == [(1, 3)])
 
 
 async def test_the_holder_of_a_line_has_nobody_else_to_stop_directly(share: Share) -> None:

@@ -41,7 +41,7 @@ def slow(request: bytes, _count: int) -> Sequence[Step]:
 
 
 def reads(*addresses: int, count: int = 1) -> tuple[PlannedRead, ...]:
-    return tuple(PlannedRead(one, count) for one in addresses)
+    return tuple(PlannedRead(address, count) for address in addresses)
 
 
 def plan(
@@ -84,8 +84,8 @@ class Subscriber:
 
 def taken(turn: PolledTurn, *wanted: PlannedRead) -> list[tuple[int, ...]]:
     """The words of the replies of a cycle."""
-    found = [turn.take(one, 0.0) for one in wanted]
-    return [one.words for one in found if one is not None]
+    found = [turn.take(read, 0.0) for read in wanted]
+    return [reply.words for reply in found if reply is not None]
 
 
 def served(owner: Line) -> Any:
@@ -96,12 +96,14 @@ def served(owner: Line) -> Any:
 
 def client_of(owner: Line, name: str) -> Any:
     shared = cast(Any, owner._engine._shared)
-    return next(one for one in shared._server._clients.values() if one.program.name == name)
+    return next(
+        client for client in shared._server._clients.values() if client.program.name == name
+    )
 
 
 def polled(peer: PtyPeer) -> list[int]:
     """The registers of all requests so far."""
-    return [int.from_bytes(one[2:4], "big") for one in peer.requests]
+    return [int.from_bytes(request[2:4], "big") for request in peer.requests]
 
 
 async def test_subscriber_gets_each_cycle_and_nothing_else_is_on_the_wire(share: Share) -> None:
@@ -111,12 +113,14 @@ async def test_subscriber_gets_each_cycle_and_nothing_else_is_on_the_wire(share:
         first, second = reads(100, 110, count=2), reads(100, 300)
         watch = Subscriber(lines.open("watch"), plan(first, second))
         turns = await asyncio.to_thread(watch.await_turns, 6)
-        assert [one.turn for one in turns] == [0, 1, 0, 1, 0, 1]
+        assert [turn.turn for turn in turns] == [0, 1, 0, 1, 0, 1]
         assert taken(turns[0], *first) == [(100, 101), (110, 111)]
         assert taken(turns[1], *second) == [(100,), (300,)]
         assert polled(peer)[:12] == [100, 110, 100, 300] * 3
-        assert [one.begun for one in turns] == sorted({one.begun for one in turns})
-        assert all(one.begun <= one.ended for one in turns)
+        assert [turn.begun for turn in turns] == sorted(
+            {polled_turn.begun for polled_turn in turns}
+        )
+        assert all(turn.begun <= turn.ended for turn in turns)
 
 
 async def test_two_subscribers_of_one_read_get_it_once_from_the_wire(share: Share) -> None:
@@ -125,10 +129,10 @@ async def test_two_subscribers_of_one_read_get_it_once_from_the_wire(share: Shar
         lines.open("keeper")
         wanted = plan(reads(100, count=4), period=ONCE)
         first = Subscriber(lines.open("watch"), wanted)
-        (one,) = await asyncio.to_thread(first.await_turns, 1)
+        (turn,) = await asyncio.to_thread(first.await_turns, 1)
         second = Subscriber(lines.open("panel"), wanted)
         (other,) = await asyncio.to_thread(second.await_turns, 1)
-        assert taken(one, *wanted.turns[0]) == taken(other, *wanted.turns[0])
+        assert taken(turn, *wanted.turns[0]) == taken(other, *wanted.turns[0])
         assert polled(peer) == [100]
 
 
@@ -138,8 +142,8 @@ async def test_subscriber_is_never_given_one_reply_twice(share: Share) -> None:
         lines.open("keeper")
         wanted = plan(reads(100), period=QUICKLY)
         watch, panel = (Subscriber(lines.open(name), wanted) for name in ("watch", "panel"))
-        for one in (watch, panel):
-            turns = await asyncio.to_thread(one.await_turns, 20)
+        for subscriber in (watch, panel):
+            turns = await asyncio.to_thread(subscriber.await_turns, 20)
             times = [cast(Reply, turn.take(wanted.turns[0][0], 0.0)).time for turn in turns]
             assert times == sorted(set(times))
         # each took some replies of the other
@@ -174,10 +178,10 @@ async def test_the_end_of_a_subscription_or_of_its_program_ends_the_polling(shar
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch, panel = (lines.open(name) for name in ("keeper", "watch", "panel"))
-        one, other = Subscriber(watch, plan(reads(100))), Subscriber(panel, plan(reads(200)))
-        for each in (one, other):
+        subscriber, other = Subscriber(watch, plan(reads(100))), Subscriber(panel, plan(reads(200)))
+        for each in (subscriber, other):
             await asyncio.to_thread(each.await_turns, 2)
-        one.end()
+        subscriber.end()
         eventually(lambda: len(served(owner)._all()) == 1)
         panel.close()
         eventually(lambda: not served(owner)._all())
@@ -196,8 +200,8 @@ async def test_the_plan_of_a_program_that_is_killed_or_frozen_ends(share: Share)
             stranger.sendall(packed(Subscribe(5, plan(reads(100)))))
             eventually(lambda: 100 in polled(peer))
         eventually(lambda: not served(owner)._served)
-        one = Subscriber(watch, plan(reads(200)))
-        await asyncio.to_thread(one.await_turns, 2)
+        subscriber = Subscriber(watch, plan(reads(200)))
+        await asyncio.to_thread(subscriber.await_turns, 2)
         with frozen(watch):
             eventually(lambda: not served(owner)._served)
 
@@ -208,8 +212,8 @@ async def test_subscriber_that_takes_nothing_is_polled_for_no_more_until_it_does
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch, panel = (lines.open(name) for name in ("keeper", "watch", "panel"))
-        one, other = Subscriber(watch, plan(reads(100))), Subscriber(panel, plan(reads(200)))
-        for each in (one, other):
+        subscriber, other = Subscriber(watch, plan(reads(100))), Subscriber(panel, plan(reads(200)))
+        for each in (subscriber, other):
             await asyncio.to_thread(each.await_turns, 2)
         client = client_of(owner, "watch")
         writer, full = client.writer, FullWriter(MOST_UNTAKEN + 1)
@@ -222,7 +226,7 @@ async def test_subscriber_that_takes_nothing_is_polled_for_no_more_until_it_does
         assert polled(peer).count(100) <= 1
         assert polled(peer).count(200) >= 4
         in_loop(owner, lambda: setattr(client, "writer", writer))
-        await asyncio.to_thread(one.await_turns, len(one.turns) + 3)
+        await asyncio.to_thread(subscriber.await_turns, len(subscriber.turns) + 3)
 
 
 class FullWriter:
@@ -243,7 +247,7 @@ async def test_commands_and_stops_go_between_the_requests_of_a_cycle(share: Shar
         lines = share(peer.path)
         owner, watch = lines.open("keeper"), lines.open("watch")
         many = reads(*range(100, 160, 2))
-        one = Subscriber(watch, plan(many, period=ONCE))
+        subscriber = Subscriber(watch, plan(many, period=ONCE))
         await asyncio.to_thread(peer.await_requests, 3)
         await watch.write(1, 30, [1])
         await owner.write(1, 40, [0], priority=Priority.STOP)
@@ -251,7 +255,7 @@ async def test_commands_and_stops_go_between_the_requests_of_a_cycle(share: Shar
         # each behind one exchange in flight at most, and the one that its writer saw begin
         assert order.index(40) - order.index(30) <= 2
         assert len(order) < len(many)
-        (turn,) = await asyncio.to_thread(one.await_turns, 1)
+        (turn,) = await asyncio.to_thread(subscriber.await_turns, 1)
         assert len(taken(turn, *many)) == len(many)
 
 
@@ -262,10 +266,10 @@ async def test_a_plan_beyond_the_limits_of_its_device_is_refused(share: Share) -
         watch = lines.open("watch")
         # a device that nobody described takes one word
         wanted = plan(reads(100), reads(200, count=2), device=77)
-        one = Subscriber(watch, wanted)
-        eventually(lambda: one.error is not None)
-        assert isinstance(one.error, RequestRefused)
-        assert str(one.error) == "2 words cannot be read at once; the device takes 1."
+        subscriber = Subscriber(watch, wanted)
+        eventually(lambda: subscriber.error is not None)
+        assert isinstance(subscriber.error, RequestRefused)
+        assert str(subscriber.error) == "2 words cannot be read at once; the device takes 1."
         assert not peer.requests
 
 
@@ -303,7 +307,7 @@ async def test_the_owner_refuses_a_plan_beyond_the_limits_by_itself(share: Share
         in_loop(owner, hear)
         eventually(lambda: len(kept) == 2)
         assert kept == [1 + MOST_PLANNED // 4000, 0]
-        failures = {one.number: one.replies[0].failure for one in heard}
+        failures = {polled.number: polled.replies[0].failure for polled in heard}
         assert failures[1] is not None
         assert failures[1][0] == "RequestRefused"
         last = failures[4 + MOST_PLANNED // 4000]
@@ -357,10 +361,10 @@ async def test_an_owner_that_ends_loses_the_plan_and_the_next_one_takes_it(share
         lines = share(peer.path)
         owner, watch, panel = (lines.open(name) for name in ("keeper", "watch", "panel"))
         ones = [Subscriber(line, plan(reads(100))) for line in (watch, panel)]
-        for one in ones:
-            await asyncio.to_thread(one.await_turns, 2)
+        for subscriber in ones:
+            await asyncio.to_thread(subscriber.await_turns, 2)
         owner.close()
-        eventually(lambda: all(one.worker.done() for one in ones))
+        eventually(lambda: all(subscriber.worker.done() for subscriber in ones))
         # one of the two holds the line now, and reads by itself
         eventually(lambda: sum(line.pace.carrier is not None for line in (watch, panel)) == 1)
         client = watch if watch.pace.carrier is not None else panel
@@ -371,10 +375,10 @@ async def test_an_owner_that_does_not_answer_loses_the_plan(share: Share) -> Non
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch = lines.open("keeper"), lines.open("watch")
-        one = Subscriber(watch, plan(reads(100), period=ONCE))
-        await asyncio.to_thread(one.await_turns, 1)
+        subscriber = Subscriber(watch, plan(reads(100), period=ONCE))
+        await asyncio.to_thread(subscriber.await_turns, 1)
         with frozen(owner):
-            eventually(one.worker.done, PATIENCE)
+            eventually(subscriber.worker.done, PATIENCE)
             again = Subscriber(watch, plan(reads(100)))
             eventually(lambda: again.worker.done() or again.subscription is not None)
             assert again.subscription is None
@@ -418,12 +422,14 @@ async def test_programs_with_different_reads_of_a_device_are_slowed_down_evenly(
         few = Subscriber(watch, plan(reads(100, count=20)))
         many = Subscriber(panel, plan(reads(*range(200, 480, 20), count=20)))
         both = (few, many)
-        for one in both:
-            await asyncio.to_thread(one.await_turns, 1)
+        for subscriber in both:
+            await asyncio.to_thread(subscriber.await_turns, 1)
         eventually(lambda: watch.pace.stretch == panel.pace.stretch > 2)
-        before = [len(one.turns) for one in both]
+        before = [len(subscriber.turns) for subscriber in both]
         await asyncio.to_thread(many.await_turns, before[1] + 10)
-        few_more, many_more = (len(one.turns) - had for one, had in zip(both, before, strict=True))
+        few_more, many_more = (
+            len(subscriber.turns) - had for subscriber, had in zip(both, before, strict=True)
+        )
         # the small plan has its turn as often as the large one
         assert few_more <= many_more * 1.5 + 1
         assert owner.pace.stretch > 2

@@ -32,17 +32,17 @@ def test_an_adapter_without_a_serial_number_is_known_by_its_socket(adapters: Ada
 
 
 def test_two_of_one_make_share_their_by_id_name_and_are_distinguished(adapters: Adapters) -> None:
-    one = lasting_name(adapters.plug("ttyUSB0", "1.1"))
+    name = lasting_name(adapters.plug("ttyUSB0", "1.1"))
     two = lasting_name(adapters.plug("ttyUSB1", "1.2"))
-    assert one.path != two.path
+    assert name.path != two.path
     shared = adapters.links / "by-id" / "usb-FTDI_6001-if00-port0"
     # typed by the name that both have, it is known as the one that it leads to now
     assert lasting_name(str(shared)) == two
 
 
 def test_two_with_one_serial_number_are_distinguished(adapters: Adapters) -> None:
-    one = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="0001"))
-    assert not one.shared
+    port_name = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="0001"))
+    assert not port_name.shared
     two = adapters.plug("ttyUSB1", "1.2", serial="0001")
     names = [lasting_name(adapters.port("ttyUSB0")), lasting_name(two)]
     assert [name.path for name in names] == [
@@ -52,11 +52,11 @@ def test_two_with_one_serial_number_are_distinguished(adapters: Adapters) -> Non
 
 
 def test_the_ports_of_one_adapter_are_no_twins(adapters: Adapters) -> None:
-    one = adapters.plug("ttyUSB0", "1.1", serial="FT4232")
+    text = adapters.plug("ttyUSB0", "1.1", serial="FT4232")
     interface = adapters.system / "ttyUSB1"
     interface.mkdir()
     (interface / "device").symlink_to((adapters.system / "ttyUSB0" / "device").resolve())
-    assert not lasting_name(one).shared
+    assert not lasting_name(text).shared
 
 
 def test_a_serial_number_with_signs_that_a_link_cannot_have(adapters: Adapters) -> None:

@@ -91,11 +91,11 @@ async def test_attached_programs_and_a_look_have_the_shares(share: Share) -> Non
 
         await asyncio.to_thread(eventually, lambda: has_both(owner) and has_both(client))
         shares = owner.counters.programs
-        found = {one for one, _ in use_by_program(owner.facts.programs, shares)}
-        assert {one.id for one in found} == ids
+        found = {program for program, _ in use_by_program(owner.facts.programs, shares)}
+        assert {program.id for program in found} == ids
         answer = await asyncio.to_thread(clients, lines)
-        assert {one.program for one in answer.clients} == {"serve", "panel"}
-        assert all(one.share > 0.0 for one in answer.clients)
+        assert {line_client.program for line_client in answer.clients} == {"serve", "panel"}
+        assert all(line_client.share > 0.0 for line_client in answer.clients)
         assert answer.minute is not None
         assert answer.minute.good >= 5
 

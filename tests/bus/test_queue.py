@@ -43,10 +43,10 @@ def test_order() -> None:
 def test_stop_after_another_command_is_a_first_one_again(between: int | None, first: bool) -> None:
     queue = JobQueue(20)
 
-    def send(one: Job) -> None:
-        queue.put(one)
-        assert queue.take(now, 0.0)[0] is one
-        queue.count(one, 0.0, 0.1, acknowledged=True)
+    def send(item: Job) -> None:
+        queue.put(item)
+        assert queue.take(now, 0.0)[0] is item
+        queue.count(item, 0.0, 0.1, acknowledged=True)
 
     send(stop_job(1))
     if between is not None:

@@ -34,7 +34,7 @@ def note_denied(denied: list[str], name: str, _device: int, _why: str) -> None:
 
 def kinds(peer: PtyPeer) -> list[tuple[int, int]]:
     """Function and register of every request on the wire."""
-    return [(one[1], int.from_bytes(one[2:4], "big")) for one in peer.requests]
+    return [(request[1], int.from_bytes(request[2:4], "big")) for request in peer.requests]
 
 
 async def test_the_second_program_works_as_if_it_had_the_line(share: Share) -> None:
@@ -48,7 +48,7 @@ async def test_the_second_program_works_as_if_it_had_the_line(share: Share) -> N
         assert (await other.identify(1)).objects
         assert kinds(peer)[2:4] == [(6, 50), (23, 60)]
         assert "Shared with panel" in other.state.reason
-        assert [one.name for one in owner.facts.others] == ["backup"]
+        assert [program.name for program in owner.facts.others] == ["backup"]
         assert other.state.status is LineStatus.CONNECTED
 
 
@@ -74,7 +74,8 @@ async def test_one_exchange_is_in_flight_and_the_priorities_hold_across_programs
         first = asyncio.create_task(owner.read(1, 1))
         await asyncio.to_thread(peer.await_requests, 1)
         waiting: list[asyncio.Task[object]] = [
-            asyncio.create_task(one.read(1, 10 + number)) for number, one in enumerate(programs * 2)
+            asyncio.create_task(line.read(1, 10 + number))
+            for number, line in enumerate(programs * 2)
         ]
         waiting.append(asyncio.create_task(backup.write(1, 30, [1])))
         await asyncio.sleep(0.02)
@@ -83,7 +84,7 @@ async def test_one_exchange_is_in_flight_and_the_priorities_hold_across_programs
         order = kinds(peer)
         assert order[:3] == [(3, 1), (6, 40), (6, 30)]
         # a next request that runs into the one before would be read at once with it
-        assert [len(one) for one in peer.bursts] == [8] * len(order)
+        assert [len(burst) for burst in peer.bursts] == [8] * len(order)
 
 
 async def test_a_program_that_asks_for_too_much_takes_no_room_from_the_others(
@@ -100,7 +101,7 @@ async def test_a_program_that_asks_for_too_much_takes_no_room_from_the_others(
         assert (await owner.read(1, 2)).words == (2,)
         await reading
         results = await asyncio.gather(*many, return_exceptions=True)
-        assert sum(isinstance(one, LineBusy) for one in results) == 2
+        assert sum(isinstance(result, LineBusy) for result in results) == 2
 
 
 async def test_abandoned_request_is_not_sent(share: Share) -> None:
@@ -128,7 +129,7 @@ async def test_a_client_sees_counters_devices_frames_and_the_state_of_the_line(
         eventually(lambda: other.device_state(1).answers is True)
         eventually(lambda: other.counters.replies == owner.counters.replies)
         await owner.read(1, 101)
-        eventually(lambda: any(one.data[1:4] == b"\x03\x00\x65" for one in other.trace))
+        eventually(lambda: any(frame.data[1:4] == b"\x03\x00\x65" for frame in other.trace))
 
 
 async def test_a_lost_line_is_reported_to_clients_which_recover_with_it(
@@ -224,7 +225,7 @@ async def test_a_drive_that_another_program_commands_takes_no_write(share: Share
         eventually(lambda: third.facts.claim(1) == "")
         eventually(lambda: owner.facts.commander(1) is not None)
         await third.write(1, 8, [4])
-        assert [one[5] for one in peer.requests if one[1] == 6] == [2, 3, 0, 4]
+        assert [request[5] for request in peer.requests if request[1] == 6] == [2, 3, 0, 4]
 
 
 async def test_of_two_that_claim_at_once_one_is_informed_no(share: Share) -> None:
@@ -291,9 +292,9 @@ async def test_socket_and_lock_are_the_users_alone_and_go_with_the_program(
         lines.open("panel")
         lines.open("watch")
         found = {
-            one.suffix or one.name: stat.S_IMODE(one.stat().st_mode)
+            path.suffix or path.name: stat.S_IMODE(path.stat().st_mode)
             for folder in (tmp_path / "run", tmp_path / "lines")
-            for one in (folder, *folder.iterdir())
+            for path in (folder, *folder.iterdir())
         }
         assert found == {"run": 0o700, "lines": 0o700, ".sock": 0o600, ".lock": 0o600}
         lines.close()
@@ -360,7 +361,7 @@ async def test_the_next_folder_is_taken_where_the_first_takes_no_socket(
         lines = share(peer.path)
         lines.open("panel", place=place)
         assert (await lines.open("watch", place=place).read(1, 4)).words == (4,)
-        assert [one.suffix for one in (tmp_path / "run").iterdir()] == [".sock"]
+        assert [path.suffix for path in (tmp_path / "run").iterdir()] == [".sock"]
 
 
 async def test_a_path_that_is_too_long_for_a_socket_is_none_for_us(
@@ -372,7 +373,7 @@ async def test_a_path_that_is_too_long_for_a_socket_is_none_for_us(
         lines = share(peer.path)
         lines.open("panel", place=place)
         assert (await lines.open("watch", place=place).read(1, 4)).words == (4,)
-        assert [one.suffix for one in folder.iterdir()] == [".sock"]
+        assert [path.suffix for path in folder.iterdir()] == [".sock"]
 
 
 async def test_line_works_unshared_without_socket_folder(share: Share, tmp_path: Path) -> None:

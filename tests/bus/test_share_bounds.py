@@ -80,8 +80,8 @@ def unbounded(form: inspect.Type, where: str) -> Iterator[str]:
         case inspect.CollectionType(item_type=item):
             yield from unbounded(item, f"{where} item")
         case inspect.TupleType(item_types=types) | inspect.UnionType(types=types):
-            for one in types:
-                yield from unbounded(one, where)
+            for type_ in types:
+                yield from unbounded(type_, where)
         case inspect.StructType() | inspect.DataclassType():
             for field in form.fields:
                 yield from unbounded(field.type, f"{form.cls.__name__}.{field.name}")
@@ -115,14 +115,14 @@ def test_stop_count_wraps_and_each_stop_changes_the_total() -> None:
 
 
 def test_stop_count_at_the_wrap_still_news_to_others() -> None:
-    one, other = StopCounts(), StopCounts()
-    for counts in (one, other):
+    stop_counts, other = StopCounts(), StopCounts()
+    for counts in (stop_counts, other):
         for count in (HIGHEST // 3, 2 * HIGHEST // 3, HIGHEST):
             counts.learn({1: {"me": count}})
-    one.give("me", (1,), "the stop key")
-    assert one.of("me", (1,)) == (0,)
-    assert other.learn(one.given) == (1,)
-    assert other.stamp(1) == one.stamp(1)
+    stop_counts.give("me", (1,), "the stop key")
+    assert stop_counts.of("me", (1,)) == (0,)
+    assert other.learn(stop_counts.given) == (1,)
+    assert other.stamp(1) == stop_counts.stamp(1)
 
 
 def test_stop_count_that_others_raised_falls_back_to_its_own_program() -> None:
@@ -162,9 +162,9 @@ async def voided_and_stopped(lines: SharedLines, peer: PtyPeer, stopper: Line, o
     stamp = other.facts.stops.stamp(device)
     stopper.facts.give_stop([device], "the stop key")
     await asyncio.wait_for(stopper.write(device, 1, [STOP], priority=Priority.STOP), timeout=20)
-    eventually(lambda: any(device in one for one in heard))
+    eventually(lambda: any(device in pair for pair in heard))
     leave()
-    assert (device, STOP) in [(one[0], one[5]) for one in peer.requests[seen:]]
+    assert (device, STOP) in [(request[0], request[5]) for request in peer.requests[seen:]]
     assert other.facts.refusal(other.facts.me.id, device, stamp)
     await asyncio.wait_for(other.write(device, 1, [RUN]), timeout=20)
 
@@ -353,12 +353,12 @@ async def test_owner_with_mutated_messages_serves_and_stops(
         owner, other = lines.open("panel"), lines.open("watch")
         await owner.read(1, 1)
         for data in batches(chance.sample(mutants(), 1500)):
-            for one in data:
+            for item in data:
                 with raw(lines) as connection, suppress(OSError):
-                    connection.sendall(greeting + one + NO_MESSAGE)
+                    connection.sendall(greeting + item + NO_MESSAGE)
                     while connection.recv(1 << 16):
                         pass
-            eventually(lambda: [one.name for one in owner.facts.others] == ["watch"], 30)
+            eventually(lambda: [program.name for program in owner.facts.others] == ["watch"], 30)
             await voided_and_stopped(lines, peer, other, owner)
             await voided_and_stopped(lines, peer, owner, other)
     assert "serving a program on the line failed" not in caplog.text
@@ -383,16 +383,16 @@ async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
         server = owner._engine._shared._server  # type: ignore[union-attr]
 
         def say(data: bytes) -> None:
-            for one in server._all():
-                one.writer.write(data)
+            for item in server._all():
+                item.writer.write(data)
 
         # one that lies about the end of a request is believed
         lies = (b"Answer", b"Failed")
-        found = [one for one in mutants() if not any(kind in one[:20] for kind in lies)]
+        found = [mutant for mutant in mutants() if not any(kind in mutant[:20] for kind in lies)]
         for some in batches(chance.sample(found, 500), 10):
             for data in some:
                 in_loop(owner, partial(say, data))
-            eventually(lambda: [one.name for one in owner.facts.others] == ["watch"], 30)
+            eventually(lambda: [program.name for program in owner.facts.others] == ["watch"], 30)
             await voided_and_stopped(lines, peer, other, owner)
     assert other.state.status is LineStatus.CONNECTED
 
@@ -404,8 +404,8 @@ def test_texts_of_other_programs_are_shown_plain_and_not_endless() -> None:
     program = Program("x", "\x1b[31m" + "n" * 100, 7, "", "pts/\x07" + "3" * 100)
     facts.hear_text(1, "stopped\x1b]0;title\x07\n" + "t" * 4000)
     facts.hear_stop((1,), "\u202ekey\r" + "k" * 4000, program)
-    assert [len(one) for one in heard] == [500, 500, 40 + len(" on ") + 40 + len(" (pid 7)")]
-    assert all(one.isprintable() for one in heard)
+    assert [len(item) for item in heard] == [500, 500, 40 + len(" on ") + 40 + len(" (pid 7)")]
+    assert all(item.isprintable() for item in heard)
     assert heard[0].startswith("stopped?]0;title??ttt")
     assert heard[2] == f"?[31m{'n' * 34}… on pts/?{'3' * 34}… (pid 7)"
     assert Program("x", "panel", 7, "", "pts/3").text == "panel on pts/3 (pid 7)"

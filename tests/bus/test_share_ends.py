@@ -51,7 +51,7 @@ def slow_at_77(request: bytes, _count: int) -> Sequence[Step]:
 
 
 def times_sent(peer: PtyPeer, function: int) -> int:
-    return [(one[1], one[3]) for one in peer.requests].count((function, SLOW_REGISTER))
+    return [(request[1], request[3]) for request in peer.requests].count((function, SLOW_REGISTER))
 
 
 async def come(condition: Callable[[], bool]) -> None:
@@ -71,7 +71,7 @@ async def test_the_owners_end_hands_the_line_over_and_reads_are_requested_again(
         await owner.read(1, 1)
         in_flight = asyncio.create_task(other.read(1, SLOW_REGISTER))
         await asyncio.to_thread(peer.await_requests, 2)
-        waiting = [asyncio.create_task(one.read(1, 30)) for one in (other, third)]
+        waiting = [asyncio.create_task(item.read(1, 30)) for item in (other, third)]
         await asyncio.sleep(0.02)
         await asyncio.to_thread(owner.close)
         assert (await in_flight).words == (SLOW_REGISTER,)
@@ -209,8 +209,8 @@ async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
         run.tell("claim 4")
         eventually(lambda: line.facts.commander(4) is not None)
         gone: list[str] = []
-        for one in (line, third):
-            one.facts.on_gone(lambda program: gone.append(program.name))
+        for item in (line, third):
+            item.facts.on_gone(lambda program: gone.append(program.name))
         os.kill(run.process.pid, number)
         os.kill(owner.process.pid, 9)
         eventually(lambda: sorted(gone) == ["panel", "run"])
@@ -283,7 +283,7 @@ async def test_message_of_one_program_costs_others_nothing(share: Share, output:
                 connection.sendall(output)
             for line in (owner, other):
                 assert (await asyncio.wait_for(line.read(1, 5), 10)).words == (5,)
-        eventually(lambda: [one.name for one in owner.facts.others] == ["watch"])
+        eventually(lambda: [program.name for program in owner.facts.others] == ["watch"])
         assert (await other.read(1, 6)).words == (6,)
 
 
@@ -303,7 +303,7 @@ async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Shar
             stop = ask(number=2, kind="WriteOne", fields=write, requested=old, priority=0)
             connection.sendall(stop)
             assert (await asyncio.to_thread(answer_of_kind, connection, Answer)).number == 2
-        assert [one[1] for one in peer.requests] == [3, 6]
+        assert [request[1] for request in peer.requests] == [3, 6]
 
 
 async def test_a_client_that_reads_nothing_is_let_go(
@@ -328,9 +328,9 @@ async def test_a_client_that_was_let_go_comes_back(share: Share) -> None:
         owner, other = lines.open("panel"), lines.open("watch")
         server = owner._engine._shared._server  # type: ignore[union-attr]
         for _ in range(5):
-            in_loop(owner, lambda: [one.writer.transport.abort() for one in server._all()])
+            in_loop(owner, lambda: [item.writer.transport.abort() for item in server._all()])
             await other.read(1, 6)
-            eventually(lambda: [one.name for one in owner.facts.others] == ["watch"])
+            eventually(lambda: [program.name for program in owner.facts.others] == ["watch"])
         eventually(lambda: other.state.status is LineStatus.CONNECTED)
 
 

@@ -24,7 +24,7 @@ RUN, OTHER = 15, 4
 
 def written(peer: PtyPeer) -> list[tuple[int, int]]:
     """Device and value of every single write on the wire."""
-    return [(one[0], one[5]) for one in peer.requests if one[1] == 6]
+    return [(request[0], request[5]) for request in peer.requests if request[1] == 6]
 
 
 async def come(condition: Callable[[], bool]) -> None:

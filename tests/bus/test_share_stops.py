@@ -31,7 +31,7 @@ def slow(request: bytes, _count: int) -> Sequence[Step]:
 
 def written(peer: PtyPeer) -> list[tuple[int, int]]:
     """Device and value of every single write on the wire."""
-    return [(one[0], one[5]) for one in peer.requests if one[1] == 6]
+    return [(request[0], request[5]) for request in peer.requests if request[1] == 6]
 
 
 NOT_ENDED = r"does not answer\. End that program \(kill -9 \d+\)"
@@ -46,7 +46,7 @@ async def send_stop(line: Line, device: int) -> float:
 def stop(line: Line, *devices: int) -> list[asyncio.Task[float]]:
     """What a stop key does: nothing that was meant before goes out, and the stop goes first."""
     line.facts.give_stop(devices, "the stop key")
-    return [asyncio.create_task(look_and_stop(line, one)) for one in devices]
+    return [asyncio.create_task(look_and_stop(line, device)) for device in devices]
 
 
 async def look_and_stop(line: Line, device: int) -> float:
@@ -55,7 +55,7 @@ async def look_and_stop(line: Line, device: int) -> float:
 
 
 def all_know(programs: Sequence[Line], stops: int) -> bool:
-    return all(one.facts.stops.stamp(0) == stops for one in programs)
+    return all(program.facts.stops.stamp(0) == stops for program in programs)
 
 
 async def refused(task: asyncio.Task[float]) -> str:
@@ -73,8 +73,8 @@ async def test_a_stop_discards_pending_work_for_that_drive_and_only_that(
         await programs[0].read(1, 1)
         reading = asyncio.create_task(programs[0].read(1, 1))
         await asyncio.to_thread(peer.await_requests, 2)
-        runs = [asyncio.create_task(one.write(1, 1, [RUN])) for one in programs]
-        others = [asyncio.create_task(one.write(2, 1, [RUN])) for one in programs]
+        runs = [asyncio.create_task(program.write(1, 1, [RUN])) for program in programs]
+        others = [asyncio.create_task(program.write(2, 1, [RUN])) for program in programs]
         await asyncio.sleep(0.03)
         programs[1].facts.give_stop([1], "the stop key")
         stops = [asyncio.create_task(programs[1].write(1, 1, [STOP], priority=Priority.STOP))]
@@ -83,9 +83,9 @@ async def test_a_stop_discards_pending_work_for_that_drive_and_only_that(
         await asyncio.gather(reading, *stops, *others)
         assert written(peer) == [(1, STOP), (2, RUN), (2, RUN), (2, RUN)]
         # what is meant afterwards goes out
-        eventually(lambda: all(one.facts.stops.stamp(1) == 1 for one in programs))
-        for one in programs:
-            await one.write(1, 1, [RUN])
+        eventually(lambda: all(program.facts.stops.stamp(1) == 1 for program in programs))
+        for program in programs:
+            await program.write(1, 1, [RUN])
 
 
 async def test_each_is_reported_a_stop_once_and_by_which_program(share: Share) -> None:
@@ -159,17 +159,17 @@ async def test_a_stop_that_nobody_could_hear_is_heard_on_coming_back(share: Shar
 
 
 def test_counts_only_go_up_and_one_telling_counts_once() -> None:
-    one, other = StopCounts(), StopCounts()
-    one.give("a", (1, 2), "key")
+    counts, other = StopCounts(), StopCounts()
+    counts.give("a", (1, 2), "key")
     other.give("b", (1,), "key")
-    assert other.learn(one.given) == (1, 2)
-    assert other.learn(one.given) == ()
+    assert other.learn(counts.given) == (1, 2)
+    assert other.learn(counts.given) == ()
     assert (other.stamp(1), other.stamp(2), other.stamp(0)) == (2, 1, 3)
     # what the owner tells replaces all but the own count
-    assert one.replace(other.given, "a") == (1,)
-    one.give("a", (1,), "key")
-    assert one.replace(other.given, "a") == ()
-    assert one.stamp(1) == 3
+    assert counts.replace(other.given, "a") == (1,)
+    counts.give("a", (1,), "key")
+    assert counts.replace(other.given, "a") == ()
+    assert counts.stamp(1) == 3
     # a program that left keeps its count without its name
     other.fold("a")
     assert other.given == {1: {"b": 1, "": 1}, 2: {"": 1}}
@@ -223,7 +223,7 @@ async def test_a_stop_that_a_frozen_owner_has_kept_is_sent_by_the_next(share: Sh
             with pytest.raises(LineLost, match=NOT_ENDED):
                 await send_stop(other, 2)
             server = owner._engine._shared._server  # type: ignore[union-attr]
-            in_loop(owner, lambda: [one.writer.transport.abort() for one in server._all()])
+            in_loop(owner, lambda: [item.writer.transport.abort() for item in server._all()])
             closing = asyncio.create_task(asyncio.to_thread(owner.close))
         await closing
         await asyncio.to_thread(eventually, lambda: len(written(peer)) == 2)
@@ -241,7 +241,9 @@ async def test_the_look_before_a_stop_fails_so_that_the_stop_is_given(share: Sha
             with pytest.raises(NoAnswer, match=NOT_ENDED):
                 await other.read(1, 3, priority=Priority.STOP)
         assert (await other.read(1, 4)).words == (4,)
-        assert [one[3] for one in peer.requests if one[1] == 3 and one[3] != 1] == [4]
+        assert [request[3] for request in peer.requests if request[1] == 3 and request[3] != 1] == [
+            4
+        ]
 
 
 async def test_the_owner_hears_a_stop_of_a_program_that_is_gone_again(share: Share) -> None:
@@ -297,7 +299,7 @@ async def test_a_command_that_waited_for_a_frozen_owner_is_too_old_to_be_sent(
         owner, other = lines.open("run"), lines.open("remote")
         await owner.read(1, 1)
         with frozen(owner):
-            runs = [asyncio.create_task(one.write(1, 1, [RUN])) for one in (owner, other)]
+            runs = [asyncio.create_task(line.write(1, 1, [RUN])) for line in (owner, other)]
             reading = asyncio.create_task(other.read(1, 7))
             await asyncio.sleep(2.3)
         for run in runs:
@@ -317,7 +319,7 @@ async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share
             await asyncio.sleep(1.3)
         await other.read(1, 1)
         await asyncio.sleep(0.15)
-        assert [one for one in output if "does not answer" in one] == []
+        assert [text for text in output if "does not answer" in text] == []
 
 
 async def test_an_answer_that_waited_for_a_stopped_program_is_requested_again(

@@ -34,7 +34,7 @@ def never_echoes(request: bytes, count: int) -> Sequence[Step]:
 
 
 def functions(peer: PtyPeer) -> list[int]:
-    return [one[1] for one in peer.requests]
+    return [request[1] for request in peer.requests]
 
 
 async def killed_while_it_waits(owner: OtherProgram, peer: PtyPeer) -> float:
@@ -142,14 +142,14 @@ async def test_a_stop_waits_for_one_request_of_a_proof_at_most(open_line: OpenLi
         await line.write(2, 1, [0], priority=Priority.STOP)
         # nor does a healthy drive wait for a silent one
         await line.read(2, OTHER)
-        assert [one[0] for one in peer.requests][:2] == [1, 2]
-        assert [one[0] for one in peer.requests].count(1) == 1
+        assert [data[0] for data in peer.requests][:2] == [1, 2]
+        assert [data[0] for data in peer.requests].count(1) == 1
         reading.cancel()
 
 
 def writes(peer: PtyPeer) -> list[int]:
     """The words that were written, in their order."""
-    return [int.from_bytes(one[4:6], "big") for one in peer.requests if one[1] == 6]
+    return [int.from_bytes(request[4:6], "big") for request in peer.requests if request[1] == 6]
 
 
 async def test_stop_is_repeated_when_line_is_quiet(open_line: OpenLine) -> None:
@@ -162,7 +162,7 @@ async def test_stop_is_repeated_when_line_is_quiet(open_line: OpenLine) -> None:
         assert time.monotonic() < until
         await run
         assert writes(peer) == [0, 0, 15], "before what starts the motor again"
-        times = [at for at, one in zip(sent(line), functions(peer), strict=True) if one == 6]
+        times = [at for at, number in zip(sent(line), functions(peer), strict=True) if number == 6]
         assert times[0] < until - 0.3 < until - 0.1 < times[1]
 
 
@@ -206,4 +206,4 @@ async def test_stop_of_one_drive_passes_repeat_of_another(open_line: OpenLine) -
         before = len(peer.requests)
         await line.write(2, 1, [0], priority=Priority.STOP)
         # one of them may have been on the line
-        assert 2 in [one[0] for one in peer.requests[before : before + 2]]
+        assert 2 in [request[0] for request in peer.requests[before : before + 2]]

@@ -50,7 +50,7 @@ def test_two_drives_are_whole_and_nothing_is_written(tmp_path: Path) -> None:
     assert set(report["missing"]) == {"screens", "log.txt"}
     for device, family in ((2, "atv71"), (3, "atv312")):
         folder = f"drive-{device}"
-        why, counts = (json.loads(files[f"{folder}/{one}.json"]) for one in ("why", "counters"))
+        why, counts = (json.loads(files[f"{folder}/{text}.json"]) for text in ("why", "counters"))
         for document in (why, counts):
             document_of(json.dumps(document))
             assert (document["device"], document["profile"]) == (device, family)
@@ -61,7 +61,7 @@ def test_two_drives_are_whole_and_nothing_is_written(tmp_path: Path) -> None:
         assert files[f"{folder}/report.md"].startswith(b"# ")
         profile = packaged_folder() / f"{family}.toml"
         assert files[f"profiles/{family}.toml"].decode() == profile.read_text("utf-8")
-    assert [one["faults"] for one in json.loads(files["profiles/check.json"])] == [[], []]
+    assert [load["faults"] for load in json.loads(files["profiles/check.json"])] == [[], []]
     assert json.loads(files["versions.json"])["libraries"]["pymodbus"]
     assert files["frames.pcapng"][:4] == b"\x0a\x0d\x0d\x0a"
     readme = files["README.txt"].decode()
@@ -169,7 +169,7 @@ def test_file_is_private_and_replaced_by_force_only(tmp_path: Path) -> None:
     ended(0, "bundle", "sim:atv312", "--output", file, "--force")
     assert zipfile.is_zipfile(file)
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
-    assert [one.name for one in tmp_path.glob("*.part")] == []
+    assert [path.name for path in tmp_path.glob("*.part")] == []
     assert "no folder" in ended(2, "bundle", "sim:atv312", "--output", tmp_path / "x" / "a").stderr
 
 
@@ -188,4 +188,4 @@ def test_interrupted_bundle_leaves_no_file(tmp_path: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr("tui.session.bundle.work.collect_parts", interrupted)
     ended(130, "bundle", "sim:atv312", "--output", tmp_path / "a.zip")
-    assert [one for one in tmp_path.iterdir() if one.suffix in (".zip", ".part")] == []
+    assert [path for path in tmp_path.iterdir() if path.suffix in (".zip", ".part")] == []

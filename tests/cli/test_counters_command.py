@@ -17,12 +17,13 @@ def test_a_good_line_ends_with_0() -> None:
     assert reported["test"] == {"frames": 7, "answered": 7}
     assert reported["agree"] is True
     assert reported["differences"] == []
-    names = {one["name"]: one for one in reported["drive"]}
+    names = {item["name"]: item for item in reported["drive"]}
     assert names["function 8"]["counts_this_line"] is True
     assert names["Modbus network"]["counts_this_line"] is True
     assert names["Keypad port"]["frames"] == 0
     assert (
-        sum(one["count"] for one in reported["ours"]["turnarounds"]) == reported["ours"]["replies"]
+        sum(item["count"] for item in reported["ours"]["turnarounds"])
+        == reported["ours"]["replies"]
     )
     assert reported["since_opened"]["frames"] > reported["ours"]["frames"]
     minutes = reported["last_minute"]

@@ -31,9 +31,9 @@ def documents(text: str) -> list[dict[str, Any]]:
     except ValueError:
         whole = [json.loads(line) for line in text.splitlines()]
     found = whole if isinstance(whole, list) else [whole]
-    for one in found:
-        form = type(document_of(json.dumps(one)))
-        assert one["schema"] == 1
+    for item in found:
+        form = type(document_of(json.dumps(item)))
+        assert item["schema"] == 1
         SEEN.add(form.__name__)
     return found
 
@@ -110,14 +110,14 @@ def test_printed_documents_fit_the_schema(name: str, folder: Path) -> None:
     status, words, form = RUNS[name]
     typed = [word.replace("FOLDER", str(folder)) for word in words]
     reported = documents(ended(status, *typed, "--json").stdout)
-    assert all(one["command"] == words[0] for one in reported)
+    assert all(row["command"] == words[0] for row in reported)
     assert not form or form in SEEN
 
 
 def test_a_motor_that_runs_and_its_stop() -> None:
     done = drivepanel("run", *DRIVE, "--reference", "20Hz", "--for", "2", "--arm", "--json")
     assert done.returncode == 0, done.stderr
-    events = [one["event"] for one in documents(done.stdout)]
+    events = [document["event"] for document in documents(done.stdout)]
     assert {"reference", "order", "state", "stopping", "stopped"} <= set(events)
 
 
@@ -149,9 +149,9 @@ async def test_a_drive_in_fault() -> None:
         fault_status.provoke(opened, "ObF")
         status = await fault_status.status_of(opened, "atv71")
     reported = {"schema": 1, "command": "status", **status_json("demo", status)}
-    (one,) = documents(json.dumps(reported))
-    assert one["fault"]["look_at"]
-    assert one["fault"]["reset"]
+    (row,) = documents(json.dumps(reported))
+    assert row["fault"]["look_at"]
+    assert row["fault"]["reset"]
 
 
 def test_a_simulated_line() -> None:

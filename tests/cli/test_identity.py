@@ -37,7 +37,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 def test_another_drive_is_reported_and_not_written_exits_with_5(
     atv71: str, command: str, tmp_path: object
 ) -> None:
-    words = [one.format(line=atv71, folder=tmp_path) for one in COMMANDS[command]]
+    words = [text.format(line=atv71, folder=tmp_path) for text in COMMANDS[command]]
     before = [held(atv71, address) for address in (CMD, ACC)]
     output = refused(5, *words, "-p", "atv312")
     assert "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312." in output

@@ -33,7 +33,7 @@ def journal() -> Path:
         replace(entry(2), time=late.isoformat(), line="tcp:host:502", device=2, why="by \x1b[2J"),
         replace(entry(3), time=late.isoformat(), kind="fault", code="ObF", new="Overbraking"),
     ]
-    file.write_text("".join(json.dumps(asdict(one)) + "\n" for one in entries) + '{"ha\x1b]0;lf')
+    file.write_text("".join(json.dumps(asdict(item)) + "\n" for item in entries) + '{"ha\x1b]0;lf')
     return file
 
 
@@ -71,7 +71,7 @@ def test_every_kind_of_entry_has_its_line_and_its_form(kind: Any, journal: Path)
 def test_as_json(journal: Path) -> None:
     reported = json.loads(run(0, "journal", "--json", "--drive", "1"))
     assert reported["journal"] == str(journal)
-    assert [one["new_raw"] for one in reported["entries"]] == [1, 3]
+    assert [item["new_raw"] for item in reported["entries"]] == [1, 3]
     assert set(reported["entries"][0]) == set(asdict(entry(1)))
     assert reported["damaged"] == [{"file": str(journal), "line": 4, "text": '{"ha\x1b]0;lf'}]
 

@@ -93,13 +93,13 @@ def test_identify() -> None:
 
 def test_profiles() -> None:
     listed = reported("profiles")
-    assert [set(one) for one in listed] == [
+    assert [set(item) for item in listed] == [
         {*HEAD, "id", "name", "vendor", "parameters", "own", "file", "remark"}
     ] * len(listed)
     packaged = {path.stem for path in library.packaged_folder().glob("*.toml")}
-    assert {one["id"] for one in listed} == packaged
-    for one in listed:
-        assert one["parameters"] == len(library.load(one["id"]).parameters)
+    assert {item["id"] for item in listed} == packaged
+    for item in listed:
+        assert item["parameters"] == len(library.load(item["id"]).parameters)
 
 
 def test_one_profile() -> None:

@@ -52,7 +52,7 @@ def test_it_is_reported_which_drive_how_long_what_follows_and_what_to_do(
     atv21: str, command: str, tmp_path: object
 ) -> None:
     words = (READING | OTHERS)[command]
-    done = ended(0, *(one.format(line=atv21, folder=tmp_path) for one in words))
+    done = ended(0, *(word.format(line=atv21, folder=tmp_path) for word in words))
     assert (
         "Device 1, Altivar 21: its communication timeout F803 runs. After 3 s without a request:"
         " Switches the output off and trips with Err5; the motor coasts.\n"
@@ -63,7 +63,7 @@ def test_it_is_reported_which_drive_how_long_what_follows_and_what_to_do(
 
 @pytest.mark.parametrize("command", READING)
 def test_one_object_of_json_everywhere(atv21: str, command: str) -> None:
-    words = [one.format(line=atv21) for one in READING[command]]
+    words = [text.format(line=atv21) for text in READING[command]]
     reported = json.loads(run(0, *words, "--json"))
     assert reported["timeout"] == ERR5
     if command == "status":

@@ -192,12 +192,12 @@ def test_a_list_of_ports_tells_what_each_adapter_is_called_for_good(
     monkeypatch.setattr(
         "tui.bus.transport.ports.list_ports", lambda: [PortInfo(p, "adapter") for p in ports]
     )
-    one, two = json.loads(run(0, "ports", "--json"))
-    assert one["lasting"].endswith("by-id/usb-FTDI_6001_A5-if00-port0")
-    assert one["adapter"] == "0403:6001 A5"
+    item, two = json.loads(run(0, "ports", "--json"))
+    assert item["lasting"].endswith("by-id/usb-FTDI_6001_A5-if00-port0")
+    assert item["adapter"] == "0403:6001 A5"
     assert two["lasting"].endswith("by-path/pci-usb-1.2-port0")
     text = run(0, "ports")
-    assert f"always {one['lasting']}" in text
+    assert f"always {item['lasting']}" in text
     assert text.count("without a serial number of its own") == 1
 
 
@@ -316,7 +316,7 @@ def test_open_line_shows_the_replies_of_its_last_minute(monkeypatch: pytest.Monk
     held = [Owner(1, Program("k", "keeper", 7), "", line=line) for line in owners]
     monkeypatch.setattr(share_place, "owners", lambda: held)
     monkeypatch.setattr(beside, "line_look", lambda owner: owners[owner.line])
-    minutes = [one["last_minute"] for one in json.loads(run(0, "lines", "--json"))["open"]]
+    minutes = [load["last_minute"] for load in json.loads(run(0, "lines", "--json"))["open"]]
     assert minutes[1:] == [None, None]
     assert (minutes[0]["share"], minutes[0]["good"], minutes[0]["lost"]) == (0.95, 19, 1)
     text = run(0, "lines")

@@ -49,7 +49,9 @@ def reported(*arguments: str | Path) -> list[dict[str, Any]]:
 def plc(*requests: str, profile: str = "atv71") -> Iterator[PlcOnLine]:
     """A master that asks a simulated drive at 2 these requests, as soon as it is started."""
     with Simulation([DriveSpec(profile, 2)]) as simulation:
-        master = PlcOnLine(simulation, [bytes.fromhex(one) for one in requests], pause=0.005)
+        master = PlcOnLine(
+            simulation, [bytes.fromhex(request) for request in requests], pause=0.005
+        )
         try:
             yield master
         finally:
@@ -73,15 +75,21 @@ def test_a_line_of_text_for_each_exchange_and_a_summary() -> None:
 
 def test_an_object_for_each_exchange_and_a_summary() -> None:
     *exchanges, summary = reported(TWO, "--for", "0.8")
-    assert {one["event"] for one in exchanges} == {"exchange"}
-    read = next(one for one in exchanges if one["device"] == 1 and "RFR" in one["values"])
+    assert {exchange["event"] for exchange in exchanges} == {"exchange"}
+    read = next(
+        exchange
+        for exchange in exchanges
+        if exchange["device"] == 1 and "RFR" in exchange["values"]
+    )
     assert (read["function"], read["answer"], read["how"]) == (3, "ok", "identified")
     assert read["values"]["RFR"] == {
         "address": 3202, "raw": 0, "value": 0.0, "unit": "Hz", "text": "0.0", "written": False,
     }  # fmt: skip
-    written = next(one for one in exchanges if one["device"] == 2 and one["function"] == 6)
+    written = next(
+        exchange for exchange in exchanges if exchange["device"] == 2 and exchange["function"] == 6
+    )
     assert written["values"]["LFr"]["written"] is True
-    assert [one["device"] for one in summary["drives"]] == [1, 2]
+    assert [item["device"] for item in summary["drives"]] == [1, 2]
     first = summary["drives"][0]
     assert first["commanded"] is True
     assert first["timeout"]["known"] == "factory"
@@ -92,13 +100,13 @@ def test_an_object_for_each_exchange_and_a_summary() -> None:
 
 def test_profiles_of_all_drives_and_of_one() -> None:
     *exchanges, _ = reported(TWO, "--for", "0.5", "-p", "atv31", "-p", "2=atv71")
-    taken = {(one["device"], one["profile"], one["how"]) for one in exchanges}
+    taken = {(exchange["device"], exchange["profile"], exchange["how"]) for exchange in exchanges}
     assert taken == {(1, "atv31", "named"), (2, "atv71", "named")}
 
 
 def test_summaries_on_the_way() -> None:
     found = reported(TWO, "--for", "2.5", "--every", "1")
-    assert [one["event"] for one in found].count("summary") == 3
+    assert [row["event"] for row in found].count("summary") == 3
 
 
 def test_a_file_of_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
@@ -107,10 +115,10 @@ def test_a_file_of_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
     found = packets(path)
     assert len(found) == summary["frames"]
     mbap = [packet[40:] for packet in found]
-    assert {one[6] for one in mbap} == {1, 2}
-    whole = [one for one in exchanges if one["answer"] == "ok"]
-    assert [one[7:].hex() for one in mbap[: 2 * len(whole)]] == [
-        pdu for one in whole for pdu in (one["request"], one["reply"])
+    assert {data[6] for data in mbap} == {1, 2}
+    whole = [exchange for exchange in exchanges if exchange["answer"] == "ok"]
+    assert [data[7:].hex() for data in mbap[: 2 * len(whole)]] == [
+        pdu for row in whole for pdu in (row["request"], row["reply"])
     ]
 
 
@@ -184,12 +192,14 @@ def test_silence_and_refusals_of_a_plc_cycle() -> None:
     with plc(*CYCLE, NOBODY) as master:
         master.start()
         *exchanges, summary = reported(master.path, "--for", "2")
-    answers = {(one["device"], one["function"], one["answer"]) for one in exchanges}
+    answers = {
+        (exchange["device"], exchange["function"], exchange["answer"]) for exchange in exchanges
+    }
     assert {(2, 3, "ok"), (2, 6, "ok"), (2, 3, "exception"), (9, 3, "none")} <= answers
     two, nine = summary["drives"]
     assert two["exceptions"] == {"2": two["exceptions"]["2"]}
     assert (nine["answered"], nine["unanswered"] > 2) == (0, True)
-    refusal = next(one for one in exchanges if one["answer"] == "exception")
+    refusal = next(exchange for exchange in exchanges if exchange["answer"] == "exception")
     assert refusal["exception"] == 2
     assert refusal["values"] == {}
     assert refusal["asked"] == ["1"]
@@ -217,7 +227,9 @@ def test_the_name_of_a_line_names_the_profile_of_its_drive() -> None:
         f'[lines.fan]\nline = "{TWO}"\ndevice = 2\nprofile = "atv71"\n', encoding="utf-8"
     )
     *exchanges, _ = reported("fan", "--for", "0.5")
-    assert {(one["device"], one["profile"], one["how"]) for one in exchanges} == {
+    assert {
+        (exchange["device"], exchange["profile"], exchange["how"]) for exchange in exchanges
+    } == {
         (1, "atv71", "identified"),
         (2, "atv71", "named"),
     }

@@ -100,8 +100,8 @@ def test_uncertain_value_is_not_a_number_and_taught_scale_is_marked() -> None:
     seen = cycle(small_drive(), RFR=499, THD=50)
     changed = {"RFR": {"unsure": True}, "THD": {"taught": True}}
     readings = {
-        code: replace(one, value=replace(one.value, **changed[code]))  # type: ignore[type-var]
-        for code, one in seen.readings.items()
+        code: replace(reading, value=replace(reading.value, **changed[code]))  # type: ignore[type-var]
+        for code, reading in seen.readings.items()
     }
     text = text_of(line_of(drive_of(replace(seen, readings=readings))))
     assert "drivepanel_value_hertz" not in text
@@ -111,10 +111,10 @@ def test_uncertain_value_is_not_a_number_and_taught_scale_is_marked() -> None:
 @pytest.mark.parametrize("contact", get_args(Contact))
 def test_result_of_the_last_requests_is_one_of_five(contact: Contact) -> None:
     seen = samples(line_of(DriveStatus(2, error="Why.", contact=contact)))
-    contacts = [one for one in seen if one.startswith("drivepanel_drive_contact")]
+    contacts = [text for text in seen if text.startswith("drivepanel_drive_contact")]
     assert len(contacts) == len(get_args(Contact))
     expected = f'drivepanel_drive_contact{{{WHERE},contact="{contact}"}} 1'
-    assert [one for one in contacts if one.endswith(" 1")] == [expected]
+    assert [text for text in contacts if text.endswith(" 1")] == [expected]
     assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen  # no cycle was read
 
 
@@ -134,7 +134,7 @@ def test_cycle_time_is_published_with_the_wished_one() -> None:
 def test_a_drive_that_was_never_found_is_down_and_nothing_else() -> None:
     seen = samples(line_of(DriveStatus(2, error="Nobody answers.")))
     assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen
-    assert not [one for one in seen if "value" in one or "info{line" in one]
+    assert not [text for text in seen if "value" in text or "info{line" in text]
 
 
 def test_every_line_has_the_form_and_every_metric_its_type_once() -> None:
@@ -152,7 +152,7 @@ def test_every_line_has_the_form_and_every_metric_its_type_once() -> None:
 
 
 def test_every_unit_of_every_profile_makes_a_name() -> None:
-    units = {p.unit for one in library.listings() for p in library.load(one.id).parameters}
+    units = {p.unit for listing in library.listings() for p in library.load(listing.id).parameters}
     for unit in units:
         name, factor = value_metric(unit)
         assert re.fullmatch(r"[a-z][a-z_0-9]*", name)

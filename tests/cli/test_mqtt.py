@@ -51,7 +51,7 @@ def test_bad_reading_is_marked() -> None:
     (text,) = drive_messages("plant", [line_of(seen)]).values()
     reported = json.loads(text)
     assert (reported["state"], reported["error"]) == (None, "No answer.")
-    assert {one["quality"] for one in reported["values"].values()} == {"stale"}
+    assert {item["quality"] for item in reported["values"].values()} == {"stale"}
     (text,) = drive_messages("plant", [line_of(DriveStatus(2, error="Nobody."))]).values()
     assert json.loads(text) | {"error": "Nobody.", "values": {}, "profile": None} == json.loads(
         text

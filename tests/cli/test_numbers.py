@@ -24,8 +24,8 @@ def numeric_options() -> Iterator[tuple[str, click.Parameter]]:
             command = main.get_command(context, name)
             assert command is not None
             subcommands = getattr(command, "commands", {})
-            for one in (command, *subcommands.values()):
-                for parameter in one.params:
+            for subcommand in (command, *subcommands.values()):
+                for parameter in subcommand.params:
                     if isinstance(
                         parameter.type,
                         click.types.FloatParamType | click.types.IntParamType,

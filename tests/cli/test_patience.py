@@ -21,7 +21,7 @@ def line_to(link: Link) -> Any:
 
 def test_it_is_longer_on_a_slow_line() -> None:
     waits = [patience(line_to(SerialLink("x", baud, "8E1")), 3.0) for baud in (19200, 9600, 1200)]
-    assert [round(one, 1) for one in waits] == [3.7, 4.4, 14.0]
+    assert [round(wait, 1) for wait in waits] == [3.7, 4.4, 14.0]
     assert patience(line_to(TcpLink("host")), 3.0) == 3.0
 
 

@@ -40,7 +40,7 @@ class Bench:
 
     def sight(self, device: int) -> DriveStatus:
         seen = self.plant.sight(time.monotonic())
-        return next(one for one in seen.drives if one.device == device)
+        return next(drive for drive in seen.drives if drive.device == device)
 
     def good(self, device: int) -> bool:
         seen = self.sight(device)
@@ -107,18 +107,18 @@ async def test_line_that_is_full_is_reported_once_until_it_is_not(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(drives, "RATE_LOOK_INTERVAL", 0.01)
-    one = bench.plant.drives[0]
-    await wait_for(lambda: one.cycle is not None)
-    assert one.cycle is not None
+    drive = bench.plant.drives[0]
+    await wait_for(lambda: drive.cycle is not None)
+    assert drive.cycle is not None
     slow = PlantDrive(bench.opened, Target(LINE, HERE, None), (), 1.0, lambda: None)
-    slow.cycle = replace(one.cycle, error="", period=5.8, wished=1.0)
+    slow.cycle = replace(drive.cycle, error="", period=5.8, wished=1.0)
     capsys.readouterr()
     task = asyncio.create_task(PlantLine("fan", bench.opened, (slow,)).report_rate())
     await asyncio.sleep(0.1)
     slow.cycle = replace(slow.cycle, period=1.0)
     await asyncio.sleep(0.1)
     task.cancel()
-    lines = [one for one in capsys.readouterr().err.splitlines() if "fan" in one]
+    lines = [line for line in capsys.readouterr().err.splitlines() if "fan" in line]
     assert lines == [
         "drivepanel: fan: a cycle takes up to 5.8 s: the line is full.",
         "drivepanel: fan: the cycle time is kept again.",
@@ -135,6 +135,6 @@ async def test_a_drive_that_was_long_silent_is_requested_again_who_it_is(
     await wait_for(lambda: not bench.good(HERE))
     seen = bench.sight(HERE).cycle
     assert seen is not None
-    assert {str(one.quality) for one in seen.readings.values()} <= {"stale", "bad"}
+    assert {str(reading.quality) for reading in seen.readings.values()} <= {"stale", "bad"}
     bench.simulation.drive(HERE).power_on()
     await wait_for(lambda: bench.good(HERE) and bench.sight(HERE).session is not first)

@@ -63,7 +63,7 @@ def line_of(*specs: DriveSpec) -> Iterator[str]:
 
 def events(text: str, kind: str) -> list[dict[str, Any]]:
     """The documents of one kind of event, each of which fits the schema."""
-    return [one for one in documents(text) if one.get("event") == kind]
+    return [document for document in documents(text) if document.get("event") == kind]
 
 
 def test_answering_drive_is_reported_with_certainty() -> None:
@@ -120,7 +120,7 @@ def test_drive_with_line_timeout_is_named_before_first_request() -> None:
     assert {"profile": "atv21", "name": "Altivar 21", "timeout": "F803", "sure": True} in reported[
         "families"
     ]
-    assert "atv71" not in {one["profile"] for one in reported["families"]}
+    assert "atv71" not in {item["profile"] for item in reported["families"]}
 
 
 @pytest.mark.parametrize("options", [(), ("--all-settings", "--yes")], ids=["one", "all"])
@@ -253,13 +253,13 @@ def test_other_settings_are_tried_and_what_hears_two_is_reported_once() -> None:
     with line_of(DriveSpec("atv71", 1), SLOW) as line:
         text = ended(0, "scan", line, "--addresses", "1,4", "--all-settings", "--json").stdout
     hits = events(text, "hit")
-    assert [(one["device"], one["baud"], one["format"]) for one in hits] == [
+    assert [(hit["device"], hit["baud"], hit["format"]) for hit in hits] == [
         (1, 19200, "8E1"),
         (4, 9600, "8E1"),
     ]
     (end,) = events(text, "ended")
     # a pseudo-terminal has no parity: what differs in nothing else is tried once
-    assert [(one["baud"], one["format"]) for one in end["settings"]] == [
+    assert [(item["baud"], item["format"]) for item in end["settings"]] == [
         (19200, "8E1"),
         (19200, "8N2"),
         (9600, "8E1"),
@@ -273,11 +273,11 @@ def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyP
     with PtyPeer(silent) as peer:
         done = invoked("scan", peer.path, "--addresses", "1", "--all-settings", "--json")
     (reported,) = events(done.stdout, "slow")
-    assert [one["baud"] for one in reported["settings"]] == [600, 300]
+    assert [item["baud"] for item in reported["settings"]] == [600, 300]
     text = "Left are 300 and 600 baud: 1 s more, for Powerdrive, Proxidrive and Varmeca 33/34 alone"
     assert text in done.stderr
     (end,) = events(done.stdout, "ended")
-    assert [one["baud"] for one in end["settings"]] == [19200, 9600, 600, 300]
+    assert [item["baud"] for item in end["settings"]] == [19200, 9600, 600, 300]
 
 
 def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() -> None:
@@ -289,7 +289,7 @@ def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() 
         assert "Device 1, Altivar 21" in end["held_back"]
         assert "--yes" in held.stderr
         text = ended(0, *requested, "--yes").stdout
-        assert [one["device"] for one in events(text, "hit")] == [1, 4]
+        assert [event["device"] for event in events(text, "hit")] == [1, 4]
 
 
 def test_a_line_that_others_use_is_not_taken_for_other_settings() -> None:
@@ -354,6 +354,6 @@ def test_drives_are_held_while_the_person_decides() -> None:
             os.write(near, b"n\n")
             out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
-    (end,) = (one for one in map(json.loads, out.splitlines()) if one.get("event") == "ended")
+    (end,) = (load for load in map(json.loads, out.splitlines()) if load.get("event") == "ended")
     assert end["held_back"] == "No other setting is tried."
     assert len(end["settings"]) == 1

@@ -122,13 +122,13 @@ def test_a_name_brings_its_drive_and_the_profiles_of_its_line() -> None:
 @pytest.mark.usefixtures("settings")
 def test_drives_are_read_by_their_profiles() -> None:
     (pump,) = served_lines(["pump@1,2"])
-    assert [(one.device, one.profile_id) for one in read_drives(pump, ())] == [
+    assert [(drive.device, drive.profile_id) for drive in read_drives(pump, ())] == [
         (1, None),
         (2, "powerdrive"),
     ]
     assert "Write bare@1,2" in refused(2, "serve", "pump", "bare", "--metrics", ":1")
     (simulated,) = served_lines(["sim:atv71@1,atv31@4"])
-    assert [one.device for one in read_drives(simulated, (1, 4))] == [1, 4]
+    assert [drive.device for drive in read_drives(simulated, (1, 4))] == [1, 4]
 
 
 @pytest.mark.usefixtures("settings")

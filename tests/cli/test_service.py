@@ -33,10 +33,10 @@ def service(systemd: socket.socket, **more: str) -> Service:
 
 
 def test_ready_and_stopping_are_reported(systemd: socket.socket) -> None:
-    one = service(systemd)
-    one.ready("sim:atv71\nMAINPID=1")
+    item = service(systemd)
+    item.ready("sim:atv71\nMAINPID=1")
     assert systemd.recv(500) == b"READY=1\nSTATUS=sim:atv71 MAINPID=1"
-    one.stopping()
+    item.stopping()
     assert systemd.recv(500).startswith(b"STOPPING=1\n")
 
 
@@ -61,8 +61,8 @@ def test_nothing_is_reported_to_nobody(tmp_path: Path) -> None:
 
 async def test_signs_of_life_end_where_the_line_stands_still(systemd: socket.socket) -> None:
     alive = True
-    one = service(systemd, WATCHDOG_USEC="60000")
-    task = asyncio.create_task(one.watch(lambda: alive))
+    item = service(systemd, WATCHDOG_USEC="60000")
+    task = asyncio.create_task(item.watch(lambda: alive))
     for _ in range(3):
         assert await asyncio.to_thread(systemd.recv, 500) == b"WATCHDOG=1"
     alive = False
@@ -94,7 +94,7 @@ def test_the_unit_says_what_the_program_does() -> None:
 def test_the_unit_lets_the_socket_be_handed_to_its_group() -> None:
     """A call that systemd does not let through killed the program before it was ready."""
     lines = (UNITS / "drivepanel.service").read_text("utf-8").splitlines()
-    filters = [one.partition("=")[2] for one in lines if one.startswith("SystemCallFilter=")]
+    filters = [line.partition("=")[2] for line in lines if line.startswith("SystemCallFilter=")]
     # @chown is one of @privileged; what comes later counts
     assert filters.index("@chown") > filters.index("~@privileged @resources")
     assert "SystemCallErrorNumber=EPERM" in lines

@@ -159,9 +159,11 @@ def test_two_backups_around_a_run_are_the_same_but_for_their_time(tmp_path: Path
         run(0, "backup", line, tmp_path / "b", "-d", "2")
         run(0, "backup", line, tmp_path / "all-b", "-d", "2", "--all")
     a, b = ((tmp_path / name).read_text("utf-8").splitlines() for name in "ab")
-    assert [one for one, two in zip(a, b, strict=True) if one != two and "time" not in one] == []
+    assert [
+        text for text, two in zip(a, b, strict=True) if text != two and "time" not in text
+    ] == []
     a, b = ((tmp_path / f"all-{name}").read_text("utf-8").splitlines() for name in "ab")
-    assert [one for one, two in zip(a, b, strict=True) if one != two and "time" not in one]
+    assert [text for text, two in zip(a, b, strict=True) if text != two and "time" not in text]
 
 
 def test_a_backup_on_standard_output(line: str, tmp_path: Path) -> None:

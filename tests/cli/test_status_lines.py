@@ -28,8 +28,8 @@ def named() -> Iterator[tuple[str, str]]:
 def listed(text: str) -> list[dict[str, Any]]:
     """The list of an output, whose documents fit the schema."""
     found: list[dict[str, Any]] = json.loads(text)
-    for one in found:
-        document_of(json.dumps(one))
+    for row in found:
+        document_of(json.dumps(row))
     return found
 
 
@@ -37,7 +37,7 @@ def test_drives_are_reported_with_their_lines_in_order(named: tuple[str, str]) -
     pump, fan = named
     reported = listed(run(0, "status", "pump@2,1", "fan", "--json"))
     drives = [(pump, 2, "atv312"), (pump, 1, "atv71"), (fan, 5, "atv71")]
-    assert [(one["line"], one["device"], one["profile"]) for one in reported] == drives
+    assert [(row["line"], row["device"], row["profile"]) for row in reported] == drives
     text = run(0, "status", "pump@2,1", "fan").splitlines()
     assert [line for line in text if line.endswith(":")] == [
         "pump  device 2:", "pump  device 1:", "fan  device 5:",
@@ -66,7 +66,7 @@ def test_a_line_that_is_not_there_hides_no_other(
 
 def test_a_drive_that_is_not_there_hides_no_other(named: tuple[str, str]) -> None:
     done = ended(3, "status", "pump@9,1", "fan", "--json")
-    assert [one.get("profile") for one in listed(done.stdout)] == [None, "atv71", "atv71"]
+    assert [row.get("profile") for row in listed(done.stdout)] == [None, "atv71", "atv71"]
     assert "drivepanel: pump: Device 9 did not answer" in done.stderr
     assert "drivepanel: pump: No answer at 9." in ended(
         3, "status", "pump@9", "fan", "--all", "--addresses", "5"

@@ -81,8 +81,8 @@ def test_stop_of_a_guessed_family_reports_not_stopped(way: tuple[str, ...]) -> N
         assert "Device 1, " not in done.stdout
         assert ("Device 2, Altivar 71: stopped." in done.stdout) is ("2" in way)
         found = documents(ended(4, "stop", line, *way, "--json").stdout)
-        one = next(document for document in found if document["device"] == 1)
-        assert (one["profile"], one["stopped"], one["status"]) == (None, False, 4)
+        row = next(document for document in found if document["device"] == 1)
+        assert (row["profile"], row["stopped"], row["status"]) == (None, False, 4)
         named = ended(0, "stop", line, *way, "-p", "powerdrive")
         assert "Device 1, Powerdrive: stopped." in named.stdout
 

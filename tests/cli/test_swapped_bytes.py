@@ -78,9 +78,9 @@ def test_stop_is_sent_and_not_reported_as_done(line: str) -> None:
 def test_json_of_watch_tells_it_with_the_quality_of_the_values(line: str) -> None:
     done = invoked("watch", line, "-d", "2", "--json", "--count", "2")
     rows = [json.loads(row) for row in done.stdout.splitlines()]
-    cycles = [one for one in rows if "values" in one]
+    cycles = [item for item in rows if "values" in item]
     assert cycles
-    for one in cycles:
-        assert TEXT in one["error"]
-        assert one["contact"] == "swapped"
-        assert {value["quality"] for value in one["values"].values()} == {"bad"}
+    for cycle in cycles:
+        assert TEXT in cycle["error"]
+        assert cycle["contact"] == "swapped"
+        assert {value["quality"] for value in cycle["values"].values()} == {"bad"}

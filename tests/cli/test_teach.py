@@ -185,7 +185,7 @@ def test_each_run_command_chooses_the_confirmed_preset(line: str, own_folders: P
     preset_taught(line)
     teach(line, "1.21", "--reference")
     motor(0, line, *DRIVE, "--arm", "--take-control", "--for", "0.5")
-    words = [one["new_raw"] for one in journal(own_folders) if one["code"] == "6.42"]
+    words = [row["new_raw"] for row in journal(own_folders) if row["code"] == "6.42"]
     assert words[0] == 0x0103
     assert words[-1] & 0x002F in (0, 1), "the stop that followed"
 

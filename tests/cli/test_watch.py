@@ -85,7 +85,7 @@ def test_no_state_where_its_words_are_not_watched() -> None:
 def test_several_drives() -> None:
     line = ("sim:atv71@1,atv312@2", "-d", "1", "-d", "2", "-d", "1")
     reported = cycles(*line, "ETA", *SHORT, "2")
-    assert sorted((one["device"], one["profile"]) for one in reported) == [
+    assert sorted((row["device"], row["profile"]) for row in reported) == [
         (1, "atv71"), (1, "atv71"), (2, "atv312"), (2, "atv312"),
     ]  # fmt: skip
     text = run(0, "watch", *line, "ETA", *SHORT, "1")
@@ -210,8 +210,8 @@ def test_several_drives_one_of_which_is_not_there(command: tuple[str, ...]) -> N
     name, *more = command
     line = ("sim:atv71@1,atv312@2", "-d", "2", "-d", "9", "-d", "1")
     done = ended(3, name, line[0], *more, *line[1:], "--json")
-    two, nine, one = json.loads(done.stdout)
-    assert (two["profile"], one["profile"]) == ("atv312", "atv71")
+    two, nine, item = json.loads(done.stdout)
+    assert (two["profile"], item["profile"]) == ("atv312", "atv71")
     assert (nine["device"], nine["status"]) == (9, 3)
     assert "did not answer" in nine["error"]
     assert "Device 1:" in ended(3, name, line[0], *more, *line[1:]).stdout

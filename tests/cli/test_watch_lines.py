@@ -50,7 +50,7 @@ def objects(text: str) -> list[dict[str, Any]]:
 def sockets() -> list[str]:
     """Sockets and notes of stops that lie in the state folder."""
     state = Path(os.environ["DRIVEPANEL_STATE"])
-    return [one.name for one in state.rglob("*.s*") if one.suffix in (".sock", ".stop")]
+    return [path.name for path in state.rglob("*.s*") if path.suffix in (".sock", ".stop")]
 
 
 # Where a value is from
@@ -62,7 +62,7 @@ def test_every_output_tells_the_line_of_a_value(named: tuple[str, str], tmp_path
     watched = ("watch", "pump@1,2", "fan", "ETA", *SHORT, "1")
     reported = objects(run(0, *watched, "--json", "--csv", file))
     drives = [(pump, 1, "atv71"), (pump, 2, "atv312"), (fan, 5, "atv71")]
-    assert sorted((one["line"], one["device"], one["profile"]) for one in reported) == sorted(
+    assert sorted((item["line"], item["device"], item["profile"]) for item in reported) == sorted(
         drives
     )
     with file.open(newline="", encoding="utf-8") as opened:
@@ -77,15 +77,15 @@ def test_every_output_tells_the_line_of_a_value(named: tuple[str, str], tmp_path
 
 def test_drives_of_one_address_on_two_lines_are_two(named: tuple[str, str]) -> None:
     reported = objects(run(0, "watch", "pump@1", "fan@1", "ETA", *SHORT, "2", "--json"))
-    assert sorted(one["line"] for one in reported) == sorted(2 * named)
-    assert {one["device"] for one in reported} == {1}
+    assert sorted(row["line"] for row in reported) == sorted(2 * named)
+    assert {row["device"] for row in reported} == {1}
 
 
 def test_simulated_lines_are_watched_with_all_their_drives() -> None:
     reported = objects(
         run(0, "watch", "sim:atv71@3", "sim:atv312@2,atv71@7", *SHORT, "1", "--json")
     )
-    assert sorted((one["line"], one["device"]) for one in reported) == [
+    assert sorted((row["line"], row["device"]) for row in reported) == [
         ("sim:atv312@2,atv71@7", 2), ("sim:atv312@2,atv71@7", 7), ("sim:atv71@3", 3),
     ]  # fmt: skip
 
@@ -100,7 +100,7 @@ def test_a_line_that_is_not_there_is_reported_and_costs_the_others_nothing(
     missing, *cycles = objects(done.stdout)
     assert (missing["line"], missing["device"], missing["status"]) == (NOBODY, 1, 3)
     assert f"drivepanel: {NOBODY}: Device 1: " in done.stderr
-    assert [(one["line"], one["error"]) for one in cycles] == 2 * [(named[1], None)]
+    assert [(cycle["line"], cycle["error"]) for cycle in cycles] == 2 * [(named[1], None)]
 
 
 def test_a_drive_that_is_not_there_is_reported_with_its_line(named: tuple[str, str]) -> None:
@@ -147,8 +147,8 @@ def wished(*words: str) -> list[LineWish]:
 
 def drives(wishes: list[LineWish]) -> list[tuple[str, list[int], list[str | None]]]:
     return [
-        (one.name, [d.device for d in one.drives], [d.profile_id for d in one.drives])
-        for one in wishes
+        (wish.name, [d.device for d in wish.drives], [d.profile_id for d in wish.drives])
+        for wish in wishes
     ]
 
 

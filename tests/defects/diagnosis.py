@@ -112,8 +112,9 @@ DEFECTS = (
     Defect(
         "collisions-taken-for-one-behind",
         "tui/session/diagnosis/measure.py",
-        'if one.older and (one.replies or one.damaged or one.older == "second"):',
-        "if one.older and one.replies:",
+        "if exchange.older and "
+        '(exchange.replies or exchange.damaged or exchange.older == "second"):',
+        "if exchange.older and exchange.replies:",
         "Two drives at one address are called a converter that is behind.",
         (f"{MEASURED}::test_an_older_reply_is_counted_by_what_else_came",),
     ),

@@ -58,8 +58,8 @@ DEFECTS = (
     Defect(
         "form-faults-hide-the-rest",
         "tui/drive/profile/check.py",
-        "reported += [one for one in _broken_rules(data) if",
-        "reported += [one for one in () if",
+        "reported += [rule for rule in _broken_rules(data) if",
+        "reported += [rule for rule in () if",
         "Faults of a profile are told one run after another.",
         ("tests/drive/test_profile_check.py",),
     ),

@@ -103,8 +103,8 @@ DEFECTS = (
     Defect(
         "slow-settings-first",
         "tui/drive/finding.py",
-        "-float(shares[one]) / cost, -one.baud, one.format",
-        "-float(shares[one]), one.baud, one.format",
+        "-float(shares[setting]) / cost,\n            -setting.baud,",
+        "-float(shares[setting]),\n            setting.baud,",
         "A search over all settings spends its first minute at 300 baud.",
         (f"{FAMILIES}::test_of_two_that_are_as_likely_the_faster_comes_first",),
     ),
@@ -175,8 +175,8 @@ DEFECTS = (
     Defect(
         "slow-settings-unannounced",
         "tui/cli/running/scanning.py",
-        "if self.costs is None or not later[0].slow or any(one.slow for one in self.tried[1:]):",
-        "if True:",
+        "self.costs is None\n            or not later[0].slow",
+        "True",
         "A search that is as good as done goes on for a minute and a half, and nobody knows why.",
         (f"{SCAN}::test_slow_setting_is_reported_before_it_is_tried",),
     ),

@@ -27,8 +27,8 @@ DEFECTS = (
     Defect(
         "one-address-takes-every-connection",
         "tui/bus/gateway/room.py",
-        "if counts[one.address] == most}",
-        "if most}",
+        "if counts[connection.address] == most",
+        "if most",
         "Clients of one computer that connect again and again throw the others out.",
         ("tests/bus/test_gateway.py",),
     ),
@@ -67,7 +67,7 @@ DEFECTS = (
     Defect(
         "metrics-under-any-name",
         "tui/cli/plant/metrics_server.py",
-        "if any(one not in names for one in _hosts(headers)):",
+        "if any(host not in names for host in _hosts(headers)):",
         "if False:",
         "A web page reads the drives of a plant through a browser in its network.",
         ("tests/cli/test_metrics.py",),
@@ -187,7 +187,7 @@ DEFECTS = (
     Defect(
         "foreign-stop-lost-among-others",
         "tui/session/gateway/writes.py",
-        "await self._send_alone(one)",
+        "await self._send_alone(stop)",
         "pass",
         "A stop that is written with its reference is refused with it.",
         (GATEWAY,),
@@ -255,15 +255,15 @@ DEFECTS = (
     Defect(
         "control-is-a-setting",
         "tui/drive/foreign_write.py",
-        "if any(is_order(profile, one) or one.code in _ordered(profile) for one in found):",
-        "if any(is_order(profile, one) for one in found):",
+        "or parameter.code in _ordered(profile) for parameter in found",
+        "for parameter in found",
         "A client takes the control of a Powerdrive by writing a setting.",
         (WORDS,),
     ),
     Defect(
         "all-means-everything",
         "tui/drive/foreign_write.py",
-        "if one.code in _named_only(profile) or not is_verified(one):",
+        "if parameter.code in _named_only(profile) or not is_verified(parameter):",
         "if False:",
         "A client that may write settings decides who commands the drive.",
         (WORDS,),
@@ -319,8 +319,8 @@ DEFECTS = (
     Defect(
         "foreign-stop-voids-what-follows-it",
         "tui/session/gateway/in_turn.py",
-        "for one in self._pending[at:]:",
-        "for one in self._pending[at : at + 1]:",
+        "for pending_write in self._pending[at:]:",
+        "for pending_write in self._pending[at : at + 1]:",
         "What a client sends behind its stop is refused as if it had come before.",
         (f"{GATEWAY}::test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them",),
     ),

@@ -37,7 +37,7 @@ DEFECTS = (
     Defect(
         "running-motor-taken-for-another-family",
         "tui/session/fleet.py",
-        "runs = any(one is before for one in self.line_watch.under_command())",
+        "runs = any(item is before for item in self.line_watch.under_command())",
         "runs = False",
         "A motor that was started here goes on when the panel is left, and nobody is asked.",
         ("tests/ui/test_found.py",),

@@ -58,8 +58,8 @@ DEFECTS = (
     Defect(
         "rows-of-two-lines-alike",
         "tui/cli/shared/watch_outputs.py",
-        "        line = [one.line_name] if self.lines else []",
-        "        line = [one.session.profile.name] if self.lines else []",
+        "        line = [drive.line_name] if self.lines else []",
+        "        line = [drive.session.profile.name] if self.lines else []",
         "The rows of drive 1 on two lines cannot be told from one another.",
         ("tests/cli/test_watch_lines.py::test_every_output_tells_the_line_of_a_value",),
     ),

@@ -457,7 +457,7 @@ DEFECTS = (
     Defect(
         "motor-left-running-on-purpose-stopped",
         "tui/session/sharing/orphan_motors.py",
-        "and not one.left_running",
+        "and not record.left_running",
         "",
         "A pump that was to run on is stopped.",
         ("tests/session/test_guardian.py",),
@@ -665,8 +665,8 @@ DEFECTS = (
     Defect(
         "record-of-a-dead-container-hides-motors",
         "tui/session/starts/starts.py",
-        "{one.device for one in living if not one.is_foreign}",
-        "{one.device for one in living}",
+        "{record.device for record in living if not record.is_foreign}",
+        "{record.device for record in living}",
         "A container was killed; the motor of the next program that is killed runs on for good.",
         (
             "tests/session/test_starts.py::test_a_record_of_an_earlier_container_hides_no_later_start",

@@ -51,7 +51,7 @@ DEFECTS = (
     Defect(
         "older-reply-wins",
         "tui/session/image.py",
-        "if before is not None and before.time > one.time:",
+        "if before is not None and before.time > reading.time:",
         "if before is not None and before.time < -1:",
         "A value from before is shown as the present one.",
         ("tests/session/test_owners.py::test_an_older_reply_never_takes_the_place_of_a_newer_one",),
@@ -139,8 +139,8 @@ DEFECTS = (
     Defect(
         "timeout-not-fed",
         "tui/bus/schedule/alive_reads.py",
-        "period = one.timeout / READS_PER_TIMEOUT",
-        "period = one.timeout * READS_PER_TIMEOUT",
+        "period = alive.timeout / READS_PER_TIMEOUT",
+        "period = alive.timeout * READS_PER_TIMEOUT",
         "Drives trip by their communication timeout while the panel is open.",
         ("tests/bus/test_keep_alive.py",),
     ),
@@ -155,7 +155,7 @@ DEFECTS = (
     Defect(
         "fed-behind-the-polls",
         "tui/bus/schedule/alive_reads.py",
-        "priority = Priority.FEED if now - heard < one.timeout else Priority.POLL",
+        "priority = Priority.FEED if now - heard < alive.timeout else Priority.POLL",
         "priority = Priority.POLL",
         "On a busy line drives trip by their communication timeout.",
         ("tests/bus/test_keep_alive.py",),

@@ -58,8 +58,8 @@ CASES = [
     *(({"CHCF": SEPARATE, **raws}, who, ref) for raws, who, ref in SEPARATE_CASES.values()),
 ]
 NAMES = [
-    *(f"combined: {one}" for one in COMBINED_CASES),
-    *(f"separate: {one}" for one in SEPARATE_CASES),
+    *(f"combined: {case}" for case in COMBINED_CASES),
+    *(f"separate: {case}" for case in SEPARATE_CASES),
 ]
 SMALL = ["atv31", "atv312"]
 

@@ -30,19 +30,25 @@ COMMON_SECTIONS = [
 
 
 def section(family: str, title: str) -> PageSection:
-    (found,) = [one for one in family_page(library.load(family)) if one.title == title]
+    (found,) = [
+        page_section
+        for page_section in family_page(library.load(family))
+        if page_section.title == title
+    ]
     return found
 
 
 def text_of(family: str, title: str = "") -> str:
     sections = family_page(library.load(family))
-    kept = [one for one in sections if not title or one.title == title]
-    return "\n".join(f"{row.head} {row.text} {row.sure}" for one in kept for row in one.rows)
+    kept = [section for section in sections if not title or section.title == title]
+    return "\n".join(
+        f"{row.head} {row.text} {row.sure}" for section in kept for row in section.rows
+    )
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_family_has_its_sections(family: str) -> None:
-    titles = [one.title for one in family_page(library.load(family))]
+    titles = [section.title for section in family_page(library.load(family))]
     assert [title for title in COMMON_SECTIONS if title not in titles] == []
     assert [title for title in titles if title.startswith("Pins: ")]
     assert ("Names of the signals" in titles) is (family in ALTIVAR)
@@ -56,13 +62,13 @@ def test_every_pin_rule_command_and_erratum_stands_on_the_page(family: str) -> N
         *(pin.signal for connector in data.connectors for pin in connector.pins),
         *(warning for connector in data.connectors for warning in connector.warnings),
         *(rule.rule for rule in data.line_rules),
-        *(f"16#{one.word:04X} {one.does}" for one in data.command_examples),
-        *(f"Right: {one.right}." for one in data.errata),
-        *(one.text for one in data.wiring.warnings),
+        *(f"16#{example.word:04X} {example.does}" for example in data.command_examples),
+        *(f"Right: {erratum.right}." for erratum in data.errata),
+        *(family_warning.text for family_warning in data.wiring.warnings),
         *(data.communication_fault.warnings if data.communication_fault else ()),
         *(server.name for server in data.addresses.servers),
     ]
-    assert [one for one in reported if one not in page] == []
+    assert [item for item in reported if item not in page] == []
 
 
 WARNED = [
@@ -190,6 +196,6 @@ def test_names_of_models() -> None:
 
 def test_a_section_without_rows_is_left_out() -> None:
     data = msgspec.structs.replace(library.load("atv71").data, errata=[], line_rules=[])
-    titles = [one.title for one in family_page(Profile(data))]
+    titles = [section.title for section in family_page(Profile(data))]
     assert "Where the manuals are wrong" not in titles
-    assert all(replace(one).rows for one in family_page(Profile(data)))
+    assert all(replace(section).rows for section in family_page(Profile(data)))

@@ -28,8 +28,8 @@ def families() -> list[Profile]:
 
 
 def test_factory_settings_come_first_and_what_costs_most_last(families: list[Profile]) -> None:
-    found = likely_settings([one.data.link for one in families], longest_turnaround(families))
-    assert [str(one) for one in found[:3]] == ["19200 8E1", "19200 8N2", "19200 8N1"]
+    found = likely_settings([family.data.link for family in families], longest_turnaround(families))
+    assert [str(setting) for setting in found[:3]] == ["19200 8E1", "19200 8N2", "19200 8N1"]
     assert found.index(LineSetting(9600, "8E1")) < found.index(LineSetting(38400, "8E1"))
     assert str(found[-1]) == "300 8O1"
     assert len(found) == len(set(found)) == 40
@@ -38,15 +38,18 @@ def test_factory_settings_come_first_and_what_costs_most_last(families: list[Pro
 def test_slow_settings_follow_all_likely_ones(
     families: list[Profile],
 ) -> None:
-    found = likely_settings([one.data.link for one in families], longest_turnaround(families))
-    slow = [one for one in found if one.slow]
+    found = likely_settings([family.data.link for family in families], longest_turnaround(families))
+    slow = [setting for setting in found if setting.slow]
     assert found[-len(slow) :] == slow
-    assert {one.baud for one in slow} == {300, 600}
+    assert {setting.baud for setting in slow} == {300, 600}
     assert families_at(families, slow) == ["Powerdrive", "Proxidrive", "Varmeca 33/34"]
     # 31 addresses at all the others take less than a minute, the listening with it
     wait = longest_turnaround(families) + 0.002
-    likely = [one for one in found if not one.slow]
-    assert sum(31 * silent_cost(one, wait_for_reply(one, wait)) for one in likely) < 60 - 1.5
+    likely = [setting for setting in found if not setting.slow]
+    assert (
+        sum(31 * silent_cost(setting, wait_for_reply(setting, wait)) for setting in likely)
+        < 60 - 1.5
+    )
 
 
 def test_names_in_a_sentence() -> None:
@@ -60,7 +63,7 @@ def test_of_two_that_are_as_likely_the_faster_comes_first() -> None:
         link={"baud": 9600, "format": "8E1", "bauds": [300, 1200, 9600, 38400]}
     ).data.link
     found = likely_settings([link], 0.005)
-    assert [one.baud for one in found] == [9600, 38400, 1200, 300]
+    assert [setting.baud for setting in found] == [9600, 38400, 1200, 300]
 
 
 def test_an_empty_address_costs_its_request_and_the_turnaround() -> None:
@@ -86,8 +89,8 @@ def test_a_family_that_meets_an_unknown_word_with_silence_is_requested_who_it_is
 
 def test_drive_with_timeout_from_first_request_is_named(families: list[Profile]) -> None:
     found = watching_families(families)
-    assert [one.id for one in found if one.sure] == ["atv21"]
-    assert "atv71" not in {one.id for one in found}
+    assert [family.id for family in found if family.sure] == ["atv21"]
+    assert "atv71" not in {family.id for family in found}
     reported = watching_text(found)
     assert "Altivar 21 (F803), and perhaps Altivar 31 (ttO)" in reported
     assert watching_text([]) == ""

@@ -20,7 +20,7 @@ from tui.drive.profile.schema import OrderId
 from tui.drive.profile.stop_profile import StopProfile, stop_profile
 
 FACTS = stop_profile()
-PLACES = {one.address: one for one in stop_places(FACTS)}
+PLACES = {stop_place.address: stop_place for stop_place in stop_places(FACTS)}
 CMD, CHCF, DOTD, ETA, LEROY, LEROY_STATUS = 8501, 8401, 8652, 3201, 641, 1039
 ENABLED, HALF_WAY = 0x0027, 0x0021
 NAMED = [(), ("atv31",), ("atv312",), ("atv71",)]
@@ -32,15 +32,19 @@ def word(address: int, raws: dict[int, int], way: OrderId = "stop", *named: str)
     return None if found is None else found.word
 
 
-@pytest.mark.parametrize("one", FACTS, ids=lambda one: one.id)
-def test_quick_head_equals_full_profile(one: StopProfile) -> None:
-    profile = library.load(one.id)
-    assert one.charts == tuple(profile.data.charts)
-    assert one.names_itself is (profile.function(43) is not None)
-    assert {code: profile[code].address for code in one.places} == dict(one.places)
-    needed = {chart.status for chart in one.charts} | {chart.command for chart in one.charts}
-    needed |= {chart.when.parameter for chart in one.charts if chart.when}
-    assert needed - {""} <= set(one.places)
+@pytest.mark.parametrize("one", FACTS, ids=lambda item: item.id)
+def test_quick_head_equals_full_profile(stop_profile: StopProfile) -> None:
+    profile = library.load(stop_profile.id)
+    assert stop_profile.charts == tuple(profile.data.charts)
+    assert stop_profile.names_itself is (profile.function(43) is not None)
+    assert {code: profile[code].address for code in stop_profile.places} == dict(
+        stop_profile.places
+    )
+    needed = {chart.status for chart in stop_profile.charts} | {
+        chart.command for chart in stop_profile.charts
+    }
+    needed |= {chart.when.parameter for chart in stop_profile.charts if chart.when}
+    assert needed - {""} <= set(stop_profile.places)
 
 
 def test_a_profile_of_the_users_own_is_read_too() -> None:
@@ -50,25 +54,25 @@ def test_a_profile_of_the_users_own_is_read_too() -> None:
     for name in ("atv71.toml",):
         text = (packaged / name).read_text().replace('id = "atv71"', 'id = "pump"', 1)
         (folder / "pump.toml").write_text(text)
-    found = {one.id: one for one in stop_profile()}
+    found = {profile.id: profile for profile in stop_profile()}
     assert found["pump"].charts == found["atv71"].charts
     assert set(found["atv71"].places) <= set(found["pump"].places)
 
 
 def test_families_that_are_silent_at_foreign_words_come_first_and_the_named_before() -> None:
-    assert [one.address for one in stop_places(FACTS)] == [LEROY, CMD, 0xFA00]
+    assert [place.address for place in stop_places(FACTS)] == [LEROY, CMD, 0xFA00]
     named = stop_places(FACTS, ["atv312"])
     assert named[0].families[0].id == "atv312"
-    assert [one.address for one in named] == [CMD, LEROY, 0xFA00]
+    assert [place.address for place in named] == [CMD, LEROY, 0xFA00]
 
 
 def test_no_family_has_another_word_where_one_is_stopped() -> None:
     """A word for one kind must not change a setting of another."""
     for place in PLACES.values():
-        stopped = {one.id for one in place.families}
-        for one in FACTS:
-            taken = {p.address for p in library.load(one.id).parameters if p.function == 3}
-            assert one.id in stopped or place.address not in taken
+        stopped = {family.id for family in place.families}
+        for fact in FACTS:
+            taken = {p.address for p in library.load(fact.id).parameters if p.function == 3}
+            assert fact.id in stopped or place.address not in taken
 
 
 def states() -> Iterator[dict[int, int]]:
@@ -145,5 +149,9 @@ def test_an_unsaid_drive_is_followed_by_a_family_that_sends_the_same_word() -> N
 
 
 def test_families_beside_a_named_one_share_its_register() -> None:
-    assert {one.id for one in families_beside(FACTS, "atv312")} == {"atv31", "atv312", "atv71"}
-    assert {one.id for one in families_beside(FACTS, "atv21")} == {"atv21"}
+    assert {profile.id for profile in families_beside(FACTS, "atv312")} == {
+        "atv31",
+        "atv312",
+        "atv71",
+    }
+    assert {profile.id for profile in families_beside(FACTS, "atv21")} == {"atv21"}

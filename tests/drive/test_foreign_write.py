@@ -149,7 +149,7 @@ def test_words_read_before_stop_decide(word: int, profile: Profile, values: list
     charts = [chart for chart in profile.data.charts if chart.command]
     known = [code for chart in charts for code in (chart.status, chart.command)]
     names = dict.fromkeys([*known, "CHCF", "DOTD", "TCC", "RRS"])
-    raws = dict(zip([one for one in names if profile.get(one)], values, strict=False))
+    raws = dict(zip([name for name in names if profile.get(name)], values, strict=False))
     for chart in charts:
         words = {profile[chart.command].address: word}
         read = {code: raws[code] for code in stop_deciding_codes(profile, words)}

@@ -236,7 +236,7 @@ def test_a_profile_is_begun_from_another(tmp_path: Path, monkeypatch: pytest.Mon
     assert CliRunner().invoke(main, ["profiles", "path"]).output.strip() == str(folder)
 
 
-@pytest.mark.parametrize("family", [one.id for one in library.listings()])
+@pytest.mark.parametrize("family", [item.id for item in library.listings()])
 def test_shared_rows_are_stored_once(family: str) -> None:
     path = library.packaged_folder() / f"{family}.toml"
     tables = tomli.loads(path.read_text("utf-8"))
@@ -249,7 +249,7 @@ def test_shared_rows_are_stored_once(family: str) -> None:
         for key in row.keys() & rows.get(row["code"], {}).keys() - {"code"}
     ]
     assert again == []
-    [listing] = [one for one in library.listings() if one.id == family]
+    [listing] = [item for item in library.listings() if item.id == family]
     assert listing.parameters == len(library.load(family).parameters)
     assert family not in SHARING or len(rows) >= SHARING[family]
 

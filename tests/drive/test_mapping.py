@@ -212,7 +212,9 @@ def test_the_steps_lead_there_and_move_nothing_without_freeing_it(
     assert tuple(held.values()) == after
     assert not steps(held, plan)
     assert {c.slot for c in slot_changes(Assignment(inputs, before).slots, plan)} == {
-        slot for slot, one, other in zip(inputs.slots, before, after, strict=True) if one != other
+        slot
+        for slot, number, other in zip(inputs.slots, before, after, strict=True)
+        if number != other
     }
 
 

@@ -29,8 +29,15 @@ def refusal(profile: Profile, chart: Chart, id: OrderId, raws: dict[str, int]) -
 
 def words_of(chart: Chart, lock: Interlock) -> dict[str, int]:
     """Words under which no interlock but this one could hold a command back, and it decides."""
-    raws = {one.parameter: one.values[0] for one in chart.interlocks if not one.when}
-    raws |= {one.parameter: raws.get(one.parameter, 0) | one.values[0] for one in chart.interlocks}
+    raws = {
+        interlock.parameter: interlock.values[0]
+        for interlock in chart.interlocks
+        if not interlock.when
+    }
+    raws |= {
+        interlock.parameter: raws.get(interlock.parameter, 0) | interlock.values[0]
+        for interlock in chart.interlocks
+    }
     return raws | {when.parameter: when.values[0] for when in lock.when}
 
 

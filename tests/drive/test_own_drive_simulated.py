@@ -41,7 +41,7 @@ def test_the_command_line_checks_and_lists_it(own_file: Path) -> None:
     assert checked.exit_code == 0, checked.output
     assert "no fault found" in checked.output
     listed = CliRunner().invoke(main, ["profiles"])
-    [line] = [one for one in listed.output.splitlines() if "(your own)" in one]
+    [line] = [text for text in listed.output.splitlines() if "(your own)" in text]
     assert line.startswith(PUMP)
 
 
@@ -131,7 +131,7 @@ async def test_it_is_read_over_a_line_with_its_state(
             readings = await Reader(session).read(["FREQ", "RAMP", "MODE", "STAT", "TRIP"])
         finally:
             opened.close()
-    texts = {code: one.value.text for code, one in readings.items() if one.value}
+    texts = {code: reading.value.text for code, reading in readings.items() if reading.value}
     assert [texts[code] for code in ("FREQ", "RAMP", "MODE")] == ["-12.5", "3.00", "By hand"]
     seen = drive_state(profile, readings)
     assert (seen.id, len(seen.alarms)) == (state, alarms)

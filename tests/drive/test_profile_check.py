@@ -351,7 +351,7 @@ def test_a_fault_is_reported_where_it_stands(tmp_path: Path, name: str) -> None:
         assert text.count(right) == 1, right
         text = text.replace(right, wrong)
     found = checked(tmp_path, text)
-    [fault] = [one for one in found if reported in one] or [f"not told, but: {found}"]
+    [fault] = [item for item in found if reported in item] or [f"not told, but: {found}"]
     line = text[: text.index(at)].count("\n") + 1
     assert fault.startswith(f"{tmp_path / 'own.toml'}:{line}: "), fault
 
@@ -365,8 +365,8 @@ def test_all_faults_are_reported_in_one_run(tmp_path: Path) -> None:
         for right, wrong in FAULTS[name][0]:
             text = text.replace(right, wrong)
     found = checked(tmp_path, text)
-    assert [name for name in some if not any(FAULTS[name][1] in one for one in found)] == []
-    lines = [int(one.split(":")[1]) for one in found]
+    assert [name for name in some if not any(FAULTS[name][1] in item for item in found)] == []
+    lines = [int(item.split(":")[1]) for item in found]
     assert lines == sorted(lines)
 
 
@@ -382,7 +382,7 @@ def test_several_files_are_checked(tmp_path: Path) -> None:
     assert "none.toml:2: not valid TOML" in done.output
     reported = CliRunner().invoke(main, ["profiles", "--json", "--check", str(right), str(wrong)])
     assert reported.exit_code == 2
-    assert [len(one["faults"]) for one in json.loads(reported.output)] == [0, 1]
+    assert [len(load["faults"]) for load in json.loads(reported.output)] == [0, 1]
 
 
 def test_lines_of_every_kind_of_place() -> None:

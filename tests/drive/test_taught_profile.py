@@ -72,8 +72,8 @@ def test_the_confirmed_reference_is_chosen_by_each_command_to_run_and_by_nothing
     (before,), (after,) = family.data.charts, own.data.charts
     for order, word in (("forward", 0x0103), ("reverse", 0x0109)):
         assert choose(after, order, raws).words == [word]  # type: ignore[arg-type]
-    rest = [one for one in after.orders if one.id not in ("forward", "reverse")]
-    assert rest == [one for one in before.orders if one.id not in ("forward", "reverse")]
+    rest = [item for item in after.orders if item.id not in ("forward", "reverse")]
+    assert rest == [item for item in before.orders if item.id not in ("forward", "reverse")]
     assert own.quantity("command_speed") == own["1.21"]
     assert own.quantity("command_frequency") is None
 

@@ -39,17 +39,17 @@ def honest(word: int, scale: Decimal, signed: bool, places: int, cut: str) -> Di
 def taught(*looks: DisplayLook) -> Lesson:
     """The lesson of the last of these looks."""
     lesson = learn("5.01", (), looks[0])
-    for one in looks[1:]:
-        lesson = learn("5.01", lesson.looks, one)
+    for look in looks[1:]:
+        lesson = learn("5.01", lesson.looks, look)
     return lesson
 
 
 @given(scales, st.booleans(), words, words, st.integers(0, 4), cuts)
 def test_every_scale_is_found_from_two_honest_looks(
-    scale: Decimal, signed: bool, one: int, other: int, places: int, cut: str
+    scale: Decimal, signed: bool, number: int, other: int, places: int, cut: str
 ) -> None:
-    first, second = (honest(word, scale, signed, places, cut) for word in (one, other))
-    assume(one != other)
+    first, second = (honest(word, scale, signed, places, cut) for word in (number, other))
+    assume(number != other)
     step = Decimal(1).scaleb(-places)
     # two digits and a half are seen of one of them: enough to tell a scale from its neighbors
     assume(max(abs(first.shown), abs(second.shown)) >= 25 * step)
@@ -58,7 +58,7 @@ def test_every_scale_is_found_from_two_honest_looks(
     assert lesson.scale is not None
     assert lesson.scale.scale == scale
     assert lesson.scale.unit == "Hz"
-    far = max(one, other) >= 0x8000
+    far = max(number, other) >= 0x8000
     assert lesson.scale.signed is (signed if far else None)
 
 
@@ -78,10 +78,10 @@ def test_honest_looks_never_teach_another_scale(
 
 @given(scales, words, words, st.sampled_from(["1.3", "0.7", "4", "0.1", "10"]))
 def test_an_inconsistent_pair_teaches_nothing_and_says_so(
-    scale: Decimal, one: int, other: int, wrong: str
+    scale: Decimal, number: int, other: int, wrong: str
 ) -> None:
-    first, second = (honest(word, scale, False, 4, ROUND_HALF_UP) for word in (one, other))
-    assume(one != other and min(one, other) >= 100)
+    first, second = (honest(word, scale, False, 4, ROUND_HALF_UP) for word in (number, other))
+    assume(number != other and min(number, other) >= 100)
     shown = (second.shown * Decimal(wrong)).quantize(Decimal("0.0001"))
     lesson = taught(first, DisplayLook(other, shown, "Hz"))
     assert lesson.kind is LessonKind.DISAGREES
@@ -127,10 +127,10 @@ def test_a_third_look_in_another_unit_ends_it_too() -> None:
 
 
 def test_one_look_and_the_same_look_again_teach_nothing() -> None:
-    one = taught(look(503, "50.3", "Hz"))
-    assert (one.kind, one.scale) == (LessonKind.FIRST, None)
-    again = learn("5.01", one.looks, look(503, "50.3"))
-    assert (again.kind, again.looks) == (LessonKind.SAME, one.looks)
+    lesson = taught(look(503, "50.3", "Hz"))
+    assert (lesson.kind, lesson.scale) == (LessonKind.FIRST, None)
+    again = learn("5.01", lesson.looks, look(503, "50.3"))
+    assert (again.kind, again.looks) == (LessonKind.SAME, lesson.looks)
     assert "another value" in again.text
 
 

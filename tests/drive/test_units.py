@@ -49,9 +49,9 @@ def test_a_number_without_a_unit_takes_none() -> None:
 def test_no_two_units_of_a_kind_differ_by_capitals_alone() -> None:
     for kind in KINDS:
         assert len({unit.casefold() for unit in kind}) == len(kind)
-        for one in kind:
+        for text in kind:
             for other in kind:
-                there, back = factor_between(one, other), factor_between(other, one)
+                there, back = factor_between(text, other), factor_between(other, text)
                 assert there is not None
                 assert back is not None
                 assert abs(there * back - 1) < Decimal("1e-20")

@@ -80,8 +80,8 @@ class Plant:
         module, _, names = self.place.partition(":")
         *owners, name = names.split(".")
         owner: Any = importlib.import_module(module)
-        for one in owners:
-            owner = getattr(owner, one)
+        for text in owners:
+            owner = getattr(owner, text)
         setattr(owner, name, self._failing(inspect.getattr_static(owner, name)))
 
     def _failing(self, whole: Any) -> Any:
@@ -116,14 +116,14 @@ class Plant:
 
 def planted(*plants: Plant) -> str:
     """The plants as an argument."""
-    return json.dumps([asdict(one) for one in plants])
+    return json.dumps([asdict(plant) for plant in plants])
 
 
 def main() -> None:
     """Plant the errors, and open the panel."""
     _, plants, *arguments = sys.argv
-    for one in json.loads(plants):
-        Plant(**one).put()
+    for load in json.loads(plants):
+        Plant(**load).put()
     sys.argv[1:] = arguments
     from tui.__main__ import main as panel
 

@@ -82,14 +82,14 @@ def attacked(attack: Callable[[Place, Random], None], place: Place, count: int) 
                 attack(place, chance)
 
     threads = [threading.Thread(target=work, args=(seed,), daemon=True) for seed in range(count)]
-    for one in threads:
-        one.start()
+    for thread in threads:
+        thread.start()
     try:
         yield
     finally:
         over.set()
-        for one in threads:
-            one.join(PATIENCE)
+        for thread in threads:
+            thread.join(PATIENCE)
 
 
 @pytest.mark.parametrize("attack", [noise, halves, reads, stops])

@@ -73,7 +73,7 @@ def test_frames_of_another_program_from_before_are_read_by_tshark(
     assert "Modbus RTU" in done.stdout
     assert "checksum incorrect" not in done.stdout.lower()
     programs = json.loads((found / "line.json").read_text())["programs"]
-    assert {"watch", "bundle", "keeper"} == {one["program"] for one in programs}
+    assert {"watch", "bundle", "keeper"} == {program["program"] for program in programs}
 
 
 def test_running_motor_goes_on_and_nothing_is_written(tmp_path: Path) -> None:
@@ -114,4 +114,4 @@ def test_ctrl_c_leaves_no_file(tmp_path: Path) -> None:
             _, output = program.communicate(timeout=PATIENCE)
     assert program.returncode == 130, output
     assert "Traceback" not in output
-    assert [one.name for one in tmp_path.iterdir() if "zip" in one.name] == []
+    assert [path.name for path in tmp_path.iterdir() if "zip" in path.name] == []

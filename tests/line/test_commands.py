@@ -163,10 +163,10 @@ def test_run_reverse_in_json() -> None:
         done = drivepanel(*run)
         assert (done.returncode, besides(done.stderr)) == (0, "")
         reported: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
-        events = [one["event"] for one in reported]
+        events = [row["event"] for row in reported]
         assert events[:2] == ["reference", "order"]
         assert events[-2:] == ["stopping", "stopped"]
-        last = [one for one in reported if one["event"] == "state"][-1]
+        last = [row for row in reported if row["event"] == "state"][-1]
         assert (last["state"], last["direction"]) == ("running", "reverse")
         assert last["values"]["output_frequency"]["value"] < -3
         assert last["values"]["frequency_reference"]["unit"] == "Hz"
@@ -427,7 +427,7 @@ def test_enabled_motor_at_0_hz_is_not_stopped_exits_with_4() -> None:
 
 
 def test_stop_all_stops_each() -> None:
-    specs = [DriveSpec(one, n, run_hz=20.0) for n, one in enumerate(("atv71", "atv21"), start=1)]
+    specs = [DriveSpec(text, n, run_hz=20.0) for n, text in enumerate(("atv71", "atv21"), start=1)]
     with bench(*specs) as (simulation, line):
         wait_until(lambda: all(turns(simulation, n) for n in (1, 2)), "the motors turn")
         done = drivepanel("stop", line, "--all", "--addresses", "1-3")

@@ -50,7 +50,7 @@ def test_keeper_of_serve_imports_no_door(tmp_path: Path, monkeypatch: pytest.Mon
     wait_until(loaded.exists, "the keeper has ended")
     modules = loaded.read_text().split()
     assert "tui.keeper.process" in modules
-    assert [one for one in modules if DOORS.match(one)] == []
+    assert [module for module in modules if DOORS.match(module)] == []
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGABRT])

@@ -81,7 +81,7 @@ def test_ctrl_c_ends_watch_after_a_whole_line() -> None:
     assert rest.endswith("\n")
     reported = [json.loads(line) for line in rest.splitlines()]
     assert reported[-1]["status"] == 130
-    assert all("values" in one for one in reported[:-1])
+    assert all("values" in item for item in reported[:-1])
 
 
 @pytest.fixture

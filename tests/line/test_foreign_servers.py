@@ -47,9 +47,9 @@ def expect_the_three_words(line: str) -> None:
     assert done.returncode == 0, done.stderr
     read = json.loads(done.stdout)
     assert (read["line"], read["device"], read["profile"]) == (line, 2, "atv71")
-    shown = {code: (one["raw"], one["value"]) for code, one in read["values"].items()}
+    shown = {code: (item["raw"], item["value"]) for code, item in read["values"].items()}
     assert shown == {"ETA": (0x0637, 0x0637), "RFR": (425, 42.5), "ACC": (57, 5.7)}
-    assert {one["quality"] for one in read["values"].values()} == {"good"}
+    assert {item["quality"] for item in read["values"].values()} == {"good"}
 
 
 def test_libmodbus(libmodbus_line: str) -> None:

@@ -112,7 +112,7 @@ class Far:
     def moved(self, since: int) -> list[object]:
         """Writes after so many that are no ramp stop."""
         later = self.log.writes[since:]
-        return [one for one in later if (one.register, one.words) != (COMMAND, (7,))]
+        return [write for write in later if (write.register, write.words) != (COMMAND, (7,))]
 
 
 @pytest.fixture

@@ -61,10 +61,10 @@ def read(line: str) -> subprocess.CompletedProcess[str]:
 def holders(path: str) -> list[int]:
     """Processes that have a port open, this one aside."""
     found = []
-    for one in Path("/proc").glob("[0-9]*/fd/*"):
+    for item in Path("/proc").glob("[0-9]*/fd/*"):
         try:
-            pid = int(one.parts[2])
-            if pid != os.getpid() and os.readlink(one) == os.path.realpath(path):
+            pid = int(item.parts[2])
+            if pid != os.getpid() and os.readlink(item) == os.path.realpath(path):
                 found.append(pid)
         except OSError:
             continue
@@ -88,7 +88,7 @@ def test_it_inherits_nothing_and_outlives_its_command() -> None:
         assert read(line).returncode == 0
         pid = keeper()
         process = Path("/proc", str(pid))
-        assert [os.readlink(process / "fd" / str(one)) for one in range(3)] == [NOTHING] * 3
+        assert [os.readlink(process / "fd" / str(number)) for number in range(3)] == [NOTHING] * 3
         assert os.readlink(process / "cwd") == "/"
         assert os.getsid(pid) == pid
         assert b"-P\0-m\0tui.keeper\0" in (process / "cmdline").read_bytes()
@@ -343,7 +343,7 @@ def test_the_next_program_has_the_trend_of_one_that_was_killed() -> None:
             wait_until(lambda: bool(monitor.trend), "a cycle")
             wait_until(lambda: monitor.trend[0].time < begun + 1.0, "the trend from before")
             # but for the last points before it was killed
-            assert len([one for one in monitor.trend if one.time < begun + 4.0]) >= 10
+            assert len([point for point in monitor.trend if point.time < begun + 4.0]) >= 10
         finally:
             opened.close()
 
@@ -399,7 +399,7 @@ def test_a_stop_is_carried_out_whose_program_ends_before_its_word(gives: str) ->
         if gives == "stop":
             wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
             entries = json.loads(drivepanel("journal", "--json").stdout)
-            assert "CMD" in [one["code"] for one in entries["entries"]]
+            assert "CMD" in [entry["code"] for entry in entries["entries"]]
         else:
             time.sleep(3.0)
             assert turns(simulation), "nobody has stopped it"

@@ -40,7 +40,8 @@ def test_drive_does_not_trip_while_the_loop_of_its_program_is_busy() -> None:
             shared = drives._opened.line
             alive = shared.facts.keep_alives
             wait_until(
-                lambda: [one.timeout for one in alive.kept.values()] == [TIMEOUT], "it is kept"
+                lambda: [keep_alive.timeout for keep_alive in alive.kept.values()] == [TIMEOUT],
+                "it is kept",
             )
             simulation.drive(1).run(20.0)
             wait_until(lambda: turns(simulation), "the motor turns")

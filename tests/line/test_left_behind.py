@@ -209,11 +209,11 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
 
     def shows(*words: str) -> None:
         """The words, however the terminal breaks them at its edge or a dialog's."""
-        wanted = [" ".join(one.split()) for one in (killed.clause, *words)]
+        wanted = [" ".join(word.split()) for word in (killed.clause, *words)]
 
         def there() -> bool:
             lines = terminal.text().replace("│", " ").splitlines()
-            return all(one in " ".join(" ".join(lines).split()) for one in wanted)
+            return all(item in " ".join(" ".join(lines).split()) for item in wanted)
 
         wait_until(there, f"{wanted} in\n{terminal.text()}")
 

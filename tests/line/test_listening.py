@@ -40,11 +40,11 @@ def tapped_cable(drives: str) -> Iterator[tuple[str, str]]:
             ready = select.select([master, far, bell], [], [])[0]
             if bell in ready:
                 return
-            for one in ready:
-                data = os.read(one, 4096)
+            for number in ready:
+                data = os.read(number, 4096)
                 with suppress(BlockingIOError):
                     os.write(tap, data)
-                os.write(to[one], data)
+                os.write(to[number], data)
 
     cable = threading.Thread(target=carry, name="cable", daemon=True)
     cable.start()
@@ -53,7 +53,7 @@ def tapped_cable(drives: str) -> Iterator[tuple[str, str]]:
     finally:
         os.write(rope, b"x")
         cable.join()
-        for handle in (bell, rope, far, *(one for pair in pairs for one in pair)):
+        for handle in (bell, rope, far, *(number for pair in pairs for number in pair)):
             os.close(handle)
 
 

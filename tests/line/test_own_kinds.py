@@ -69,7 +69,7 @@ class Bench:
     def values(self, *codes: str) -> dict[str, object]:
         """Values as they are read now."""
         reported = json.loads(self.done("read", *codes, "--json"))
-        return {code: one["value"] for code, one in reported["values"].items()}
+        return {code: item["value"] for code, item in reported["values"].items()}
 
 
 @pytest.fixture(params=KINDS, ids=lambda kind: kind.profile)
@@ -95,10 +95,10 @@ def test_it_is_found_and_watched(bench: Bench) -> None:
     assert f"name its profile with -p: {bench.kind.profile}" in refused.stderr
     rows = bench.done("watch", "--count", "2", "--every", "0.2", "--json").splitlines()
     last = json.loads(rows[-1])
-    assert {one["quality"] for one in last["values"].values()} == {"good"}
+    assert {item["quality"] for item in last["values"].values()} == {"good"}
     assert bench.values("HOURS") == {"HOURS": 70000}
     fields = json.loads(bench.done("read", "FANMODE", "DIMMING", "--json"))["values"]
-    assert {code: one["raw"] for code, one in fields.items()} == {"FANMODE": 1, "DIMMING": 2}
+    assert {code: item["raw"] for code, item in fields.items()} == {"FANMODE": 1, "DIMMING": 2}
     if bench.kind.chart == "bits":
         assert bench.values("TEMP") == {"TEMP": 41.7}
 
@@ -153,7 +153,7 @@ def test_it_never_gets_a_request_that_it_does_not_take(bench: Bench) -> None:
     profile = library.load_file(HERE / "profiles" / f"{bench.kind.profile}.toml")
     codes = [p.code for p in profile.parameters]
     reported = json.loads(bench.done("read", *codes, "--json"))
-    assert {one["quality"] for one in reported["values"].values()} == {"good"}
+    assert {item["quality"] for item in reported["values"].values()} == {"good"}
     assert len(reported["values"]) == len(codes)
     bench.done("watch", "--count", "3", "--every", "0.1")
     assert bench.server.end() == (0, "0")

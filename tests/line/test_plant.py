@@ -34,7 +34,7 @@ ROOT = "plant/hall2"
 def printed(kind: str, begins: str) -> str:
     """The block of the page that has these words in its first lines."""
     blocks = re.findall(rf"^```{kind}\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
-    (found,) = (one for one in blocks if begins in one[:80])
+    (found,) = (block for block in blocks if begins in block[:80])
     return str(found)
 
 

@@ -155,8 +155,8 @@ def test_a_run_word_is_exception_6_while_a_program_commands(programs: ExitStack)
 
 
 def test_ids_of_two_lines(programs: ExitStack) -> None:
-    with bench(DriveSpec("atv71", 1)) as (_, one), bench(DriveSpec("atv31", 1)) as (_, other):
-        command = serving(one, other, "--tcp", ":0", "--map", "1=1", "--map", "101-110=2@1")
+    with bench(DriveSpec("atv71", 1)) as (_, text), bench(DriveSpec("atv31", 1)) as (_, other):
+        command = serving(text, other, "--tcp", ":0", "--map", "1=1", "--map", "101-110=2@1")
         made = programs.enter_context(served(command, ready="Ready:"))
         with ModbusTcpClient("127.0.0.1", port=port_of(made.ready), timeout=PATIENCE) as client:
             names = [

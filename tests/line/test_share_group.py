@@ -78,14 +78,14 @@ def program(line: str, user: int, groups: str, folder: Path, **more: str) -> sub
     )
 
 
-def output(one: subprocess.Popen[str]) -> str:
-    assert one.stdout is not None
-    return one.stdout.readline().strip()
+def output(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
 
 
 def end(*programs: subprocess.Popen[str]) -> None:
-    for one in programs:
-        one.communicate("\n", timeout=20.0)
+    for program in programs:
+        program.communicate("\n", timeout=20.0)
 
 
 def test_a_member_attaches_without_setup_and_a_stranger_does_not(
@@ -116,13 +116,13 @@ def test_nobody_of_another_user_attaches_unless_it_was_requested(
 def test_a_group_without_a_folder_is_informed_what_to_do(tmp_path: Path, tcp_line: str) -> None:
     if os.geteuid() != 0:
         pytest.skip(ROOT_NEEDED)
-    one = program(tcp_line, 0, "", tmp_path / "none", DRIVEPANEL_SHARE_GROUP=GROUP)
-    reported = output(one)
-    end(one)
+    process = program(tcp_line, 0, "", tmp_path / "none", DRIVEPANEL_SHARE_GROUP=GROUP)
+    reported = output(process)
+    end(process)
     assert "sudo install -d -m 2770 -g dialout" in reported
-    one = program(tcp_line, 0, "", tmp_path, DRIVEPANEL_SHARE_GROUP="no-such-group")
-    reported = output(one)
-    end(one)
+    process = program(tcp_line, 0, "", tmp_path, DRIVEPANEL_SHARE_GROUP="no-such-group")
+    reported = output(process)
+    end(process)
     assert "There is no group no-such-group" in reported
 
 
@@ -131,7 +131,7 @@ def test_serve_opens_its_socket_for_the_group_that_is_configured(
 ) -> None:
     """One user is enough: the group is one of his own, the rest is what the system does."""
     groups = [*os.getgroups(), os.getgid()] if os.geteuid() else [grp.getgrnam(GROUP).gr_gid]
-    number = next((one for one in groups if one != os.getgid()), os.getgid())
+    number = next((group for group in groups if group != os.getgid()), os.getgid())
     folder = tmp_path / "group"
     folder.mkdir()
     os.chown(folder, -1, number)
@@ -141,7 +141,7 @@ def test_serve_opens_its_socket_for_the_group_that_is_configured(
     command = [*DRIVEPANEL, "serve", tcp_line]
     with served(command, ready="Ready:"):
         assert not list(folder.iterdir()), "closed to others unless told otherwise"
-    with served([*command, "--share-group", grp.getgrgid(number).gr_name], ready="Ready:") as one:
+    with served([*command, "--share-group", grp.getgrgid(number).gr_name], ready="Ready:") as item:
         (socket,) = folder.glob("*.sock")
         reported = socket.stat()
         assert (reported.st_gid, stat.S_IMODE(reported.st_mode)) == (number, 0o660)
@@ -149,6 +149,6 @@ def test_serve_opens_its_socket_for_the_group_that_is_configured(
         done = subprocess.run(watch, capture_output=True, text=True, timeout=PATIENCE, check=False)
         assert done.returncode == 0
         assert "Shared with serve" in done.stderr
-        assert one.end()[0] == 0
+        assert item.end()[0] == 0
     end_keepers()
     assert not list(folder.glob("*.sock"))

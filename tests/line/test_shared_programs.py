@@ -51,7 +51,7 @@ def left_over() -> list[str]:
     """Sockets and notes of stops that lie in the state folder once its keepers have ended."""
     end_keepers()
     state = Path(os.environ["DRIVEPANEL_STATE"])
-    return [one.name for one in state.rglob("*.s*") if one.suffix in (".sock", ".stop")]
+    return [path.name for path in state.rglob("*.s*") if path.suffix in (".sock", ".stop")]
 
 
 def stopped_by_commands(simulation: Simulation, device: int = 1) -> bool:
@@ -129,7 +129,7 @@ def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
     output, _ = runner.process.communicate(timeout=PATIENCE)
     # it hears of the stop on its return, or how many there were if it was taken for gone
     by = ("drivepanel stop, stop", "a stop while this program stood still")
-    assert any(f"was stopped by {one}" in output for one in by)
+    assert any(f"was stopped by {text}" in output for text in by)
     assert runner.process.returncode == 6
     assert stopped_by_commands(simulation)
 
@@ -206,9 +206,9 @@ def one_connection(target: tuple[str, int], others: str) -> Iterator[str]:
         with suppress(OSError):
             while data := source.recv(4096):
                 sink.sendall(data)
-        for one in (source, sink):
+        for item in (source, sink):
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
+                item.shutdown(socket.SHUT_RDWR)
 
     def serve(client: socket.socket) -> None:
         if free.acquire(blocking=others == "wait"):
@@ -317,9 +317,9 @@ def panel_run(
 def on_record() -> list[bool]:
     """Of each start on record, whether its motor is meant to be left running."""
     found = []
-    for one in Path(os.environ["DRIVEPANEL_STATE"], "starts").glob("*.json"):
+    for path in Path(os.environ["DRIVEPANEL_STATE"], "starts").glob("*.json"):
         with suppress(FileNotFoundError):  # taken away since it was listed
-            found.append(json.loads(one.read_text())["left_running"])
+            found.append(json.loads(path.read_text())["left_running"])
     return found
 
 

@@ -195,8 +195,8 @@ def test_nothing_suspends_a_command_that_owns_a_line(name: str) -> None:
         assert program.process.stderr is not None
         reading = threading.Thread(target=lambda: output.extend(program.process.stderr or ()))
         reading.start()
-        for one in SUSPENDING:
-            program.process.send_signal(getattr(signal, one))
+        for text in SUSPENDING:
+            program.process.send_signal(getattr(signal, text))
         wait_until(lambda: sum(IGNORED in line for line in output) == 3, f"it says so: {output}")
         assert not is_suspended(program.process.pid)
         program.process.send_signal(signal.SIGUSR1)

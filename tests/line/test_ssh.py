@@ -176,10 +176,10 @@ class Counter:
         try:
             yield self
         finally:
-            for one in (self._listener, *self._open):
+            for item in (self._listener, *self._open):
                 with suppress(OSError):
-                    one.shutdown(socket.SHUT_RDWR)
-                one.close()
+                    item.shutdown(socket.SHUT_RDWR)
+                item.close()
             threads[0].join()
 
     def _accept(self) -> None:

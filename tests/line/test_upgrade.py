@@ -69,7 +69,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Package:
 
 def holders() -> set[str]:
     """The names of the programs that hold lines."""
-    return {one.program.name for one in owners()}
+    return {owner.program.name for owner in owners()}
 
 
 @pytest.mark.parametrize("more", [None, 1])

@@ -50,7 +50,11 @@ class OneDrive(FakeLine):
     @property
     def requested(self) -> list[tuple[int, int]]:
         """Address and count of all reads so far."""
-        return [(one.address, one.count) for one in self.requests if isinstance(one, Read)]
+        return [
+            (request.address, request.count)
+            for request in self.requests
+            if isinstance(request, Read)
+        ]
 
 
 def parameter(code: str, address: int, **more: object) -> dict[str, object]:

@@ -21,7 +21,7 @@ class Lacking(OneDrive):
 
     def __init__(self, family: str, *codes: str) -> None:
         self.profile = library.load(family)
-        super().__init__({one.address: 1 for one in self.profile.parameters})
+        super().__init__({parameter.address: 1 for parameter in self.profile.parameters})
         self.silent = {self.profile[code].address for code in codes}
 
     async def read(self, device: int, address: int, count: int = 1, **how: Any) -> Reply:
@@ -35,7 +35,11 @@ async def test_the_others_are_reported_and_the_silent_one_is_named() -> None:
     found = await read_apart(
         Reader(DriveSession(line, 1, line.profile)), ["15.06", "15.07", "10.40"]
     )
-    assert {code: one.raw for code, one in found.items()} == {"15.06": 1, "15.07": None, "10.40": 1}
+    assert {code: reading.raw for code, reading in found.items()} == {
+        "15.06": 1,
+        "15.07": None,
+        "10.40": 1,
+    }
     assert found["15.07"].error == NO_SUCH_WORD
 
 

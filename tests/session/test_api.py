@@ -164,9 +164,9 @@ def test_samples_follow_one_another(drive: Drive) -> None:
         samples.append(sample)
         if len(samples) == 4:
             break
-    assert all(one.values["RFR"].good and not one.error for one in samples)
-    assert {one.state for one in samples} == {"not ready"}
-    times = [one.values["ETA"].time for one in samples]
+    assert all(item.values["RFR"].good and not item.error for item in samples)
+    assert {item.state for item in samples} == {"not ready"}
+    times = [item.values["ETA"].time for item in samples]
     assert times == sorted(set(times))
 
 

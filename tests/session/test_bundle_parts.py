@@ -50,10 +50,10 @@ PARTS = (
 async def test_failed_part_ends_no_other() -> None:
     steps: list[tuple[int, int, str]] = []
     results = await collect_parts(PARTS, lambda *step: steps.append(step))
-    assert [one.missing for one in results] == [
+    assert [result.missing for result in results] == [
         "", "jdoe has it", "by zero", "It took longer than 0.01 s.", "",
     ]  # fmt: skip
-    assert [one.file is not None for one in results] == [True, False, False, False, True]
+    assert [result.file is not None for result in results] == [True, False, False, False, True]
     assert steps[0] == (0, 5, "x/a.txt")
     assert steps[-1] == (5, 5, "")
 
@@ -85,7 +85,7 @@ async def test_readme_names_files_reasons_and_what_was_omitted() -> None:
     with zipfile.ZipFile(io.BytesIO(made.data)) as opened:
         assert opened.testzip() is None
         texts = {name: opened.read(name).decode() for name in opened.namelist()}
-        assert all(one.external_attr >> 16 == 0o600 for one in opened.infolist())
+        assert all(info.external_attr >> 16 == 0o600 for info in opened.infolist())
     readme = texts["stem/README.txt"]
     assert not any("jdoe" in text for text in texts.values())
     assert texts["stem/x/a.txt"] == "of [user]"
@@ -120,4 +120,4 @@ async def test_nothing_is_sent_to_a_drive_if_its_diagnosis_sends_nothing() -> No
     assert why.file is not None
     assert why.file.content == {"why": True}
     assert len(others) == 3
-    assert all("Nothing was sent to the drive." in one.missing for one in others)
+    assert all("Nothing was sent to the drive." in other.missing for other in others)

@@ -39,7 +39,7 @@ def subject_of(text: str) -> BundleSubject:
 
 
 async def collected(text: str) -> dict[str, PartResult]:
-    return {one.part.name: one for one in await collect_parts([*past_parts(subject_of(text))])}
+    return {part.part.name: part for part in await collect_parts([*past_parts(subject_of(text))])}
 
 
 async def test_past_of_a_line_of_another_program_is_collected() -> None:
@@ -70,7 +70,7 @@ async def test_frames_from_before_the_bundle_are_not_displaced_by_it() -> None:
     subject.opened = OpenLine("/dev/nosuch", line)
     parts = [*past_parts(subject)]
     line.trace = tuple(frames[2:])
-    found = {one.part.name: one for one in await collect_parts(parts)}
+    found = {part.part.name: part for part in await collect_parts(parts)}
     file = found["frames.raw.pcapng"].file
     assert file is not None
     assert file.note.startswith("6 frames")

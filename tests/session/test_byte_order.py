@@ -108,7 +108,7 @@ async def test_monitor_of_swapped_bytes_shows_no_good_value(kind: str) -> None:
         assert snapshot is not None
         assert snapshot.contact == "swapped"
         assert "arrive swapped" in snapshot.error
-        assert {one.quality for one in snapshot.readings.values()} == {Quality.BAD}
+        assert {reading.quality for reading in snapshot.readings.values()} == {Quality.BAD}
         assert snapshot.state.kind == "unknown"
         assert session.image.raws == {}
         mend(simulation)
@@ -210,7 +210,9 @@ async def test_healthy_drive_shows_no_swapped_word(family: str, state: str) -> N
     with line_to(spec, HEALTHY) as (simulation, _, session):
         if state == "fault":
             codes = session.profile.data.faults.codes
-            simulation.drive(1).provoke(next((one.raw for one in codes if one.raw), 1))
+            simulation.drive(1).provoke(
+                next((fault_code.raw for fault_code in codes if fault_code.raw), 1)
+            )
         if state == "running":
             await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
         await check(session)
@@ -227,24 +229,24 @@ async def test_healthy_drive_shows_no_swapped_word(family: str, state: str) -> N
 def test_value_in_its_documented_range_is_never_one_swapped(family: str) -> None:
     profile = library.load(family)
     judged = 0
-    for one in profile.parameters:
-        if word_count(one) != 1 or is_field(one):
+    for parameter in profile.parameters:
+        if word_count(parameter) != 1 or is_field(parameter):
             continue
-        low, high = raw_range(one)
-        if is_enumeration(one):
-            raws = set(profile.names(one))
+        low, high = raw_range(parameter)
+        if is_enumeration(parameter):
+            raws = set(profile.names(parameter))
         else:
             raws = {
                 low,
                 high,
                 (low + high) // 2,
-                one.factory or low,
+                parameter.factory or low,
                 *range(low, min(high, low + 300)),
             }
         for raw in raws:
-            to_words(one, raw)
+            to_words(parameter, raw)
             judged += 1
-            assert only_swapped(profile, one, raw) is not True, f"{one.code} {raw}"
+            assert only_swapped(profile, parameter, raw) is not True, f"{parameter.code} {raw}"
     assert judged > 100
 
 

@@ -47,7 +47,7 @@ def arm(bench: Bench, device: int, family: str) -> None:
     assert bench.line.facts.holder.hear_care(device, care)
 
 
-@pytest.mark.parametrize("family", [one.id for one in library.listings()])
+@pytest.mark.parametrize("family", [listing.id for listing in library.listings()])
 def test_a_profile_arrives_as_it_was_sent(family: str) -> None:
     profile = library.load(family)
     assert unpacked_profile(profile.packed).data == profile.data
@@ -55,9 +55,9 @@ def test_a_profile_arrives_as_it_was_sent(family: str) -> None:
 
 def test_a_damaged_profile_is_an_error_of_its_own() -> None:
     packed = library.load("atv71").packed
-    for one in (b"", b"no profile", packed[:-9], packed[:200] + bytes(9) + packed[209:]):
+    for data in (b"", b"no profile", packed[:-9], packed[:200] + bytes(9) + packed[209:]):
         with pytest.raises(ProfileError, match="Another program sent a damaged profile"):
-            unpacked_profile(one)
+            unpacked_profile(data)
     assert 10 * len(msgspec.json.encode(library.load("atv71").data)) < LONGEST_UNPACKED
 
 

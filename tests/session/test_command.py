@@ -176,7 +176,7 @@ async def test_the_journal_keeps_every_word() -> None:
         await made.done()
         await made.order("forward")
     lines = [json.loads(line) for line in Journal().path.read_text("utf-8").splitlines()]
-    assert [(one["code"], one["new_raw"]) for one in lines] == [
+    assert [(item["code"], item["new_raw"]) for item in lines] == [
         ("LFR", 125), ("LFR", 125), ("CMD", 6), ("CMD", 15),
     ]  # fmt: skip
     first = lines[0]

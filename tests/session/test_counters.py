@@ -50,7 +50,7 @@ def count(frames: int, damaged: int = 0, *, sent: int = 0, answered: int = 0) ->
 
 def reported(before: DriveCount, now: DriveCount) -> dict[str, int]:
     found = Comparison(before, before).with_look(now)
-    return {one.kind: one.count for one in differences(found)}
+    return {difference.kind: difference.count for difference in differences(found)}
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_roll_overs_are_undone_whatever_was_sent_between(
         sent, seen = sent + ours, seen + ours + foreign
         found = found.with_look(count((start + seen) % 65536, sent=sent, answered=sent))
     assert found.frames == seen
-    kinds = {one.kind: one.count for one in differences(found)}
+    kinds = {difference.kind: difference.count for difference in differences(found)}
     assert kinds == ({"not-from-here": seen - sent} if seen > sent else {})
 
 
@@ -168,7 +168,9 @@ async def test_frames_that_the_drive_saw_and_we_did_not_get(tcp: bool) -> None:
         simulation.faults.rates = FaultRates()
         await watch.look()
         now = watch.now()
-        assert [(one.kind, one.count) for one in now.differences] == [("not-answered", 3)]
+        assert [(difference.kind, difference.count) for difference in now.differences] == [
+            ("not-answered", 3)
+        ]
         assert now.since.timeouts == 3
         counted = dict(now.drive)
         # both ways to ask tell the same counters; the keypad port has heard nothing
@@ -187,7 +189,9 @@ async def test_frames_that_answer_no_request_are_explained(tcp: bool) -> None:
         simulation.faults.rates = FaultRates()
         await asyncio.sleep(0.1)
         await watch.look()
-        (strays,) = (one for one in watch.now().differences if one.kind == "strays")
+        (strays,) = (
+            difference for difference in watch.now().differences if difference.kind == "strays"
+        )
         assert strays.count == 3
         assert "3 copies of replies" in strays.text
         watch.reset_ours()
@@ -213,7 +217,7 @@ async def test_damaged_frames_and_those_of_another_master() -> None:
         drive.line_side.answer(2, b"\x03\x0c\x81\x00\x01")
         drive.line_side.count_checksum_error()
         await watch.look()
-        kinds = {one.kind: one.count for one in watch.now().differences}
+        kinds = {difference.kind: difference.count for difference in watch.now().differences}
         assert kinds == {"damaged-there": 1, "not-from-here": 2}
 
 
@@ -246,7 +250,7 @@ async def test_counters_that_somebody_else_reset_are_reported() -> None:
         await watch.look()
         await line.diagnose(2, 0x0A)
         await watch.look()
-        assert [one.kind for one in watch.now().differences] == ["counted-anew"]
+        assert [difference.kind for difference in watch.now().differences] == ["counted-anew"]
         await ask(line, 3)
         await watch.look()
         watch.reset_ours()
@@ -277,7 +281,9 @@ async def test_a_drive_without_counters_has_ours_alone() -> None:
         simulation.faults.rates = FaultRates(lost=1.0)
         assert await watch.echo(2) == 0
         now = watch.now()
-        assert [(one.kind, one.count) for one in now.differences] == [("no-answer", 2)]
+        assert [(difference.kind, difference.count) for difference in now.differences] == [
+            ("no-answer", 2)
+        ]
         assert now.drive == ()
 
 
@@ -288,4 +294,4 @@ async def test_a_silent_drive_is_reported_and_hides_nothing() -> None:
         await watch.look()
         now = watch.now()
         assert "did not answer" in now.trouble
-        assert [one.kind for one in now.differences] == ["no-answer"]
+        assert [difference.kind for difference in now.differences] == ["no-answer"]

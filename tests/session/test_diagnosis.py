@@ -81,8 +81,8 @@ def line() -> Iterator[OpenedLine]:
         return lines[-1]
 
     yield opened
-    for one in lines:
-        one.close()
+    for item in lines:
+        item.close()
 
 
 async def why(line: ModbusLine, device: int = 2, family: str | None = "atv71") -> Diagnosis:

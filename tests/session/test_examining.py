@@ -130,7 +130,7 @@ def test_an_older_reply_is_counted_by_what_else_came(
 def test_one_behind_is_at_once_and_a_late_reply_is_not(after: float, kind: str) -> None:
     frames = [Frame(0, "out", ASKED), Frame(1, "out", WIDE), Frame(1 + after, "in", REPLY, OLD)]
     found = measure_of(frames, 2)
-    assert {one: found.count(one) for one in ("behind", "late")} == {
+    assert {text: found.count(text) for text in ("behind", "late")} == {
         "behind": int(kind == "behind"),
         "late": int(kind == "late"),
     }

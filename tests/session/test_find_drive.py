@@ -134,7 +134,7 @@ class LosesReads(FakeLine):
 
     async def read(self, device: int, address: int, *some: int, **how: Any) -> Reply:
         reply = await super().read(device, address, *some, **how)
-        if sum(isinstance(one, Read) for one in self.requests) == 2:
+        if sum(isinstance(request, Read) for request in self.requests) == 2:
             raise NoAnswer(device, 3, address)
         return reply
 

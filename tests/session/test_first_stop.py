@@ -35,7 +35,11 @@ def frames(line: Line) -> list[bytes]:
 
 @pytest.mark.parametrize(
     ("family", "named"),
-    [*((one, "") for one in FAMILIES), *((one, "atv312") for one in FAMILIES), ("atv21", "atv71")],
+    [
+        *((item, "") for item in FAMILIES),
+        *((entry, "atv312") for entry in FAMILIES),
+        ("atv21", "atv71"),
+    ],
 )
 async def test_it_stops_each_family_before_that_was_requested_what_it_is(
     start: Start, journal: Journal, family: str, named: str
@@ -45,7 +49,7 @@ async def test_it_stops_each_family_before_that_was_requested_what_it_is(
     sent = await first(line, journal, *([named] if named else []))
     assert sent.taken is not None
     assert (sent.taken.address, sent.taken.word) == WORDS[family]
-    assert family in {one.id for one in sent.taken.families}
+    assert family in {profile.id for profile in sent.taken.families}
     assert 43 not in {frame[1] for frame in frames(line)}
     await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
     # whoever was named wrongly was ruled out by its status word, or heard nothing

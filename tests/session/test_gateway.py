@@ -234,7 +234,7 @@ async def test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them(
     assert (await asyncio.wait_for(stop, 30))[0] == 6
     assert made.written() == [(ACC, 57), (CMD, 0x0007)]
     silent.set()
-    assert [(await one)[:2] for one in before] == [bytes([0x86, 6])] * 3
+    assert [(await task)[:2] for task in before] == [bytes([0x86, 6])] * 3
     assert (await behind)[0] == 6
     assert made.written() == [(ACC, 57), (CMD, 0x0007), (LFR, 200)]
 
@@ -261,7 +261,7 @@ async def test_a_word_that_stops_by_what_was_set_before_it_waits_for_that(bench:
     await asyncio.sleep(0.1)
     assert made.written() == sent
     silent.set()
-    assert [(await one)[:2].hex() for one in tasks] == ["0620", "8601"]
+    assert [(await task)[:2].hex() for task in tasks] == ["0620", "8601"]
 
 
 async def test_a_stop_among_words_that_are_not_allowed_goes_out_alone(bench: Make) -> None:

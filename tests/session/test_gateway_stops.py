@@ -53,7 +53,7 @@ class Wire:
 
     def requests(self) -> list[bytes]:
         """Function, address and word of each request that has come to the drives."""
-        return [one.request[1:6] for one in self.recording.exchanges]
+        return [exchange.request[1:6] for exchange in self.recording.exchanges]
 
     async def known(self) -> None:
         """A client has asked for the drive, and it was found out which it is."""
@@ -125,10 +125,10 @@ async def test_polls_wait_for_next_read_of_client(
     for _ in range(30):
         await asyncio.sleep(0.02)  # more than the silence between two frames
         await wire.read(ACC)
-    polled = [one for one in wire.requests()[before:] if one[1] == 3000 >> 8]
+    polled = [request for request in wire.requests()[before:] if request[1] == 3000 >> 8]
     assert len(polled) < 20
-    for one in polls:
-        one.cancel()
+    for poll in polls:
+        poll.cancel()
 
 
 async def test_stop_after_write_is_preceded_by_one_read(wire: Wire) -> None:
@@ -162,7 +162,7 @@ async def test_stops_of_one_host_do_not_hold_up_that_of_another(wire: Wire) -> N
     wire.client.host = "10.0.0.9"
     other = TcpClient(2, "10.0.0.8:5000", "10.0.0.8")
     words = [struct.pack(">BHHHHBH", 23, ETA, count, CMD, 1, 2, 0x0007) for count in range(1, 50)]
-    flood = [asyncio.create_task(wire.ask(one)) for one in words]
+    flood = [asyncio.create_task(wire.ask(word)) for word in words]
     await asyncio.sleep(0)
     before = len(wire.requests())
     answer = await wire.gateway.answer(TcpRequest(other, 1, STOP))

@@ -77,8 +77,8 @@ class Bench:
             facts.me = Program(facts.me.id, "panel", facts.me.pid)
             facts.set_programs((facts.me, GONE))
         sessions = {
-            one: DriveSession(self.line, one, library.load(profile), clock=self.clock)
-            for one, profile in ((1, "atv71"), (2, "atv312"))
+            number: DriveSession(self.line, number, library.load(profile), clock=self.clock)
+            for number, profile in ((1, "atv71"), (2, "atv312"))
         }
         return OrphanMotorGuard(
             self.line,
@@ -122,9 +122,9 @@ class Bench:
     def records(self) -> list[int]:
         """The drives of which a start is on record."""
         found = []
-        for one in self.files():
+        for file in self.files():
             with suppress(FileNotFoundError):  # taken away since it was listed
-                found.append(json.loads(one.read_text())["device"])
+                found.append(json.loads(file.read_text())["device"])
         return found
 
     def files(self) -> list[Path]:
@@ -137,7 +137,7 @@ class Bench:
         loop.call_soon_threadsafe(self.line.facts.hear_gone, program)
 
     def says(self, text: str) -> bool:
-        return any(text in one for _, one in self.reported)
+        return any(text in item for _, item in self.reported)
 
     def close(self) -> None:
         self.line.close()

@@ -92,7 +92,11 @@ async def test_stop_of_a_silent_drive_of_unlike_families_sends_the_word_of_all(
     stopper.stop([session])
     report = await ended(stopper, 1)
     assert report.text == "NOT STOPPED: it did not answer. Stop it at the machine."
-    sent = {(one.address, one.value) for one in line.requests if isinstance(one, WriteOne)}
+    sent = {
+        (request.address, request.value)
+        for request in line.requests
+        if isinstance(request, WriteOne)
+    }
     assert sent == {(COMMAND, 0x0000)}
 
 
@@ -114,7 +118,11 @@ async def test_a_guess_among_families_that_stop_otherwise_sends_what_stops_them_
         assert report.phase is Phase.FAILED
         assert "it is not known if the motor stopped" in report.text
         assert "Read as" not in report.text
-    sent = [(one.address, one.value) for one in line.requests if isinstance(one, WriteOne)]
+    sent = [
+        (request.address, request.value)
+        for request in line.requests
+        if isinstance(request, WriteOne)
+    ]
     assert sent == [(COMMAND, 0x0000)] * len(sessions)
 
 

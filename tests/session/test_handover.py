@@ -67,7 +67,7 @@ class Bench:
         self.session = DriveSession(self.line, 1, library.load("atv71"), clock=self.clock)
         self.session.starts = self.starts
         self.handover = Handover(
-            self.line, self.events, lambda one: self.session if one == 1 else None, self.clock
+            self.line, self.events, lambda number: self.session if number == 1 else None, self.clock
         )
         self.handover.person = True
 
@@ -77,7 +77,7 @@ class Bench:
 
     @property
     def reported(self) -> list[str]:
-        return [one.text for one in self.events.events]
+        return [event.text for event in self.events.events]
 
     def starts_files(self) -> list[Path]:
         """The starts on record."""
@@ -85,7 +85,7 @@ class Bench:
 
     @property
     def answers(self) -> list[tuple[object, ...]]:
-        return [one for one in self.voice.output if one[0] == "reply"]
+        return [pair for pair in self.voice.output if pair[0] == "reply"]
 
     def close(self) -> None:
         self.handover.close()
@@ -163,7 +163,7 @@ async def test_a_stop_of_another_program_ends_arming_and_work_and_is_reported(be
     bench.facts.hear_stop((1,), "the stop key", REMOTE)
     assert not bench.session.arming.armed
     assert bench.session.work.stops == before + 1
-    assert any("Stop from panel on pts/9 (pid 77)" in one for one in bench.reported)
+    assert any("Stop from panel on pts/9 (pid 77)" in text for text in bench.reported)
     bench.session.arming.arm()
     bench.facts.hear_stop((2,), "the stop key", REMOTE)
     assert bench.session.arming.armed
@@ -177,7 +177,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
     bench.facts.hear_question(1, REMOTE)
     request = bench.handover.requests[1]
     assert request.program == REMOTE
-    assert any("asks for this drive. G answers" in one for one in bench.reported)
+    assert any("asks for this drive. G answers" in text for text in bench.reported)
     bench.handover.answer(bench.handover.requests[1], yes=True)
     assert bench.handover.requests == {}
     assert bench.answers == [("reply", 1, REMOTE.id, True)]
@@ -223,7 +223,7 @@ async def test_an_answered_question_does_not_expire_into_another_answer(bench: B
     bench.facts.hear_question(1, REMOTE)
     await expires(bench)
     await asyncio.sleep(0.05)
-    assert [one[3] for one in bench.answers] == [False, False]
+    assert [answer[3] for answer in bench.answers] == [False, False]
 
 
 @pytest.mark.parametrize(("status", "yes"), [(0x0233, True), (0x0637, False), (None, False)])
@@ -382,5 +382,5 @@ async def test_a_fleet_comes_to_a_line_on_which_another_program_commands() -> No
     line.facts.set_programs((line.facts.me, REMOTE))
     line.facts.note_commander(1, REMOTE.id)
     fleet = Fleet(line, Journal())
-    assert any("commands this drive now" in one.text for one in fleet.events.events)
+    assert any("commands this drive now" in event.text for event in fleet.events.events)
     fleet.handover.close()

@@ -42,21 +42,21 @@ def stopped(line: FakeLine) -> Heard:
     """What other programs hear of a stop of all drives."""
     voice = line.facts.voice = Heard()
     stopper = Stopper(line, Journal())
-    stopper.stop([DriveSession(line, one, library.load("atv71")) for one in DRIVES])
+    stopper.stop([DriveSession(line, drive, library.load("atv71")) for drive in DRIVES])
     return voice
 
 
 async def direct_stop(voice: Heard) -> tuple[object, ...] | None:
     """The first stop that goes around the loop, if one does within some seconds."""
     for _ in range(500):
-        if found := [one for one in voice.output if one[0] == "directly"]:
+        if found := [pair for pair in voice.output if pair[0] == "directly"]:
             return found[0]
         await asyncio.sleep(0.01)
     return None
 
 
 async def test_the_keeper_stops_drives_whose_stop_does_not_begin() -> None:
-    voice = stopped(HungLine({one: {} for one in DRIVES}))
+    voice = stopped(HungLine({drive: {} for drive in DRIVES}))
     assert await direct_stop(voice) == ("directly", DRIVES)
 
 
@@ -72,10 +72,10 @@ async def test_a_keeper_that_does_not_answer_is_requested_again(
             if len(tries) < 3:
                 raise OSError("it does not answer")
 
-    line = HungLine({one: {} for one in DRIVES})
+    line = HungLine({drive: {} for drive in DRIVES})
     line.facts.voice = Silent()
     stopper = Stopper(line, Journal())
-    stopper.stop([DriveSession(line, one, library.load("atv71")) for one in DRIVES])
+    stopper.stop([DriveSession(line, drive, library.load("atv71")) for drive in DRIVES])
     for _ in range(500):
         if len(tries) >= 3:
             break
@@ -86,7 +86,7 @@ async def test_a_keeper_that_does_not_answer_is_requested_again(
 
 async def test_a_loop_that_works_needs_no_other_way(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(under_way, "HANGS_AFTER", 3.0)
-    voice = stopped(FakeLine({one: {} for one in DRIVES}))
+    voice = stopped(FakeLine({drive: {} for drive in DRIVES}))
     assert await direct_stop(voice) is None
 
 

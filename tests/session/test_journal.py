@@ -116,7 +116,7 @@ def test_nobody_waits_for_a_disk_that_hangs(journal: Journal, disk: Disk) -> Non
         journal.add(entry(number))
     assert disk.hangs.wait(PATIENCE)
     journal.add(entry(20))
-    assert [one.new_raw for one in journal.recent] == list(range(21))
+    assert [item.new_raw for item in journal.recent] == list(range(21))
     assert not journal.flush(0.01)
     assert not journal.close(0.01)
     disk.works.set()
@@ -184,7 +184,7 @@ def test_entries_of_several_threads_keep_their_order(journal: Journal) -> None:
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(add, range(0, 400, 100)))
-    order = [one.new_raw for one in journal.recent]
+    order = [item.new_raw for item in journal.recent]
     assert len(order) == 200
     assert journal.flush(PATIENCE)
     assert kept(journal) == order
@@ -203,7 +203,7 @@ def test_a_folder_that_cannot_be_written(
     assert not made.flush(PATIENCE * 10)
     assert not made.close(PATIENCE * 10)
     wait_until(lambda: not threads(disk), "nobody tries any more")
-    assert [one.new_raw for one in made.recent] == [1]
+    assert [item.new_raw for item in made.recent] == [1]
     # the person mends it
     (tmp_path / "file").unlink()
     made.add(entry(2))
@@ -253,7 +253,7 @@ def test_a_disk_that_comes_back_gets_what_it_missed(
     # nobody has to ask for it
     wait_until(lambda: journal.trouble == "" and journal.flush(), "it is written")
     assert kept(journal) == list(range(6))
-    assert [one.new_raw for one in entries_of(journal, "line", 1)] == list(range(6))
+    assert [item.new_raw for item in entries_of(journal, "line", 1)] == list(range(6))
     assert journal.lost == 0
     assert caplog.text.count("the journal cannot be written") == 1
     assert "written again" in caplog.text
@@ -291,7 +291,7 @@ def test_old_files_make_room(journal: Journal, monkeypatch: pytest.MonkeyPatch) 
         journal_file.JOURNAL_NAME,
         *(f"{journal_file.JOURNAL_NAME}.{n}" for n in range(1, 10)),
     ]
-    held = [one.new_raw for one in entries_of(journal, "line", 1)]
+    held = [item.new_raw for item in entries_of(journal, "line", 1)]
     assert held == [number % 10 for number in range(10, 30)]
 
 
@@ -299,7 +299,7 @@ def test_a_line_that_was_cut_off_damages_no_other(journal: Journal) -> None:
     journal.path.parent.mkdir()
     journal.path.write_text('{"time": "a power cut')
     journal.add(entry(1))
-    assert [one.new_raw for one in entries_of(journal, "line", 1)] == [1]
+    assert [item.new_raw for item in entries_of(journal, "line", 1)] == [1]
 
 
 def test_reader_sees_latest_entry(journal: Journal) -> None:

@@ -93,7 +93,7 @@ def reported(journal: Journal) -> list[Entry | DamagedLine]:
 
 
 def numbers(journal: Journal) -> list[int]:
-    return [one.new_raw for one in reported(journal) if isinstance(one, Entry)]
+    return [entry.new_raw for entry in reported(journal) if isinstance(entry, Entry)]
 
 
 @pytest.mark.parametrize("half", [b'{"time": "2026-01-01T00:00:00.000+00:00", "li', b"\0" * 700])
@@ -109,9 +109,9 @@ def test_half_a_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
     mark, first, second = data[len(whole + half) + 1 :].splitlines()
     assert json.loads(mark)["kind"] == "mended"
     assert "cut off" in json.loads(mark)["why"]
-    assert [json.loads(one)["new_raw"] for one in (first, second)] == [1, 2]
-    damaged = [one for one in reported(journal) if isinstance(one, DamagedLine)]
-    assert [one.number for one in damaged] == [1, 2]
+    assert [json.loads(item)["new_raw"] for item in (first, second)] == [1, 2]
+    damaged = [item for item in reported(journal) if isinstance(item, DamagedLine)]
+    assert [line.number for line in damaged] == [1, 2]
     assert half.startswith(damaged[1].text.encode()[:10])
 
 
@@ -128,19 +128,19 @@ def test_several_programs_lose_nothing_and_mix_no_lines(tmp_path: Path) -> None:
         for first in range(0, 400, 100)
     ]
     try:
-        for one in programs:
-            assert one.stdout is not None
-            assert one.stdout.readline() == "ready\n"
+        for program in programs:
+            assert program.stdout is not None
+            assert program.stdout.readline() == "ready\n"
         # all begin at a time
-        output = [one.communicate("\n", timeout=PATIENCE)[1] for one in programs]
-        assert [one.returncode for one in programs] == [0] * 4, output
+        output = [program.communicate("\n", timeout=PATIENCE)[1] for program in programs]
+        assert [program.returncode for program in programs] == [0] * 4, output
     finally:
-        for one in programs:
-            one.kill()
-            one.wait()
+        for program in programs:
+            program.kill()
+            program.wait()
     journal = Journal(tmp_path / "state")
     assert len([file for file in journal.files if file.exists()]) > 3
-    assert not [one for one in reported(journal) if isinstance(one, DamagedLine)]
+    assert not [entry for entry in reported(journal) if isinstance(entry, DamagedLine)]
     wanted = [n for first in range(0, 400, 100) for n in range(first, first + 40)]
     assert sorted(numbers(journal)) == wanted
 

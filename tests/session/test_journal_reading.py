@@ -19,8 +19,8 @@ from tui.session.journal_reading import DamagedLine, completed, read_journal, se
 from .test_journal import entry
 
 
-def line_of(one: Entry) -> bytes:
-    return json.dumps(asdict(one)).encode() + b"\n"
+def line_of(entry: Entry) -> bytes:
+    return json.dumps(asdict(entry)).encode() + b"\n"
 
 
 def reported(file: Path) -> list[Entry | DamagedLine]:
@@ -36,7 +36,7 @@ def test_whole_entries_are_found_among_anything(
     for number, data in enumerate(garbage, start=1):
         parts += [data.replace(b"\n", b" ") + b"\n", line_of(entry(number))]
     file.write_bytes(b"".join(parts))
-    numbers = [one.new_raw for one in reported(file) if isinstance(one, Entry)]
+    numbers = [item.new_raw for item in reported(file) if isinstance(item, Entry)]
     assert numbers == list(range(len(garbage) + 1))
 
 
@@ -58,8 +58,8 @@ ODD = {
 def test_odd_lines_are_reported_and_hide_nothing(name: str, tmp_path: Path) -> None:
     file = tmp_path / "journal.jsonl"
     file.write_bytes(line_of(entry(1)) + ODD[name] + b"\n" + line_of(entry(2)) + b"half")
-    one, odd, two, half = reported(file)
-    assert (one, two) == (entry(1), entry(2))
+    item, odd, two, half = reported(file)
+    assert (item, two) == (entry(1), entry(2))
     assert isinstance(odd, DamagedLine)
     assert isinstance(half, DamagedLine)
     assert (odd.number, half.number, half.text) == (2, 4, "half")
@@ -87,7 +87,7 @@ def test_a_file_without_end_is_read_at_its_end(
     monkeypatch.setattr(journal_reading, "READ_MOST", 1000)
     file = tmp_path / "journal.jsonl"
     file.write_bytes(b"".join(line_of(entry(number)) for number in range(50)))
-    found = [one.new_raw for one in reported(file) if isinstance(one, Entry)]
+    found = [item.new_raw for item in reported(file) if isinstance(item, Entry)]
     assert 0 < len(found) < 10
     assert found == list(range(50 - len(found), 50))
 
@@ -100,12 +100,12 @@ def test_a_pipe_in_its_place_holds_nobody_up(tmp_path: Path) -> None:
 
 
 def test_read_back_completes_only_its_own_write() -> None:
-    one = replace(entry(1), time="t1", answer="no answer.")
+    item = replace(entry(1), time="t1", answer="no answer.")
     two = replace(entry(1), time="t2", answer="no answer.", device=2)
-    back = replace(one, time="t3", kind="read-back", of="t1", answer="Taken.", read_back=1)
+    back = replace(item, time="t3", kind="read-back", of="t1", answer="Taken.", read_back=1)
     lone = replace(back, of="t0")
-    assert completed([one, two, back, lone]) == [
-        replace(one, answer="no answer. Taken.", read_back=1),
+    assert completed([item, two, back, lone]) == [
+        replace(item, answer="no answer. Taken.", read_back=1),
         two,
         lone,
     ]
@@ -120,7 +120,7 @@ def test_a_drive_a_line_and_a_time_are_selected() -> None:
     ]
 
     def numbers(**how: object) -> list[int]:
-        return [one.new_raw for one in selected(here, **how)]  # type: ignore[arg-type]
+        return [item.new_raw for item in selected(here, **how)]  # type: ignore[arg-type]
 
     assert numbers() == [1, 2, 3, 4]
     assert numbers(device=2) == [2]

@@ -58,7 +58,7 @@ async def test_fields_of_one_register_come_in_one_read() -> None:
     line = OneDrive({10: 0x8015, 11: 7})
     session = armed(line, FIELDS)
     readings = await Reader(session).read(["LOW", "MID", "TOP", "WHOLE"])
-    assert {code: one.raw for code, one in readings.items()} == {
+    assert {code: reading.raw for code, reading in readings.items()} == {
         "LOW": 5, "MID": 1, "TOP": 1, "WHOLE": 7,
     }  # fmt: skip
     mid = readings["MID"].value
@@ -103,7 +103,9 @@ def test_a_field_is_never_a_word_by_itself() -> None:
 
 def test_functions_3_and_4_are_never_read_in_one() -> None:
     plan = plan_reads(FIELDS, ["LOW", "WHOLE", "SPEED", "AMPS"])
-    requested = sorted((one.function, one.address, one.count) for one in plan.requests)
+    requested = sorted(
+        (request.function, request.address, request.count) for request in plan.requests
+    )
     assert requested == [(3, 10, 2), (4, 10, 2)]
 
 
@@ -297,7 +299,7 @@ async def saved(
     session = armed(line, profile)
     permit: Permit = session.work.permit()
     reported = await save_to_eeprom(session, journal, permit)
-    return reported, [one for one in line.requests if isinstance(one, WriteOne)]
+    return reported, [request for request in line.requests if isinstance(request, WriteOne)]
 
 
 async def test_a_save_word_may_keep_its_value(journal: Journal) -> None:

@@ -11,7 +11,7 @@ from tui.session.monitor.line_health import LineHealth, percent
 
 
 def counted(line: LastMinute, drives: Mapping[int, LastMinute] | None = None) -> LineCounters:
-    each = {device: DeviceCounters(minute=one) for device, one in (drives or {}).items()}
+    each = {device: DeviceCounters(minute=minute) for device, minute in (drives or {}).items()}
     return LineCounters(minute=line, devices=each)
 
 
@@ -20,7 +20,7 @@ def kinds_after(*minutes: LastMinute) -> list[Sequence[str]]:
     health, found = LineHealth(), list[Sequence[str]]()
     for minute in minutes:
         health.look(counted(minute, {1: minute}))
-        found.append([one.kind for one in health.troubles])
+        found.append([trouble.kind for trouble in health.troubles])
     return found
 
 
@@ -48,10 +48,10 @@ def test_a_trouble_ends_later_than_it_began() -> None:
     assert kinds_after(little, poor, little, well, little) == [[], ["poor"], ["poor"], [], []]
     few = LastMinute(good=10, lost=1)
     assert kinds_after(few, poor, few, LastMinute()) == [[], ["poor"], ["poor"], []]
-    one, none = LastMinute(good=99, foreign=1, strays=1), LastMinute(good=99)
+    minute, none = LastMinute(good=99, foreign=1, strays=1), LastMinute(good=99)
     both = LastMinute(good=99, foreign=3, strays=3)
     strange = ["foreign", "strays"]
-    assert kinds_after(one, both, one, none, one) == [[], strange, strange, [], []]
+    assert kinds_after(minute, both, minute, none, minute) == [[], strange, strange, [], []]
 
 
 def test_a_new_trouble_is_reported_once_and_so_is_its_end() -> None:
@@ -108,4 +108,4 @@ def test_the_worst_drive_is_that_with_most_lost_replies() -> None:
 
 def test_a_share_is_never_rounded_up_to_a_better_one() -> None:
     shares = (None, 0.0, 0.9799, 0.999, 1.0)
-    assert [percent(one) for one in shares] == [" --", "  0", " 97", " 99", "100"]
+    assert [percent(share) for share in shares] == [" --", "  0", " 97", " 99", "100"]

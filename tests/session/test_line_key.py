@@ -41,8 +41,8 @@ def test_a_link_that_leads_elsewhere_now_is_another_line(tmp_path: Path) -> None
         ("sim:atv71@2,atv21", "SIM: atv21@1, ATV71@2"),
     ],
 )
-def test_spellings_of_one_line(one: str, other: str) -> None:
-    assert line_key(one) == line_key(other)
+def test_spellings_of_one_line(text: str, other: str) -> None:
+    assert line_key(text) == line_key(other)
 
 
 @pytest.mark.parametrize(
@@ -58,8 +58,8 @@ def test_spellings_of_one_line(one: str, other: str) -> None:
         ("sim:atv71", "sim:atv21"),
     ],
 )
-def test_different_lines(one: str, other: str) -> None:
-    assert line_key(one) != line_key(other)
+def test_different_lines(text: str, other: str) -> None:
+    assert line_key(text) != line_key(other)
 
 
 def test_a_name_of_the_hosts_file_is_its_number(

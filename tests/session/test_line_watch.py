@@ -97,11 +97,11 @@ async def keep() -> AsyncIterator[Callable[[int], Kept]]:
     """Looks after drives until the test has ended."""
     made: list[Kept] = []
 
-    def one(tenths: int) -> Kept:
+    def keep_alive(tenths: int) -> Kept:
         made.append(Kept(tenths))
         return made[-1]
 
-    yield one
+    yield keep_alive
     for kept in made:
         await kept.end()
 
@@ -153,7 +153,7 @@ async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None
     strangers = UnknownDrivePoller(line)
     strangers.keep(7)
     await until(lambda: kept_alive(line) != [])
-    assert [(one.device, one.timeout) for one in kept_alive(line)] == [(7, UNKNOWN_TIMEOUT)]
+    assert [(alive.device, alive.timeout) for alive in kept_alive(line)] == [(7, UNKNOWN_TIMEOUT)]
     strangers.stop()
     assert kept_alive(line) == []
 

@@ -57,7 +57,7 @@ class Heard:
 
     @property
     def texts(self) -> list[str]:
-        return [exchange_text(one, self.families) for one in self.reported]
+        return [exchange_text(exchange, self.families) for exchange in self.reported]
 
     @property
     def summary(self) -> ListeningSummary:
@@ -74,7 +74,7 @@ def named(*profile_ids: str) -> Families:
 
 
 def values(reported: ToldExchange) -> dict[str, str]:
-    return {one.code: one.value.display for one in reported.values}
+    return {value.code: value.value.display for value in reported.values}
 
 
 BOTH = read_write_frame(2, 3201, 2, 8501, [6])
@@ -101,7 +101,7 @@ BOTH_REPLY = reply_words(2, 0x0637, 425, function=23)
 )  # fmt: skip
 def test_an_exchange_in_words(readings: tuple[bytes, ...], text: str) -> None:
     found = Heard(named("atv31", "atv71")).say(*readings).rest().texts
-    assert any(one.startswith(text) for one in found), found
+    assert any(item.startswith(text) for item in found), found
 
 
 def test_identity_text_does_not_control_terminal() -> None:
@@ -113,8 +113,8 @@ def test_identity_text_does_not_control_terminal() -> None:
 
 def test_values_that_were_refused_or_not_confirmed_are_none() -> None:
     heard = Heard(named("atv31", "atv71")).say(COMMAND, frame(2, b"\x86\x03"), COMMAND).rest()
-    assert [one.values for one in heard.reported] == [(), ()]
-    assert [requested_names(one) for one in heard.reported] == [["CMD"], ["CMD"]]
+    assert [exchange.values for exchange in heard.reported] == [(), ()]
+    assert [requested_names(exchange) for exchange in heard.reported] == [["CMD"], ["CMD"]]
 
 
 def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() -> None:
@@ -127,8 +127,8 @@ def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() 
             "identified": Families(PROFILES, {1: library.load("atv31")}, {2: "atv312"}),
         }.items()
     }
-    assert {how: one.how for how, one in taken.items() if one} == {k: k for k in taken}
-    assert [one.profile.id for one in taken.values() if one] == ["atv31", "atv71"]
+    assert {how: profile.how for how, profile in taken.items() if profile} == {k: k for k in taken}
+    assert [profile.profile.id for profile in taken.values() if profile] == ["atv31", "atv71"]
     remembered = Heard(Families(PROFILES, None, {2: "atv312"})).say(READ, WORDS).reported[-1].family
     assert remembered is not None
     assert (remembered.how, remembered.profile.id) == ("remembered", "atv312")
@@ -147,10 +147,10 @@ def reads_of(profile_id: str, codes: Iterable[str]) -> list[bytes]:
     profile = library.load(profile_id)
     found = []
     for code in codes:
-        one = profile[code]
+        parameter = profile[code]
         found += [
-            frame(2, bytes([one.function, *one.address.to_bytes(2, "big"), 0, 1])),
-            reply_words(2, 1, function=one.function),
+            frame(2, bytes([parameter.function, *parameter.address.to_bytes(2, "big"), 0, 1])),
+            reply_words(2, 1, function=parameter.function),
         ]
     return found
 
@@ -263,7 +263,7 @@ def test_a_request_that_is_not_answered_feeds_nobody() -> None:
 def test_open_request_is_reported_with_its_wait(waited: float, answers: list[str]) -> None:
     heard = Heard().say(READ)
     found = heard.listener.end(heard.now + waited)
-    assert [one.exchange.answer for one in found] == answers
+    assert [exchange.exchange.answer for exchange in found] == answers
 
 
 def test_two_drives_at_one_address_are_reported() -> None:
@@ -307,15 +307,17 @@ def test_silences_are_not_judged_where_readings_tell_none() -> None:
 def test_a_shorter_plan_for_the_master() -> None:
     heard = Heard(named("atv71", "atv71"))
     singles = [
-        one
+        data
         for address in (3201, 3202, 3204)
-        for one in (read_frame(2, address, 1), reply_words(2, 1))
+        for data in (read_frame(2, address, 1), reply_words(2, 1))
     ]
     cycle(heard, 3, *singles)
     (drive,) = heard.summary.drives
     assert drive.shorter is not None
     assert len(drive.shorter.now) == 3
-    assert [(one.address, one.count) for one in drive.shorter.plan.requests] == [(3201, 4)]
+    assert [(request.address, request.count) for request in drive.shorter.plan.requests] == [
+        (3201, 4)
+    ]
     assert drive.shorter.plan.seconds < drive.shorter.now_seconds
     assert "its cycle reads ETA, RFR, LCR in 3 requests" in heard.lines
 
@@ -346,18 +348,18 @@ def test_nothing_and_noise_are_reported() -> None:
 
 def test_a_scale_follows_what_was_heard_of_the_same_drive() -> None:
     """A value whose scale follows another word is raw until that was heard."""
-    profile = next(p for p in PROFILES if any(one.scale_by for one in p.parameters))
-    one = next(p for p in profile.parameters if p.scale_by and "r" in p.access)
-    assert one.scale_by is not None
-    source = profile[one.scale_by.parameter]
+    profile = next(p for p in PROFILES if any(item.scale_by for item in p.parameters))
+    entry = next(p for p in profile.parameters if p.scale_by and "r" in p.access)
+    assert entry.scale_by is not None
+    source = profile[entry.scale_by.parameter]
     heard = Heard(Families(PROFILES, {None: profile}))
 
     def read(parameter: object, word: int) -> None:
         address = parameter.address  # type: ignore[attr-defined]
         heard.say(read_frame(2, address, 1), reply_words(2, word))
 
-    read(one, 100)
+    read(entry, 100)
     assert heard.reported[-1].values[0].value.unit == "raw"
-    read(source, int(next(iter(one.scale_by.scales))))
-    read(one, 100)
+    read(source, int(next(iter(entry.scale_by.scales))))
+    read(entry, 100)
     assert heard.reported[-1].values[0].value.unit != "raw"

@@ -271,7 +271,7 @@ async def test_failed_cycle_tells_silence_damage_and_no_poll_apart(
     good, _ = (await bench.run(1))[0]
     assert good.contact == "answers"
     failed, _ = (await bench.fail(fault, cycles=2))[-1]
-    found = {one.contact for one, _ in bench.cycles if one.error}
+    found = {snapshot.contact for snapshot, _ in bench.cycles if snapshot.error}
     assert found == {contact}, failed
 
 

@@ -93,7 +93,7 @@ async def test_a_master_is_heard_on_a_line_on_which_nothing_is_sent(gap: float) 
         try:
             with talking(peer, gap=gap):
                 heard = await listen_first(line, 2.0)
-            assert {one.device for one in heard.requests} == {4}
+            assert {request.device for request in heard.requests} == {4}
             assert peer.requests == []
         finally:
             line.close()

@@ -221,7 +221,7 @@ async def test_a_stop_ends_parameter_writing_before_its_next_frame() -> None:
         at = sent.index((8501, 7))
         await until(lambda: not here.session.work.busy)
         await asyncio.sleep(0.3)
-        assert [one for one in here.writes()[at:] if one[0] != 8501] == []
+        assert [write for write in here.writes()[at:] if write[0] != 8501] == []
         assert at < staged
         assert not here.session.arming.armed
         assert len(editor.staging.edits) >= staged - at

@@ -159,8 +159,8 @@ def test_a_parameter_that_was_not_compared_leaves_all_open() -> None:
     proof = SlotEvidence(PROFILE, BLOCK)
     for _ in range(5):
         for code in CODES[:-1]:
-            one = {code: reading(code, APART[code].base)}
-            proof.note([APART[c].base for c in CODES[:5]], one, one)
+            row = {code: reading(code, APART[code].base)}
+            proof.note([APART[c].base for c in CODES[:5]], row, row)
     proof.conclude({"F875": RAWS["FD01"]})
     assert not proof.holds("F875", RAWS["FD01"])
     assert CODES[-1] in proof.open_codes({"F875": RAWS["FD01"]})
@@ -174,8 +174,8 @@ def test_a_place_that_was_unlucky_may_begin_again() -> None:
     wrong.begin()
     for _ in range(3):
         for code in CODES:
-            one = {code: reading(code, APART[code].base)}
-            wrong.note([APART[CODES[0]].base] * 5, one, one)
+            row = {code: reading(code, APART[code].base)}
+            wrong.note([APART[CODES[0]].base] * 5, row, row)
     wrong.conclude(raws)
     assert wrong.holds("F875", RAWS[CODES[0]])
 
@@ -197,8 +197,8 @@ def test_nothing_is_proved_that_is_not_so(
     wanted = dict(zip(BLOCK.slots, chosen, strict=True))
     given = {
         # words of bits neither tremble nor go evenly
-        code: Signal(one.base) if PROFILE[code].bits else one
-        for code, one in zip(CODES, signal, strict=True)
+        code: Signal(item.base) if PROFILE[code].bits else item
+        for code, item in zip(CODES, signal, strict=True)
     }
     proof = compared(real, given, rounds, chance, wanted)
     for slot, code in real.items():

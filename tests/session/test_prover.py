@@ -93,7 +93,7 @@ def bench(clock: OwnTime, drive: WatchingDrive, *, turning: bool = False) -> Pro
 
 
 def test_silences_around_the_time_out_are_at_most_300_ms_apart_at_2_s() -> None:
-    around = [one for one in silences(2.0) if 1.5 <= one <= 2.7]
+    around = [silence for silence in silences(2.0) if 1.5 <= silence <= 2.7]
     steps = [b - a for a, b in pairwise(around)]
     assert max(steps) < 0.3
     assert list(silences(2.0)) == sorted(silences(2.0))
@@ -297,7 +297,7 @@ class WithoutModule(OneDrive):
 
     def __init__(self, clock: OwnTime, *codes: str) -> None:
         self.profile = library.load("powerdrive")
-        super().__init__({one.address: 0 for one in self.profile.parameters})
+        super().__init__({parameter.address: 0 for parameter in self.profile.parameters})
         self.clock = clock
         self.silent = {self.profile[code].address for code in codes}
 

@@ -135,7 +135,7 @@ async def test_all_times_are_in_the_zone_in_which_the_drive_was_read() -> None:
         values = upload.parameter_set()
         entries = entries_of(made.journal, made.session.line_text, 1)
     times = ("2026-10-25T02:30:00.000+02:00", "2026-10-25T02:30:00.000+01:00")
-    entries = [replace(one, time=time) for one, time in zip(entries, times, strict=True)]
+    entries = [replace(entry, time=time) for entry, time in zip(entries, times, strict=True)]
     values = replace(values, head=replace(values.head, time="2026-11-22T08:00:00+01:00"))
     text = report_text(made.profile, values, entries)
     assert "- Read: 2026-11-22 08:00:00; times here are UTC+01:00" in text

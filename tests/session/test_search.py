@@ -236,7 +236,7 @@ async def test_a_drive_with_a_long_response_delay_is_found() -> None:
         finally:
             line.close()
     assert devices(results) == [3, 5]
-    assert [one.by for one in results] == ["read of register 1039", "function 43"]
+    assert [result.by for result in results] == ["read of register 1039", "function 43"]
 
 
 async def test_address_text_between_two_addresses_can_end_search() -> None:

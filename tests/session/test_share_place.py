@@ -22,7 +22,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, patience: None) -> None:
 
 
 def others(opened: OpenLine) -> list[str]:
-    return [one.name for one in opened.line.facts.others]
+    return [other.name for other in opened.line.facts.others]
 
 
 def test_a_line_is_one_by_its_device_however_it_is_spelt(tmp_path: Path) -> None:
@@ -41,8 +41,8 @@ def test_a_line_is_one_by_its_device_however_it_is_spelt(tmp_path: Path) -> None
             assert "It is open as" not in opened[0].line.state.reason
             assert "19200" in opened[1].line.state.reason
         finally:
-            for one in opened:
-                one.close()
+            for line in opened:
+                line.close()
 
 
 def test_a_program_without_a_name_shares_nothing(tmp_path: Path) -> None:

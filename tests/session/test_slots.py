@@ -149,7 +149,9 @@ class Shared:
     async def read(self) -> dict[str, int]:
         """What the reader tells that is not so."""
         found = await self.reader.read(self.codes, priority=Priority.POLL)
-        good = {code: one.raw for code, one in found.items() if one.quality is Quality.GOOD}
+        good = {
+            code: reading.raw for code, reading in found.items() if reading.quality is Quality.GOOD
+        }
         return {code: raw for code, raw in good.items() if raw not in (None, self.words[code])}
 
 

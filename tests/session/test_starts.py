@@ -153,7 +153,7 @@ def test_a_start_of_a_killed_program_is_found(tmp_path: Path) -> None:
 
 def test_two_programs_keep_each_other_s_records(tmp_path: Path) -> None:
     starts = Starts(tmp_path)
-    with other_program(tmp_path) as one, other_program(tmp_path) as other:
+    with other_program(tmp_path) as item, other_program(tmp_path) as other:
         devices = range(1, 9)
 
         def busy(program: Other, mine: int) -> None:
@@ -163,16 +163,16 @@ def test_two_programs_keep_each_other_s_records(tmp_path: Path) -> None:
                     program.does("end", device)
 
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(busy, [one, other], [0, 1]))
+            list(pool.map(busy, [item, other], [0, 1]))
         kept = [json.loads(file.read_text()) for file in files(starts)]
         by_pid = {
             program.process.pid: sorted(
                 record["device"] for record in kept if record["pid"] == program.process.pid
             )
-            for program in (one, other)
+            for program in (item, other)
         }
-        assert by_pid == {one.process.pid: [1, 3, 5, 7], other.process.pid: [2, 4, 6, 8]}
-        one.kill()
+        assert by_pid == {item.process.pid: [1, 3, 5, 7], other.process.pid: [2, 4, 6, 8]}
+        item.kill()
         assert [record.device for record in starts.all_found(LINE)] == [1, 3, 5, 7]
         other.kill()
         assert [record.device for record in starts.all_found(LINE)] == [*devices]
@@ -261,7 +261,7 @@ def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
     session: Any = SimpleNamespace(line_text=LINE, line=FakeLine({}), device=2)
     keeper.look(session)
     keeper.take_over(session)
-    (mine,) = [one for one in starts._files.records() if one.pid == os.getpid()]
+    (mine,) = [record for record in starts._files.records() if record.pid == os.getpid()]
     assert mine.left_running is intended
 
 
@@ -570,18 +570,18 @@ class Model:
 
     def remove(self, drive: Drive) -> None:
         self.under_way.discard(drive)
-        gone = [one for one in self._of(drive) if one[1] != LIVING]
-        self.begun = {one: number for one, number in self.begun.items() if one not in gone}
+        gone = [pair for pair in self._of(drive) if pair[1] != LIVING]
+        self.begun = {pair: number for pair, number in self.begun.items() if pair not in gone}
 
     def found(self, drive: Drive) -> int | None:
         mine = self._of(drive)
         if any(pid in (LIVING, os.getpid()) for _, pid in mine):
             return None
-        return max((self.begun[one] for one in mine), default=None)
+        return max((self.begun[pair] for pair in mine), default=None)
 
     def _of(self, drive: Drive) -> list[tuple[Drive, int]]:
         key = (line_key(drive[0]), drive[1])
-        return [one for one in self.begun if (line_key(one[0][0]), one[0][1]) == key]
+        return [pair for pair in self.begun if (line_key(pair[0][0]), pair[0][1]) == key]
 
 
 @settings(max_examples=60)
@@ -621,24 +621,24 @@ def test_a_start_is_on_record_for_the_other_users_of_the_group(
 
     folder = tmp_path / "group"
     monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(folder))
-    one, other = user("one"), user("other")
-    one.begin(start(line=LINE))
+    starts, other = user("one"), user("other")
+    starts.begin(start(line=LINE))
     assert other.found(LINE, 2) is None  # there is no such folder: the line is not shared
     folder.mkdir()
     folder.chmod(0o2770)
-    one.begin(start(line=LINE))
+    starts.begin(start(line=LINE))
     record = other.found(LINE, 2)
     assert record is not None
-    assert [record] == one.all_found(LINE)
+    assert [record] == starts.all_found(LINE)
     (shared,) = (folder / "starts").glob("*.json")
     modes = [stat.S_IMODE(path.stat().st_mode) for path in (shared, shared.parent)]
     assert modes == [0o660, 0o2770]
     other.end(LINE, 2)
-    one.note_stop(LINE, 2)
-    assert one.close(PATIENCE)
+    starts.note_stop(LINE, 2)
+    assert starts.close(PATIENCE)
     assert other.close(PATIENCE)
     assert not list((folder / "starts").iterdir())
-    assert one.found(LINE, 2) is None
+    assert starts.found(LINE, 2) is None
 
 
 def test_a_group_that_cannot_be_reported_keeps_no_motor_from_its_start(

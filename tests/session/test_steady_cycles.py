@@ -81,13 +81,13 @@ class Holder:
         self._turn += 1
         begun = time.monotonic() - self.age
         replies: dict[PlannedRead, Reply | LineError] = {}
-        for one in self._subscription.plan.turns[turn]:
-            if one.address in self.errors:
-                replies[one] = self.errors[one.address]
+        for read in self._subscription.plan.turns[turn]:
+            if read.address in self.errors:
+                replies[read] = self.errors[read.address]
                 break
-            if one.address not in self.without:
-                words = self.line.devices[1].held(one.address, one.count)
-                replies[one] = Reply(words, begun)
+            if read.address not in self.without:
+                words = self.line.devices[1].held(read.address, read.count)
+                replies[read] = Reply(words, begun)
         self._subscription.hear(PolledTurn(turn, begun, replies))
 
     def lose(self) -> None:
@@ -219,7 +219,7 @@ async def test_a_look_at_everything_is_read_from_here_at_once(steady: Steady) ->
     await steady.cycle()
     steady.session.request_full_read()
     await steady.cycle()
-    brought = {one.address for one in steady.holder.plans[0].turns[1]}
+    brought = {turn.address for turn in steady.holder.plans[0].turns[1]}
     direct = {address for address, _ in steady.line.requested}
     assert direct == {FIRST_SLOW + 100 * i for i in range(SLOW)} - brought
     await steady.cycle()
@@ -242,7 +242,7 @@ async def test_another_period_or_another_value_is_another_plan(steady: Steady) -
     steady.session.request_full_read()
     await steady.cycle()
     await steady.until(lambda: len(steady.holder.plans) == 3)
-    planned = {one.address for turn in steady.holder.plans[-1].turns for one in turn}
+    planned = {read.address for turn in steady.holder.plans[-1].turns for read in turn}
     assert FIRST_SLOW not in planned
     assert steady.holder.ended == 2
 

@@ -171,7 +171,7 @@ def passed(wire: Wire, attached: bool, folder: Path) -> tuple[Place, ...]:
         assert until(lambda: bench.phase() is Phase.STOPPED, 20.0)
         passage.open = False
     bench.close()
-    assert all(room_of(one) for one in passage.places), "a room is missing in the list"
+    assert all(room_of(place) for place in passage.places), "a room is missing in the list"
     return tuple(sorted(passage.places))
 
 
@@ -202,7 +202,7 @@ def test_an_error_anywhere_on_the_way_of_a_stop_keeps_no_frame_from_the_drive(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     folder = tmp_path_factory.mktemp("stop")
-    places = [one for one in passed(wire, attached, folder) if room_of(one) == room]
+    places = [item for item in passed(wire, attached, folder) if room_of(item) == room]
     assert places
     wrong = []
     for number, place in enumerate(places[first::every]):

@@ -62,7 +62,7 @@ def test_the_first_word_starts_no_motor_whatever_chart_is_in_force(
 ) -> None:
     session = seen(family, raws, ago)
     chart, chosen = last_known_stop(session, order)
-    assert [one & 0xFFFF for one in chosen.words] == [word]
+    assert [number & 0xFFFF for number in chosen.words] == [word]
     assert order_target(session.profile, chart, chosen).code == chart.command
 
 
@@ -71,8 +71,10 @@ async def test_every_drive_is_sent_its_word_before_anything_is_read(
 ) -> None:
     families = ["atv71", "atv31", "powerdrive", "atv71", "atv21"]
     specs = [
-        DriveSpec(one, n, run_hz=20.0, sets={} if one.startswith("atv") else {"6.43": 1, "6.42": 3})
-        for n, one in enumerate(families, start=1)
+        DriveSpec(
+            item, n, run_hz=20.0, sets={} if item.startswith("atv") else {"6.43": 1, "6.42": 3}
+        )
+        for n, item in enumerate(families, start=1)
     ]
     simulation, line = start(*specs)
     for n in range(1, 6):
@@ -81,7 +83,7 @@ async def test_every_drive_is_sent_its_word_before_anything_is_read(
     dead = DriveSession(line, 9, library.load("atv31"))
     with suppress(LineError):
         await line.read(9, 3201, priority=Priority.OPERATOR_READ)
-    live = [DriveSession(line, n, library.load(one)) for n, one in enumerate(families, start=1)]
+    live = [DriveSession(line, n, library.load(item)) for n, item in enumerate(families, start=1)]
     for session in live:
         status = session.profile.data.charts[0].status
         await Reader(session).read([status, *(["CHCF"] if session.profile.get("CHCF") else [])])
@@ -92,9 +94,11 @@ async def test_every_drive_is_sent_its_word_before_anything_is_read(
         frames = [f.data for f in list(line.trace)[before:] if f.direction == "out"]
         return [(data[0], data[1]) for data in frames]
 
-    def note(one: Stopper, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
+    def note(
+        entry: Stopper, session: DriveSession, phase: Phase, text: str, ordered: float
+    ) -> None:
         seen_phases.append((session.device, phase, (session.device, 6) in sent()))
-        report(one, session, phase, text, ordered)
+        report(entry, session, phase, text, ordered)
 
     monkeypatch.setattr(Stopper, "_report", note)
     before = len(line.trace)
@@ -103,7 +107,7 @@ async def test_every_drive_is_sent_its_word_before_anything_is_read(
     for session in live:
         result = await ended(stopper, session.device)
         assert result.phase is Phase.STOPPED, result.text
-    first = [one for one in sent() if one[0]][:6]
+    first = [pair for pair in sent() if pair[0]][:6]
     assert sorted(first) == [(1, 6), (2, 6), (3, 6), (4, 6), (5, 6), (9, 6)]
     assert first[-1] == (9, 6), "one that answers nothing is waited for last"
     assert {frame for _, phase, frame in seen_phases if phase is Phase.SENDING} == {False}

@@ -41,7 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def drive(identity: DriveIdentity | None = None, **words: int) -> tuple[OneDrive, Teacher]:
     """A drive with its words by code, and its teacher, which has recalled what was kept."""
-    held = {one.address: 0 for one in PROFILE.parameters}
+    held = {parameter.address: 0 for parameter in PROFILE.parameters}
     held |= {PROFILE[code].address: word for code, word in words.items()}
     line = OneDrive(held)
     teacher = Teacher(DriveSession(line, 1, PROFILE, identity))
@@ -361,7 +361,7 @@ async def test_a_folder_that_cannot_be_written_is_reported_and_the_scale_is_used
 
 
 def test_the_file_is_found_however_the_line_is_typed() -> None:
-    one = TaughtDrive.of("serial:/dev/ttyS9,19200,8E1", 4, "powerdrive", None)
-    assert one.file == TaughtDrive.of("/dev/ttyS9", 4, "powerdrive", None).file
-    assert one.file != TaughtDrive.of("/dev/ttyS9", 5, "powerdrive", None).file
-    assert one.file != TaughtDrive.of("/dev/ttyS9", 4, "varmeca", None).file
+    drive = TaughtDrive.of("serial:/dev/ttyS9,19200,8E1", 4, "powerdrive", None)
+    assert drive.file == TaughtDrive.of("/dev/ttyS9", 4, "powerdrive", None).file
+    assert drive.file != TaughtDrive.of("/dev/ttyS9", 5, "powerdrive", None).file
+    assert drive.file != TaughtDrive.of("/dev/ttyS9", 4, "varmeca", None).file

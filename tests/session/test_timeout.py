@@ -153,7 +153,9 @@ async def test_a_drive_is_requested_what_it_has_after_a_silence() -> None:
 
 async def test_a_family_that_refuses_by_silence_may_tell_nothing() -> None:
     profile = library.load("powerdrive")
-    line = Ports({one.address: 0 for one in profile.parameters}, silent=profile["15.07"].address)
+    line = Ports(
+        {parameter.address: 0 for parameter in profile.parameters}, silent=profile["15.07"].address
+    )
     session = DriveSession(line, 1, profile)
     assert await reported(session) == Timeout(known=True)  # of its other port
     line.refused = profile["11.63"].address
@@ -196,6 +198,6 @@ async def test_a_watch_that_begins_with_a_command(
 async def test_few_words_are_read(family: str) -> None:
     """A command that ends asks for the words of the profile's table, no more."""
     profile = library.load(family)
-    line = OneDrive({one.address: 1 for one in profile.parameters})
+    line = OneDrive({parameter.address: 1 for parameter in profile.parameters})
     await reported(DriveSession(line, 1, profile))
     assert sum(count for _, count in line.requested) <= 3

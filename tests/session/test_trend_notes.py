@@ -60,7 +60,7 @@ class TrendOf:
 
     @property
     def times(self) -> list[float]:
-        return [one.time for one in self.trend.points]
+        return [point.time for point in self.trend.points]
 
 
 def test_the_next_program_has_the_points_at_their_times() -> None:
@@ -75,7 +75,7 @@ def test_the_next_program_has_the_points_at_their_times() -> None:
 
 def test_a_killed_program_has_left_all_but_the_last_two_seconds() -> None:
     holder = LineHolder()
-    TrendOf(holder, "panel").add(*(100.0 + 0.5 * one for one in range(9)))
+    TrendOf(holder, "panel").add(*(100.0 + 0.5 * number for number in range(9)))
     following = TrendOf(holder, "next")
     following.notes.ask()
     following.add(110.0)
@@ -187,4 +187,4 @@ def test_a_message_cannot_reach_the_terminal_with_control_characters() -> None:
     holder, log = LineHolder(), EventLog()
     data = msgspec.msgpack.encode(LeftEvent("run", Event(1.0, 2, "told", "\x1b[2J")))
     holder.facts.notes.keep(LineNote(0, EVENTS_OF_LINE, data))
-    assert [one.text for one in found(holder, log)] == ["?[2J (run)"]
+    assert [event.text for event in found(holder, log)] == ["?[2J (run)"]

@@ -28,15 +28,15 @@ def test_trips_of_a_fault_first_seen_later_has_no_time_of_the_trip() -> None:
 
 def test_trips_of_a_new_trip_without_a_seen_reset_is_another() -> None:
     kept = [entry("1", "seen"), entry("5", "tripped")]
-    assert [one.seen for one in trips_of(kept)] == ["1", "5"]
+    assert [trip.seen for trip in trips_of(kept)] == ["1", "5"]
     other = [entry("1", "tripped"), entry("5", "seen", "OLF"), entry("6", "reset", "OLF")]
-    assert [(one.code, one.reset) for one in trips_of(other)] == [("ObF", ""), ("OLF", "6")]
+    assert [(trip.code, trip.reset) for trip in trips_of(other)] == [("ObF", ""), ("OLF", "6")]
 
 
 def test_trips_of_older_files_counts_each_opened_panel_once() -> None:
     kept = [entry(time, "tripped", why=OLD) for time in "123"]
     kept += [entry("4", "reset", why=OLD), entry("5", "tripped", why=OLD)]
-    assert [(one.tripped, one.seen, one.reset) for one in trips_of(kept)] == [
+    assert [(trip.tripped, trip.seen, trip.reset) for trip in trips_of(kept)] == [
         ("", "1", "4"),
         ("", "5", ""),
     ]

@@ -124,14 +124,14 @@ async def test_one_after_another(reported: Notified) -> None:
 
 
 async def test_whose_work_it_is(reported: Notified) -> None:
-    one, other = object(), object()
-    reported.put("a", owner=one)
+    item, other = object(), object()
+    reported.put("a", owner=item)
     reported.put("b", owner=other)
-    assert reported.queue.busy_for(one)
+    assert reported.queue.busy_for(item)
     assert reported.queue.busy_for(other)
     assert not reported.queue.busy_for(object())
     await reported.idle()
-    assert not reported.queue.busy_for(one)
+    assert not reported.queue.busy_for(item)
     assert not reported.queue.busy_for(other)
 
 

@@ -53,7 +53,11 @@ class WilfulLine(OneDrive):
     @property
     def written(self) -> list[tuple[int, int]]:
         """Address and word of all writes that went out."""
-        return [(one.address, one.value) for one in self.requests if isinstance(one, WriteOne)]
+        return [
+            (request.address, request.value)
+            for request in self.requests
+            if isinstance(request, WriteOne)
+        ]
 
     async def write(self, *what: Any, **how: Any) -> float:
         self.before()
@@ -245,7 +249,7 @@ async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
 def abilities_in(journal: Journal) -> list[Entry]:
     """What the journal's files tell, completions apart from what they complete."""
     assert journal.flush(60)
-    return [one for one in read_journal(journal.files) if isinstance(one, Entry)]
+    return [entry for entry in read_journal(journal.files) if isinstance(entry, Entry)]
 
 
 @pytest.mark.parametrize("taken", [True, False])
@@ -311,7 +315,7 @@ async def test_a_lost_answer_is_not_completed_by_what_a_later_write_left(
     with pytest.raises(NoAnswer):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     await writer(session, journal).write_parameter(PROFILE["ACC"], 40, why="setting")
-    assert [one.kind for one in abilities_in(journal)] == ["write", "write"]
+    assert [entry.kind for entry in abilities_in(journal)] == ["write", "write"]
 
 
 async def test_a_refused_write_has_its_answer(
@@ -321,4 +325,4 @@ async def test_a_refused_write_has_its_answer(
     with pytest.raises(DeviceException):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     await Reader(session).read(["ACC"])
-    assert [one.kind for one in abilities_in(journal)] == ["write"]
+    assert [entry.kind for entry in abilities_in(journal)] == ["write"]

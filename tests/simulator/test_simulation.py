@@ -96,10 +96,10 @@ def test_modbus_tcp_serves_several_clients() -> None:
     with simulation() as running:
         place = running.serve_tcp()
         with (
-            socket.create_connection(place, timeout=5) as one,
+            socket.create_connection(place, timeout=5) as item,
             socket.create_connection(place, timeout=5) as other,
         ):
-            for client in (one, other, one):
+            for client in (item, other, item):
                 client.sendall(MBAP_REQUEST)
                 assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
 

@@ -63,14 +63,14 @@ class Client:
 
 
 def test_replies_one_behind_carry_the_value_of_the_read_before() -> None:
-    with sick({"behind": 1}, "rtu-tcp") as place, client(place, FramerType.RTU) as one:
-        assert one.read(ETA) is None
-        assert [one.read(RFR), one.read(ETA), one.read(ETA)] == [STATUS, FREQUENCY, STATUS]
+    with sick({"behind": 1}, "rtu-tcp") as place, client(place, FramerType.RTU) as item:
+        assert item.read(ETA) is None
+        assert [item.read(RFR), item.read(ETA), item.read(ETA)] == [STATUS, FREQUENCY, STATUS]
 
 
 def test_each_second_request_is_lost() -> None:
-    with sick({"lost-every": 2}) as place, client(place) as one:
-        found = [one.read(ETA) for _ in range(4)]
+    with sick({"lost-every": 2}) as place, client(place) as item:
+        found = [item.read(ETA) for _ in range(4)]
     assert found == [STATUS, None, STATUS, None]
 
 
@@ -78,27 +78,27 @@ def test_a_lost_request_does_not_reach_the_drive() -> None:
     rates, habits = troubles_of({"lost-every": 2})
     with Simulation([DriveSpec("atv71", 2)], faults=rates, habits=habits) as simulation:
         place = simulation.serve_tcp()
-        with client(place) as one:
+        with client(place) as item:
             for _ in range(4):
-                one.read(ETA)
+                item.read(ETA)
         assert simulation.drive(2).server.counters.frames == 2
 
 
 @pytest.mark.parametrize("code", [10, 11])
 def test_a_gateway_replies_with_its_exception(code: int) -> None:
-    with sick({f"exception-0{code:x}": 1}) as place, client(place) as one:
-        assert one.read(ETA) == f"ex {code}"
+    with sick({f"exception-0{code:x}": 1}) as place, client(place) as item:
+        assert item.read(ETA) == f"ex {code}"
 
 
 def test_the_bytes_of_words_are_swapped() -> None:
-    with sick({"swapped": 1}) as place, client(place) as one:
-        assert one.read(ETA) == 0x3706
+    with sick({"swapped": 1}) as place, client(place) as item:
+        assert item.read(ETA) == 0x3706
 
 
 @pytest.mark.parametrize("unit", [255, 0])
 def test_a_gateway_answers_one_unit_only(unit: int) -> None:
-    with sick({"only-unit": unit}) as place, client(place) as one:
-        assert one.read(ETA, unit=2) is None
+    with sick({"only-unit": unit}) as place, client(place) as item:
+        assert item.read(ETA, unit=2) is None
     with sick({"only-unit": unit}) as place, socket.create_connection(place, timeout=5) as plain:
         # pymodbus does not wait for a reply of unit 0
         plain.sendall(bytes.fromhex(f"000100000006{unit:02X}030C810001"))
@@ -107,9 +107,9 @@ def test_a_gateway_answers_one_unit_only(unit: int) -> None:
 
 def test_an_idle_connection_is_closed_and_a_busy_one_is_not() -> None:
     with sick({"idle-close": 0.5}) as place:
-        with client(place) as one:
+        with client(place) as item:
             for _ in range(4):
-                assert one.read(ETA) == STATUS
+                assert item.read(ETA) == STATUS
         with socket.create_connection(place, timeout=10) as idle:
             began = time.monotonic()
             assert idle.recv(1) == b""
@@ -148,8 +148,8 @@ def test_two_drives_at_one_address_collide_in_both_orders() -> None:
 
 
 def test_two_drives_at_one_address_on_the_wire() -> None:
-    with sick({"twin": 1}, "rtu-tcp") as place, client(place, FramerType.RTU) as one:
-        found = [one.read(ETA) for _ in range(4)]
+    with sick({"twin": 1}, "rtu-tcp") as place, client(place, FramerType.RTU) as item:
+        found = [item.read(ETA) for _ in range(4)]
     assert found[1] == STATUS
     assert None in found
 

@@ -100,8 +100,8 @@ def test_every_sign_of_the_panel_has_a_plain_one() -> None:
         for character in path.read_text("utf-8")
         if not character.isascii() and not "\u2400" <= character <= "\u2421"
     }
-    assert [one for one in sorted(drawn) if in_encoding(one, ASCII) == NO_SIGN] == []
-    assert all(cell_len(one) == len(PLAIN_SIGNS.get(one, " ")) for one in drawn)
+    assert [text for text in sorted(drawn) if in_encoding(text, ASCII) == NO_SIGN] == []
+    assert all(cell_len(text) == len(PLAIN_SIGNS.get(text, " ")) for text in drawn)
 
 
 @given(st.text(max_size=30))
@@ -129,6 +129,8 @@ def test_ungrounded_input_stays_active() -> None:
     assert without_colors(palette.FAULT_BLOCK).reverse
     assert without_colors(palette.ATTENTION_BLOCK).reverse
     assert not without_colors(Style(color=palette.TEXT, bgcolor=palette.SURFACE)).reverse
-    grounds = {in_sixteen(Style(bgcolor=one)).bgcolor for one in (palette.GROUND, palette.SURFACE)}
+    grounds = {
+        in_sixteen(Style(bgcolor=text)).bgcolor for text in (palette.GROUND, palette.SURFACE)
+    }
     assert in_sixteen(palette.CURSOR).bgcolor not in grounds
     assert in_sixteen(palette.FAULT).color != in_sixteen(palette.ALARM).color

@@ -251,16 +251,16 @@ def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> No
     # in order, each once, none that was not typed
     rest = iter(name for name, _ in typed)
     assert all(any(name == key.name for name in rest) for key in keys)
-    for one in bench.found:
-        key = one.what
+    for key_input in bench.found:
+        key = key_input.what
         assert isinstance(key, KeyToken)
         near = [name for name, at in typed if abs(at - key.at) <= APART - 1e-6]
-        if one.alone:
+        if key_input.alone:
             assert near == [key.name]
-        if one.held:
+        if key_input.held:
             assert key.name in STEPPING
             assert near.count(key.name) > 1
-        assert one.steps <= (key.name in STEPPING or one.alone)
+        assert key_input.steps <= (key.name in STEPPING or key_input.alone)
     # a key that no stop came after is given out, alone where nothing is near
     stops = [at for name, at in typed if name in STOPS]
     for name, at in typed:

@@ -135,7 +135,7 @@ def test_bytes_that_a_busy_thread_finds_late_are_not_taken_for_late_keys(
     finally:
         for end in ends:
             os.close(end)
-    assert [one.stroke.alone for one in found if isinstance(one, Pressed)] == [alone] * 2
+    assert [item.stroke.alone for item in found if isinstance(item, Pressed)] == [alone] * 2
 
 
 def test_a_stop_that_falls_between_bytes_and_stamp_voids_them(

@@ -109,10 +109,10 @@ def _driver_asks_in_writes_of_their_own() -> bool:
 def _driver_continues_by_opening_again() -> bool:
     from textual.drivers.linux_driver import LinuxDriver
 
-    flags = [inspect.signature(getattr(LinuxDriver, f"_patch_{one}flag")) for one in "li"]
+    flags = [inspect.signature(getattr(LinuxDriver, f"_patch_{text}flag")) for text in "li"]
     return (
         "signal.signal(signal.SIGCONT, self._sigcont_application)" in _source("__init__")
-        and all(list(one.parameters) == ["attrs"] for one in flags)
+        and all(list(flag.parameters) == ["attrs"] for flag in flags)
         and "2004h" in _source("_enable_bracketed_paste")
     )
 
@@ -214,7 +214,7 @@ def _drawing_asks_whether_there_is_a_terminal() -> bool:
     sends = inspect.getsource(App._display)
     app: Any = App[None]()
     conditions = ("self._batch_count", "self._running", "not self._closed", "self._driver is not")
-    return all(one in sends for one in conditions) and (
+    return all(condition in sends for condition in conditions) and (
         app._batch_count,
         app._running,
         app._closed,
@@ -272,7 +272,7 @@ def _an_error_closes_the_loop() -> bool:
     from textual.app import App
 
     close = "self._close_messages_no_wait()"
-    return all(close in inspect.getsource(one) for one in (App._fatal_error, App.panic))
+    return all(close in inspect.getsource(function) for function in (App._fatal_error, App.panic))
 
 
 def _workers_are_made_in_one_place() -> bool:
@@ -493,7 +493,9 @@ def test_the_versions_are_those_that_were_looked_at(package: str) -> None:
     import tomli
 
     needed = tomli.loads(PROJECT.read_text(encoding="utf-8"))["project"]["dependencies"]
-    requested = next(one for one in map(Requirement, needed) if one.name == package)
+    requested = next(
+        requirement for requirement in map(Requirement, needed) if requirement.name == package
+    )
     assert str(requested.specifier) == VERSIONS[package], (
         "look at what follows, then change VERSIONS"
     )

@@ -53,7 +53,7 @@ def read(
     found += reader.tick(LATER * 10)
     found += reader.tick(LATER * 20)
     assert reader.deadline is None
-    return stops.taken, [one for one in found if isinstance(one, Pressed)], found
+    return stops.taken, [paste for paste in found if isinstance(paste, Pressed)], found
 
 
 def acting(keys: Sequence[Pressed], stamp: object) -> list[str]:
@@ -83,7 +83,7 @@ def test_a_sequence_that_a_stop_falls_into_has_the_older_stamp() -> None:
     reader.read(b"\x1b[", 1.0, stops.stop_stamp())
     stops.taken.append("f12")  # somebody else
     reader.read(b"A", 1.5, stops.stop_stamp())
-    (key,) = [one for one in reader.tick(LATER) if isinstance(one, Pressed)]
+    (key,) = [paste for paste in reader.tick(LATER) if isinstance(paste, Pressed)]
     assert (key.name, key.stroke.stamp, key.stroke.read_at) == ("up", 0, 1.0)
 
 
@@ -105,7 +105,7 @@ def test_terminal_reports_are_no_part_of_a_piece(output: str) -> None:
         taken, keys, found = read((1.0, b"r" + first), (1.02, second))
         assert taken == []
         assert [(key.name, key.stroke.alone) for key in keys] == [("r", True)], (first, second)
-        assert [one for one in found if not isinstance(one, Pressed | Report)] == []
+        assert [paste for paste in found if not isinstance(paste, Pressed | Report)] == []
 
 
 def test_a_key_near_an_escape_is_not_alone() -> None:
@@ -134,7 +134,7 @@ def test_bytes_that_are_no_text_may_begin_a_sequence_and_are_never_a_key(code: b
 def test_a_paste_stops_nothing_and_is_text() -> None:
     taken, keys, found = read((0.0, b"\x1b[200~a b\xff\nrun \x1b[201~"))
     assert (taken, keys) == ([], [])
-    assert [one.text for one in found if isinstance(one, Paste)] == ["a b?\nrun "]
+    assert [paste.text for paste in found if isinstance(paste, Paste)] == ["a b?\nrun "]
 
 
 def test_a_paste_of_random_keys_without_brackets_only_stops() -> None:

@@ -60,12 +60,12 @@ async def wait_for_the_busy(self: Pilot[Any], timeout: float = 30.0) -> bool:
     for pump in (app, app.screen, *filter(is_busy, app.screen.walk_children())):
         left += pump.call_later(one_less)
     if left:
-        waiting = {asyncio.ensure_future(one.wait()) for one in (done, app._exception_event)}
+        waiting = {asyncio.ensure_future(event.wait()) for event in (done, app._exception_event)}
         ended, others = await asyncio.wait(
             waiting, timeout=timeout, return_when=asyncio.FIRST_COMPLETED
         )
-        for one in others:
-            one.cancel()
+        for other in others:
+            other.cancel()
         assert ended, "the widgets of the screen did not do what is queued"
     return left == 0
 

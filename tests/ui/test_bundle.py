@@ -104,8 +104,8 @@ async def test_esc_cancels_and_leaves_no_file(tmp_path: Path) -> None:
             await pilot.press("escape")
             await until(pilot, lambda: not isinstance(app.screen, BundleScreen))
             assert app.events.events[-1].text == CANCELLED
-            assert not [one for one in app.workers if one.group == "bundle"]
-    assert [one for one in os.listdir(tmp_path) if "a.zip" in one] == []
+            assert not [worker for worker in app.workers if worker.group == "bundle"]
+    assert [text for text in os.listdir(tmp_path) if "a.zip" in text] == []
 
 
 async def test_no_line_no_bundle() -> None:

@@ -217,11 +217,11 @@ def _line(chance: Any) -> Text:
 
 @given(PIECES, PIECES)
 def test_runs_are_where_two_lines_differ_and_no_more_than_a_move_beyond(
-    one: Text, other: Text
+    item: Text, other: Text
 ) -> None:
-    before, after = (strip_of(text) for text in (one, other))
+    before, after = (strip_of(text) for text in (item, other))
     found = runs(before, after)
-    old, new = (list(zip(*looks(one), strict=True)) for one in (before, after))
+    old, new = (list(zip(*looks(strip), strict=True)) for strip in (before, after))
     inside = {x for first, end in found for x in range(first, end)}
     assert {x for x in range(COLUMNS) if old[x] != new[x]} <= inside
     for first, end in found:

@@ -142,7 +142,7 @@ def writes(app: DrivePanelApp, since: float = 0.0) -> list[bytes]:
     assert app.opened is not None
     frames = [frame for frame in app.opened.line.trace if frame.direction == "out"]
     write = (5, 6, 15, 16, 22, 23)
-    return [one.data for one in frames if one.data[1] in write and one.time >= since]
+    return [item.data for item in frames if item.data[1] in write and item.time >= since]
 
 
 def knows_the_state(app: DrivePanelApp) -> bool:
@@ -277,7 +277,7 @@ async def test_trip_has_one_time_on_every_screen() -> None:
         record = fleet.consoles[0].recorder.latest
         assert record is not None
         assert fault.wall == record.wall
-        (event,) = [one for one in made.app.events.events if one.text.startswith("tripped:")]
+        (event,) = [item for item in made.app.events.events if item.text.startswith("tripped:")]
         assert event.wall == fault.wall
         await made.pilot.press("5")
         await until(made.pilot, lambda: f"{fault.when}, last read " in shown(made.app, "doctor"))
@@ -318,7 +318,7 @@ async def test_failed_reset_is_whole_on_faults_and_messages_at_80x24(
 
 def failed_reset(app: DrivePanelApp) -> str:
     """What was said of a reset after which the drive was still in fault."""
-    return next((one.text for one in app.events.events if "still in fault" in one.text), "")
+    return next((event.text for event in app.events.events if "still in fault" in event.text), "")
 
 
 def follows(app: DrivePanelApp) -> str:
@@ -423,7 +423,7 @@ async def test_stop_works_on_every_screen() -> None:
 def reported(app: DrivePanelApp) -> str:
     """What was said, the toasts for a motor that does not stop included."""
     output = [event.text for event in app.events.events]
-    return " ".join([*output, *(one.message for one in app._notifications)])
+    return " ".join([*output, *(notification.message for notification in app._notifications)])
 
 
 async def test_space_stops_outside_texts_only() -> None:

@@ -24,7 +24,7 @@ async def test_a_drive_is_not_armed_by_a_profile_that_it_contradicts() -> None:
         field.value = "atv312"
         await pilot.press("s")
         reported = "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312."
-        await until(pilot, lambda: any(one.startswith(reported) for one in output(app)))
+        await until(pilot, lambda: any(text.startswith(reported) for text in output(app)))
         way = "Not armed: the profile is not its own. Type atv71 beside Profile, then s."
         await until(pilot, lambda: way in shown(app, "about"))
         app.connection.drives.focus()

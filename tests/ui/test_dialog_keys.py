@@ -80,24 +80,33 @@ def _parameter(console: DriveConsole, code: str) -> Any:
 DIALOGS: dict[str, Make] = {
     "Ask": lambda *_: Ask("Save to", lambda _: "wrong"),
     "Ask for a number": lambda *_: Ask("Rated current", lambda _: "wrong", number=True),
-    "Confirm": lambda app, one: Confirm(
-        "Write?", "It is.", yes="writes", no="no", loses=True, now=MotorStates(app, [one.session])
+    "Confirm": lambda app, console: Confirm(
+        "Write?",
+        "It is.",
+        yes="writes",
+        no="no",
+        loses=True,
+        now=MotorStates(app, [console.session]),
     ),
     "Leave": lambda *_: Leave("It runs."),
     "Palette": lambda *_: Palette("monitor"),
     "PickFile": lambda *_: PickFile("Open", [("factory", "factory setting")], []),
     "WhyScreen": lambda *_: WhyScreen("Why no answer?", _no_answer),
     "HelpScreen": lambda *_: HelpScreen("monitor"),
-    "OptionsScreen": lambda _, one: OptionsScreen(one.session.profile.data.charts[0].options, {}),
-    "PickWord": lambda app, one: PickWord(one, ["HSP"], MotorStates(app, [one.session])),
-    "PickParameter": lambda _, one: PickParameter(
-        one.session.profile, one.session.profile.data.blocks[0], "NMA1"
+    "OptionsScreen": lambda _, console: OptionsScreen(
+        console.session.profile.data.charts[0].options, {}
     ),
-    "EditNumber": lambda _, one: EditNumber(one.editor, _parameter(one, "HSP")),
-    "PickValue": lambda _, one: PickValue(one.editor, _parameter(one, "FR1")),
-    "EditBits": lambda _, one: EditBits(one.editor, _parameter(one, "CMD")),
+    "PickWord": lambda app, console: PickWord(
+        console, ["HSP"], MotorStates(app, [console.session])
+    ),
+    "PickParameter": lambda _, console: PickParameter(
+        console.session.profile, console.session.profile.data.blocks[0], "NMA1"
+    ),
+    "EditNumber": lambda _, console: EditNumber(console.editor, _parameter(console, "HSP")),
+    "PickValue": lambda _, console: PickValue(console.editor, _parameter(console, "FR1")),
+    "EditBits": lambda _, console: EditBits(console.editor, _parameter(console, "CMD")),
     "Results": lambda *_: Results(APPLIED),
-    "RestQuestion": lambda app, one: RestQuestion(APPLIED, MotorStates(app, [one.session])),
+    "RestQuestion": lambda app, console: RestQuestion(APPLIED, MotorStates(app, [console.session])),
     "BundleScreen": lambda *_: BundleScreen(Path("a.zip"), _no_bundle),
     "Skipped": lambda *_: Skipped(1, "backup.toml", []),
 }
@@ -110,14 +119,14 @@ def dialogs_there_are() -> set[str]:
     found: list[type] = []
     left: list[type] = [Framed]
     while left:
-        one = left.pop()
-        left += one.__subclasses__()
-        found.append(one)
+        item = left.pop()
+        left += item.__subclasses__()
+        found.append(item)
     bases = (Question, KeyQuestion)
     return {
-        one.__name__
-        for one in found
-        if issubclass(one, ModalScreen) and one not in bases and one.__module__.startswith("tui.")
+        cls.__name__
+        for cls in found
+        if issubclass(cls, ModalScreen) and cls not in bases and cls.__module__.startswith("tui.")
     }
 
 

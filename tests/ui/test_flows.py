@@ -275,8 +275,8 @@ async def test_another_word_of_bits_draws_that_alone(size: tuple[int, int], plac
     async with app.run_test(size=size) as pilot:
         screen = await to_monitor(app, pilot, 2)
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
-        for one in ("_timer", "_still"):
-            if timer := getattr(screen, one):
+        for text in ("_timer", "_still"):
+            if timer := getattr(screen, text):
                 timer.pause()
         words, motor = screen.query_one(f"#{place}", Lines), screen.query_one("#motor", Lines)
         before = words.lines

@@ -55,9 +55,11 @@ rows = st.builds(
 
 
 @given(st.integers(36, 180), rows, rows)
-def test_nothing_in_a_row_moves_whatever_it_says(width: int, one: WallRow, other: WallRow) -> None:
+def test_nothing_in_a_row_moves_whatever_it_says(
+    width: int, wall_row: WallRow, other: WallRow
+) -> None:
     columns = columns_for(width)
-    lines = [wall_line(row, columns) for row in (one, other)]
+    lines = [wall_line(row, columns) for row in (wall_row, other)]
     assert {len(line.plain) for line in lines} == {columns.taken}
     assert columns.taken <= width
     assert len(column_heads(columns).plain) == columns.taken
@@ -65,7 +67,7 @@ def test_nothing_in_a_row_moves_whatever_it_says(width: int, one: WallRow, other
 
 def test_small_width_drops_load_then_name() -> None:
     kept = [columns_for(width) for width in (180, 86, 70, 53)]
-    assert [(bool(one.load), bool(one.name), bool(one.drive)) for one in kept] == [
+    assert [(bool(columns.load), bool(columns.name), bool(columns.drive)) for columns in kept] == [
         (True, True, True),
         (True, True, True),
         (False, True, True),

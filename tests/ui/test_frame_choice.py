@@ -76,15 +76,15 @@ def test_a_number_is_a_drive_and_bytes_are_found_by_their_letters() -> None:
 @given(typed=st.text(max_size=20), data=st.lists(st.binary(max_size=12), max_size=6))
 @pytest.mark.sweep
 def test_whatever_is_typed_chooses_frames_that_are_there(typed: str, data: list[bytes]) -> None:
-    log = [Frame(0.0, "out" if at % 2 else "in", one) for at, one in enumerate(data)]
+    log = [Frame(0.0, "out" if at % 2 else "in", item) for at, item in enumerate(data)]
     found = chosen(log, choice_of(typed), reported, tcp=False)
     assert found == sorted(set(found) & set(range(len(log))))
 
 
 def test_gaps_are_those_on_the_line_whichever_frames_are_shown() -> None:
     assert gaps(LOG)[:3] == [None, pytest.approx(0.01), pytest.approx(0.49)]
-    texts = [gap_text(one) for one in (None, 0.0, 0.0123, 9.99, 10.0, 3600.0)]
-    assert [one.strip() for one in texts] == [
+    texts = [gap_text(value) for value in (None, 0.0, 0.0123, 9.99, 10.0, 3600.0)]
+    assert [text.strip() for text in texts] == [
         "", "+0.0 ms", "+12.3 ms", "+9.99 s", "+10.00 s", "+3600 s",
     ]  # fmt: skip
 

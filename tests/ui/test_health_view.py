@@ -20,8 +20,8 @@ def counted(line: LastMinute, drive: LastMinute, device: int = 247) -> LineCount
 @pytest.mark.parametrize("width", [60, 79, 80, 100, 119, 120, 200])
 def test_no_figure_moves_another_and_none_is_cut_off(width: int) -> None:
     shown = [
-        [line.plain for line in health_lines(counted(one, one), 247, width)]
-        for one in (LastMinute(), WELL, POOR, MANY)
+        [line.plain for line in health_lines(counted(minute, minute), 247, width)]
+        for minute in (LastMinute(), WELL, POOR, MANY)
     ]
     for lines in shown:
         assert max(map(len, lines)) <= width

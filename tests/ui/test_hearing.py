@@ -121,7 +121,7 @@ async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_beh
             await until(pilot, lambda: "listens already" in output(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
-            assert not [one for one in threading.enumerate() if one.name == "listening"]
+            assert not [thread for thread in threading.enumerate() if thread.name == "listening"]
             # canceled while it opens: nothing listens, and the port is free again
             may_open.clear()
             await pilot.press("H")
@@ -130,7 +130,7 @@ async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_beh
             await until(pilot, lambda: "was canceled" in output(app))
             may_open.set()
             await until(pilot, lambda: not app.hearing)
-            assert not [one for one in threading.enumerate() if one.name == "listening"]
+            assert not [thread for thread in threading.enumerate() if thread.name == "listening"]
             assert app.screen is app.connection
             await pilot.press("H")
             await heard(app, pilot, peer)
@@ -255,7 +255,7 @@ class StillHearing(HeardLine):
         self.link = SerialLink("/dev/ttyUSB0", 19200, "8E1")
         place = cast("Any", type("Place", (), {"link": self.link, "character": 11 / 19200}))
         place.silence = 3.5 * 11 / 19200
-        self._families = Families([library.load(one) for one in ("atv21", "atv71")])
+        self._families = Families([library.load(text) for text in ("atv21", "atv71")])
         self._hearing = Hearing(place, self._families, lambda _: None, self._keep)
         self._hearing.listener.tally.begun = fakes.NOW - 30
         for number in range(12):

@@ -18,9 +18,9 @@ ROW = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 
 def tables() -> dict[str, str]:
     """Every table of keys of the pages, by the screen that it is of."""
-    found = [one for path in PAGES for one in TABLE.finditer(path.read_text("utf-8"))]
-    assert len({one["of"] for one in found}) == len(found), "one table a screen"
-    return {one["of"]: one[0] for one in found}
+    found = [match_ for path in PAGES for match_ in TABLE.finditer(path.read_text("utf-8"))]
+    assert len({found_match["of"] for found_match in found}) == len(found), "one table a screen"
+    return {found_match["of"]: found_match[0] for found_match in found}
 
 
 def named(key: str) -> str:

@@ -168,9 +168,9 @@ async def test_typing_into_a_field_changes_no_screen() -> None:
         ("", "tcp:gateway", False),
     ],
 )
-def test_lines_that_are_the_same(one: str, other: str, same: bool) -> None:
-    assert same_line(one, other) is same
-    assert same_line(other, one) is same
+def test_lines_that_are_the_same(text: str, other: str, same: bool) -> None:
+    assert same_line(text, other) is same
+    assert same_line(other, text) is same
 
 
 class Listed(Screen[None]):

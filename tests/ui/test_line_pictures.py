@@ -278,7 +278,7 @@ OTHERS = [(state, size) for state in ("no-line", "thirty-one") for size in ((60,
 @pytest.mark.parametrize(
     ("state", "size"),
     [*USUAL, *OTHERS],
-    ids=lambda one: one if isinstance(one, str) else f"{one[0]}x{one[1]}",
+    ids=lambda item: item if isinstance(item, str) else f"{item[0]}x{item[1]}",
 )
 def test_line(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
     app = fakes.app_of()

@@ -120,7 +120,7 @@ def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
             if "forward" not in (lock.orders or MOVING_ORDERS):
                 continue
             wrong = next(raw for raw in range(0x10000) if raw & lock.mask not in lock.values)
-            raws = {one.parameter: one.values[0] for one in chart.interlocks}
+            raws = {interlock.parameter: interlock.values[0] for interlock in chart.interlocks}
             raws |= {when.parameter: when.values[0] for when in lock.when}
             raws |= {chart.when.parameter: chart.when.values[0]} if chart.when else {}
             found = hindrance(profile, raws | {lock.parameter: wrong})
@@ -173,7 +173,7 @@ def test_word_line_lists_what_is_true_at_0_too(
 @pytest.mark.parametrize("family", PROFILES)
 def test_word_line_lists_nothing_that_the_grid_does_not_light(family: str) -> None:
     profile = library.load(family)
-    for word in (one for one in profile.data.parameters if one.bits):
+    for word in (parameter for parameter in profile.data.parameters if parameter.bits):
         for raw in (0x0000, 0x0027, 0x0207, 0xFFFF):
             view = view_of(profile, {word.code: raw})
             listed = word_line(view, word, 2000).plain.count(" · ")
@@ -269,7 +269,7 @@ def test_quick_stop_bit_is_lit_only_in_states_where_it_counts(
     family: str, raw: int, lit: bool
 ) -> None:
     """In Switch on disabled and Fault the state chart leaves bit 5 open: no quick stop goes on."""
-    bit = next(one for one in library.load(family)["ETA"].bits if one.bit == 5)
+    bit = next(item for item in library.load(family)["ETA"].bits if item.bit == 5)
     line = _bit_line(bit, raw, 40).plain
     assert ("● Quick stop active" in line) is lit
     assert lit or "active" not in line

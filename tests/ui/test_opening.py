@@ -55,7 +55,7 @@ class Held:
     @property
     def closed(self) -> int:
         """How many of the lines that were opened are closed again."""
-        return sum(one.line.state.status.value == "closed" for one in self.lines)
+        return sum(line.line.state.status.value == "closed" for line in self.lines)
 
     def let(self) -> None:
         self._free.set()

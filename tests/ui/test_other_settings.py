@@ -63,8 +63,8 @@ async def test_a_drive_at_another_baud_is_found_and_the_line_stays_there() -> No
             assert set(app.connection.found) == {1}
             assert app.line_text.endswith(",9600,8E1")
             assert app.connection.form.line_at("p") == "serial:p,9600,8E1"
-            assert sum(",19200,8N2" in one for one in recent_lines()) == 0
-            assert any(",9600,8E1" in one for one in recent_lines())
+            assert sum(",19200,8N2" in line for line in recent_lines()) == 0
+            assert any(",9600,8E1" in line for line in recent_lines())
 
 
 async def test_a_drive_that_would_act_is_left_alone_only_with_a_yes() -> None:

@@ -47,10 +47,11 @@ def test_every_word_that_was_typed_is_in_what_is_found() -> None:
     for query in ("eeprom", "save eeprom", "EEPROM sav", "frames", "ramp", "trip file"):
         found = find(query, "monitor")
         assert found
-        for one in found:
-            text = f"{one.action.help} {one.action.label} {one.action.id} {one.screen}".casefold()
+        for hit in found:
+            action = hit.action
+            text = f"{action.help} {action.label} {action.id} {hit.screen}".casefold()
             assert all(word.casefold() in text for word in query.split())
-    assert [one.action.id for one in find("eeprom", "monitor")] == ["eeprom"]
+    assert [action.action.id for action in find("eeprom", "monitor")] == ["eeprom"]
     assert find("eeprom stop", "monitor") == []
     assert find("eprm", "monitor") == []  # letters here and there are no word
 
@@ -72,21 +73,21 @@ def test_every_action_is_found_from_everywhere(screen: str) -> None:
         only_moves = action.id.startswith(WAYS)
         query = " ".join([*BY_NAME.get(action.id, ()), *action.help.rstrip(".").split()[:3]])
         query = "".join(c if c.isalnum() or c == " " else " " for c in query)
-        found = [one for one in find(query, screen) if one.action.help == action.help]
+        found = [item for item in find(query, screen) if item.action.help == action.help]
         if here or not only_moves:
             assert found, (screen, action.id, query)
             assert found[0].here is any(
-                screen in one.screens for one in ACTIONS if one.help == action.help
+                screen in item.screens for item in ACTIONS if item.help == action.help
             )
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=3), st.sampled_from(EVERYWHERE))
 def test_motor_commands_need_their_full_name(words: list[str], screen: str) -> None:
-    for one in find(" ".join(words), screen):
-        names = BY_NAME.get(one.action.id, ())
+    for action in find(" ".join(words), screen):
+        names = BY_NAME.get(action.action.id, ())
         called = {name for name in names if any(word.startswith(name) for word in words)}
         assert bool(called) or not names
-        if one.ready:
+        if action.ready:
             assert called == set(names)
 
 

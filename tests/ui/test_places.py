@@ -136,9 +136,11 @@ def test_values_beside_monitor_are_read() -> None:
     """Who commands and who gives the reference would stand as dashes."""
     for profile in map(library.load, PROFILES):
         channels = [profile.quantity("command_channel"), profile.quantity("reference_channel")]
-        wanted = {one.code for one in channels if one is not None}
+        wanted = {channel.code for channel in channels if channel is not None}
         wanted |= {word.code for word in watched_words(profile)}
-        wanted |= {one.high for one in profile.data.monitoring.values if profile.get(one.high)}
+        wanted |= {
+            value.high for value in profile.data.monitoring.values if profile.get(value.high)
+        }
         assert wanted == set(codes_beside(profile))
 
 

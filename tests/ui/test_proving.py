@@ -23,7 +23,7 @@ async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
         await made.pilot.press("y")
         await until(made.pilot, lambda: "Test: silent for" in shown(made.app, "said"))
         await until(made.pilot, lambda: "· proved " in shown(made.app, "now"))
-        assert any(one.text.startswith("Proof: Trips ") for one in made.app.events.events)
+        assert any(event.text.startswith("Proof: Trips ") for event in made.app.events.events)
         await until(made.pilot, lambda: "FAULT SLF" in shown(made.app, "strip"))
 
 

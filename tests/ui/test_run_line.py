@@ -125,7 +125,7 @@ async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPa
             await made.pilot.pause(0.2)
             assert writes(made.app) == before
             assert open_lines(made)()
-            assert any(one.text.startswith("Enter ignored") for one in made.app.events.events)
+            assert any(event.text.startswith("Enter ignored") for event in made.app.events.events)
         clock.monotonic = lambda: now + MOMENT + 0.01  # type: ignore[method-assign]
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.speed() > 2)

@@ -57,7 +57,7 @@ def test_as_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
     wanted = ("mbtcp.unit_id", "modbus.regval_uint16", "frame.time_epoch", "frame.comment")
     done = subprocess.run(
         [peer("tshark", "tshark"), "-r", str(path), "-T", "fields", "-E", "separator=;",
-         *(part for one in wanted for part in ("-e", one))],
+         *(part for text in wanted for part in ("-e", text))],
         capture_output=True, text=True, timeout=PATIENCE, check=True,
     )  # fmt: skip
     assert done.stdout.splitlines() == [
@@ -87,7 +87,7 @@ def test_as_text(tmp_path: Path) -> None:
     head, columns, *lines = path.read_text("utf-8").splitlines()
     assert (head, columns.split("\t")[-1]) == ("# serial:x", "bytes")
     reported = [line.split("\t") for line in lines]
-    assert [one[2:] for one in reported] == [
+    assert [row[2:] for row in reported] == [
         ["request", "2 read ETA", "", "02 03 0C 81 00 01 D7 41"],
         ["reply", "", "", "00 02"],
         ["reply", "2 ETA 16#0637", "", "02 03 02 06 37 BE 32"],

@@ -39,9 +39,9 @@ async def two_lines() -> AsyncIterator[Panel]:
 def turning(made: Panel) -> list[bool]:
     """Whether the motor of each line turns, by the simulated drives themselves."""
     found = []
-    for one in made.app.panel_lines:
-        assert one.opened.simulation is not None
-        found.append(one.opened.simulation.drive(1).motor.frequency > 0)
+    for line in made.app.panel_lines:
+        assert line.opened.simulation is not None
+        found.append(line.opened.simulation.drive(1).motor.frequency > 0)
     return found
 
 
@@ -71,7 +71,8 @@ async def test_a_fault_of_a_line_that_is_not_shown_counts_and_is_reported_with_i
         label = made.app.panel_lines[0].opened.label
         await made.until(
             lambda: any(
-                one.text.startswith(label) and "ObF" in one.text for one in made.app.events.events
+                event.text.startswith(label) and "ObF" in event.text
+                for event in made.app.events.events
             )
         )
 
@@ -106,15 +107,15 @@ async def test_closing_one_shows_the_other_and_leaves_it_alone() -> None:
 async def test_leaving_tells_of_the_drives_of_both() -> None:
     async with two_lines() as made:
         app = made.app
-        for one in app.panel_lines:
-            await made.until(lambda one=one: not one.fleet.line_watch.unread())  # type: ignore[misc]
-        for one in app.panel_lines:
-            one.fleet.sessions[0].note_command()
+        for line in app.panel_lines:
+            await made.until(lambda line=line: not line.fleet.line_watch.unread())  # type: ignore[misc]
+        for line in app.panel_lines:
+            line.fleet.sessions[0].note_command()
         await made.pilot.press("q")
         await made.until(lambda: app.screen is not app.connection)
-        output = "\n".join(str(one.render()) for one in app.screen.query("#follows"))
-        for one in app.panel_lines:
-            assert one.opened.label in output
+        output = "\n".join(str(widget.render()) for widget in app.screen.query("#follows"))
+        for line in app.panel_lines:
+            assert line.opened.label in output
         assert "Altivar 71" in output
         assert "Altivar 312" in output
 
@@ -133,8 +134,8 @@ async def test_the_same_line_with_other_settings_is_closed_only_after_asking() -
 async def test_foreign_frames_are_reported_with_the_name_of_a_line_that_is_not_shown() -> None:
     async with two_lines() as made:
         below, shown = made.app.panel_lines
-        for one in (below, shown):
-            line = one.opened.line
+        for item in (below, shown):
+            line = item.opened.line
             assert isinstance(line, Line)
             for _ in range(SEVERAL_FRAMES):
                 line._engine.tally.count_minute(None, "foreign")

@@ -254,7 +254,7 @@ def waiting(app: DrivePanelApp) -> bool:
     """True if a stop was not answered yet."""
     assert app.fleet is not None
     return any(
-        not one.stop.sent and not one.stop.over for one in app.fleet.stopper._under_way.values()
+        not work.stop.sent and not work.stop.over for work in app.fleet.stopper._under_way.values()
     )
 
 

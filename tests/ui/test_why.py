@@ -117,7 +117,7 @@ def test_every_line_fits(family: str, width: int) -> None:
 
 def test_it_is_found_by_its_words() -> None:
     for query in ("why", "no answer", "silent"):
-        assert "why" in [one.action.id for one in find(query, "line")][:2], query
+        assert "why" in [action.action.id for action in find(query, "line")][:2], query
 
 
 @pytest.mark.parametrize("size", [(80, 24), (60, 20)], ids=["80x24", "60x20"])

@@ -75,13 +75,13 @@ def test_tshark_decodes_modbus_tcp_at_once(peer: Peer, tmp_path: Path) -> None:
         peer("tshark", "tshark"), path,
         "_ws.col.Protocol", "mbtcp.unit_id", "mbtcp.trans_id", "modbus.func_code", "ip.dst",
     )  # fmt: skip
-    assert {one[0] for one in found} == {"Modbus/TCP"}
-    sent = [one for one in found if one[4].startswith("192.0.2.")]
+    assert {row[0] for row in found} == {"Modbus/TCP"}
+    sent = [row for row in found if row[4].startswith("192.0.2.")]
     requested = [(d, int(request[:2], 16)) for d, request, _ in EXCHANGES]
-    assert [(int(one[1]), int(one[3])) for one in sent] == [*requested, (0, 6)]
-    assert [one[4] for one in sent] == [f"192.0.2.{one[1]}" for one in sent]
+    assert [(int(row[1]), int(row[3])) for row in sent] == [*requested, (0, 6)]
+    assert [row[4] for row in sent] == [f"192.0.2.{item[1]}" for item in sent]
     # a reply has the number of its request
-    assert [one[1:4] for one in found[0:-1:2]] == [one[1:4] for one in found[1::2]]
+    assert [row[1:4] for row in found[0:-1:2]] == [item[1:4] for item in found[1::2]]
 
 
 def test_tshark_finds_the_values_and_no_fault_in_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
@@ -90,14 +90,14 @@ def test_tshark_finds_the_values_and_no_fault_in_modbus_tcp(peer: Peer, tmp_path
     checked = ("-o", "ip.check_checksum:TRUE", "-o", "tcp.check_checksum:TRUE")
     assert reported(program, path, *checked, "-Y", "_ws.malformed or tcp.analysis.flags") == ""
     sums = fields(program, path, "ip.checksum.status", "tcp.checksum.status", options=checked)
-    assert {tuple(one) for one in sums} == {("1", "1")}
+    assert {tuple(sum_) for sum_ in sums} == {("1", "1")}
     (values,) = [
-        one
-        for one in fields(program, path, "modbus.regnum16", "modbus.regval_uint16")
-        if one[0] == "3201,3202"
+        field
+        for field in fields(program, path, "modbus.regnum16", "modbus.regval_uint16")
+        if field[0] == "3201,3202"
     ]
     assert values[1] == "1591,425"
-    (refused,) = [one for one in fields(program, path, "modbus.exception_code") if one[0]]
+    (refused,) = [field for field in fields(program, path, "modbus.exception_code") if field[0]]
     assert refused == ["2"]
 
 
@@ -124,7 +124,7 @@ def test_tshark_reads_raw_frames_as_configured(peer: Peer, tmp_path: Path) -> No
     damaged = tmp_path / "damaged.pcapng"
     damaged.write_bytes(path.read_bytes().replace(bytes.fromhex("0637"), b"\x06\x38", 1))
     checked = fields(program, damaged, *names, options=tuple(options))
-    assert [one[2] for one in checked[:3]] == ["1", "0", "1"]
+    assert [row[2] for row in checked[:3]] == ["1", "0", "1"]
 
 
 def test_raw_packets_are_the_bytes_of_the_line() -> None:

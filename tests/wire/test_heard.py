@@ -37,9 +37,9 @@ def split(*readings: bytes, every: float = 0.01, pause: bool = True) -> list[Hea
     splitter = FrameSplitter(CHARACTER, pairing.is_due)
     found = []
     for number, data in enumerate(readings):
-        for one in splitter.take(data, number * every):
-            pairing.take(one)
-            found.append(one)
+        for piece in splitter.take(data, number * every):
+            pairing.take(piece)
+            found.append(piece)
     return found + (list(splitter.pause()) if pause else [])
 
 
@@ -47,8 +47,8 @@ def heard(*readings: bytes, every: float = 0.01, until: float = 10.0) -> list[He
     """Exchanges of readings that come at an even pace, and then nothing."""
     pairing = Pairing()
     found = []
-    for one in split(*readings, every=every):
-        found += pairing.take(one)[0]
+    for piece in split(*readings, every=every):
+        found += pairing.take(piece)[0]
     return found + pairing.wait(until)
 
 
@@ -72,35 +72,35 @@ def test_reads_are_found_however_they_were_read(
     reads: list[tuple[int, int, list[int]]], chance: random.Random
 ) -> None:
     frames = [
-        one
+        item
         for device, address, words in reads
-        for one in (read_frame(device, address, len(words)), reply_words(device, *words))
+        for item in (read_frame(device, address, len(words)), reply_words(device, *words))
     ]
     data = b"".join(frames)
     cuts = sorted(chance.randrange(len(data) + 1) for _ in range(chance.randrange(8)))
     readings = [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
     found = split(*readings)
-    assert [one.data for one in found if one.whole] == frames
-    assert all(one.whole for one in found)
+    assert [frame.data for frame in found if frame.whole] == frames
+    assert all(frame.whole for frame in found)
 
 
 def test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it() -> None:
     request, reply = read_frame(160, 7, 2), reply_words(160, 1040, 1040)
     assert is_whole(reply[:-1])
-    assert [one.data for one in split(request, reply + READ)] == [request, reply, READ]
-    assert [one.data for one in split(request, reply[:-1], reply[-1:])] == [request, reply]
+    assert [frame.data for frame in split(request, reply + READ)] == [request, reply, READ]
+    assert [frame.data for frame in split(request, reply[:-1], reply[-1:])] == [request, reply]
 
 
 def test_a_request_that_is_a_whole_reply_without_its_last_byte_is_found_with_it() -> None:
     request, reply = read_frame(70, 531, 1), reply_words(70, 0)
     assert is_whole(request[:-1])
     dribbled = [bytes([byte]) for byte in request + reply]
-    assert [one.data for one in split(*dribbled, every=CHARACTER)] == [request, reply]
+    assert [frame.data for frame in split(*dribbled, every=CHARACTER)] == [request, reply]
 
 
 def test_a_request_that_is_sent_again_is_found_while_its_reply_is_due() -> None:
     found = split(READ, READ, WORDS, pause=False, every=0.2)
-    assert [one.data for one in found] == [READ, READ, WORDS]
+    assert [frame.data for frame in found] == [READ, READ, WORDS]
 
 
 @pytest.mark.parametrize("example", FRAMES, ids=lambda f: f"{f.family}-{f.number}")
@@ -115,7 +115,7 @@ def test_every_frame_of_the_manuals_is_found(example: Frame) -> None:
 )  # fmt: skip
 def test_each_kind_of_frame_is_found_byte_by_byte(data: bytes) -> None:
     readings = [bytes([byte]) for byte in data + READ]
-    assert [one.data for one in split(*readings, every=CHARACTER)] == [data, READ]
+    assert [heard_frame.data for heard_frame in split(*readings, every=CHARACTER)] == [data, READ]
 
 
 def test_a_function_that_is_not_known_ends_with_a_pause() -> None:
@@ -127,13 +127,13 @@ def test_a_function_that_is_not_known_ends_with_a_pause() -> None:
 @given(st.binary(min_size=1, max_size=20))
 def test_noise_before_a_request_hides_it_no_longer_than_a_pause(noise: bytes) -> None:
     found = split(noise, READ, WORDS)
-    assert b"".join(one.data for one in found) == noise + READ + WORDS
-    assert [one.data for one in found if one.whole][-2:] == [READ, WORDS]
+    assert b"".join(frame.data for frame in found) == noise + READ + WORDS
+    assert [frame.data for frame in found if frame.whole][-2:] == [READ, WORDS]
 
 
 def test_a_cut_reply_does_not_take_the_next_request_with_it() -> None:
     found = split(READ, WORDS[:5], READ, pause=False)
-    assert [(one.data, one.whole) for one in found] == [
+    assert [(frame.data, frame.whole) for frame in found] == [
         (READ, True),
         (WORDS[:5], False),
         (READ, True),
@@ -144,15 +144,15 @@ def test_a_cut_reply_does_not_take_the_next_request_with_it() -> None:
 def test_noise_right_before_a_request_does_not_take_it_along(noise: bytes) -> None:
     """An adapter has handed over both at once; the reply comes behind a silence."""
     found = split(noise + READ, WORDS, pause=False)
-    assert [one.data for one in found] == [noise, READ, WORDS]
+    assert [frame.data for frame in found] == [noise, READ, WORDS]
 
 
 def test_broken_frame_is_dropped() -> None:
     splitter = FrameSplitter()
     noise = bytes([0x55, 0x55]) * 3000
-    given = b"".join(one.data for one in splitter.take(noise, 0.0))
+    given = b"".join(frame.data for frame in splitter.take(noise, 0.0))
     assert len(given) > 4000
-    assert given + b"".join(one.data for one in splitter.pause()) == noise
+    assert given + b"".join(frame.data for frame in splitter.pause()) == noise
     assert not splitter.waiting
 
 
@@ -164,15 +164,18 @@ def test_pauses_are_measured_where_readings_tell_them() -> None:
     assert reply[0].pause == pytest.approx(0.010 - 4 * CHARACTER)
     assert reply[0].gap == pytest.approx(0.010 - 5 * CHARACTER)
     together = list(splitter.take(READ + WORDS, 2.0))
-    assert [one.pause is None for one in together] == [False, True]
+    assert [frame.pause is None for frame in together] == [False, True]
 
 
 def test_one_reading_of_several_frames_tells_no_gap() -> None:
-    assert [one.gap for one in split(READ + WORDS + READ)] == [0.0, 0.0, 0.0]
+    assert [frame.gap for frame in split(READ + WORDS + READ)] == [0.0, 0.0, 0.0]
 
 
 def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]:
-    return [(one.device, one.function, one.answer) for one in heard(*readings, every=every)]
+    return [
+        (exchange.device, exchange.function, exchange.answer)
+        for exchange in heard(*readings, every=every)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -212,9 +215,9 @@ def test_a_write_that_is_sent_again_is_no_reply() -> None:
 
 
 def test_an_exchange_tells_its_times_and_its_words() -> None:
-    (one,) = heard(READ, WORDS, every=0.02)
-    assert one.turnaround == pytest.approx(0.02 - len(WORDS) * CHARACTER)
-    assert (one.request, one.reply) == (READ[1:-2], WORDS[1:-2])
+    (exchange,) = heard(READ, WORDS, every=0.02)
+    assert exchange.turnaround == pytest.approx(0.02 - len(WORDS) * CHARACTER)
+    assert (exchange.request, exchange.reply) == (READ[1:-2], WORDS[1:-2])
     (refused,) = heard(READ, REFUSED)
     assert refused.exception == 2
 

@@ -90,7 +90,11 @@ class FakeDevice:
     def fail(self, kind: str, failure: PlannedFailure) -> None:
         """Let something go wrong, in the place of what was to go wrong with that address."""
         wanted = self._failures.setdefault(kind, [])
-        wanted[:] = [one for one in wanted if one.address != failure.address]
+        wanted[:] = [
+            planned_failure
+            for planned_failure in wanted
+            if planned_failure.address != failure.address
+        ]
         wanted.append(failure)
 
     def next_failure(self, kind: str, request: Request) -> PlannedFailure | None:

@@ -68,36 +68,36 @@ class KeepAlives:
         """Have a device kept alive for so many seconds; None: until this program leaves."""
         until = None if seconds is None else time.monotonic() + seconds
         timeout = min(max(wanted.timeout, SHORTEST_TIMEOUT), LONGEST_TIMEOUT)
-        one = msgspec.structs.replace(wanted, timeout=timeout, until=until)
-        if self.kept.get((self._me, one.device)) != one:
-            self._say(one)
+        alive = msgspec.structs.replace(wanted, timeout=timeout, until=until)
+        if self.kept.get((self._me, alive.device)) != alive:
+            self._say(alive)
 
     def let_go(self, device: int) -> None:
         """Have a device kept alive no more."""
-        if (one := self.kept.get((self._me, device))) is not None:
-            self._say(msgspec.structs.replace(one, until=0.0))
+        if (alive := self.kept.get((self._me, device))) is not None:
+            self._say(msgspec.structs.replace(alive, until=0.0))
 
-    def _say(self, one: KeepAlive) -> None:
-        self.hear(self._me, one)
-        self._tell(one)
+    def _say(self, alive: KeepAlive) -> None:
+        self.hear(self._me, alive)
+        self._tell(alive)
 
     # Of all
 
-    def hear(self, program: str, one: KeepAlive) -> None:
+    def hear(self, program: str, alive: KeepAlive) -> None:
         """A program has a device kept alive, or no more."""
         with self._lock:
-            kept = {key: each for key, each in self.kept.items() if key != (program, one.device)}
-            if one.until != 0.0:
-                kept[program, one.device] = one
+            kept = {key: each for key, each in self.kept.items() if key != (program, alive.device)}
+            if alive.until != 0.0:
+                kept[program, alive.device] = alive
             self.kept = MappingProxyType(kept)
         self.changed()
 
     def end(self, program: str) -> None:
         """A program is on the line no more."""
         with self._lock:
-            rest = {key: one for key, one in self.kept.items() if key[0] != program}
+            rest = {key: alive for key, alive in self.kept.items() if key[0] != program}
             self.kept = MappingProxyType(rest)
 
     def of(self, program: str) -> list[KeepAlive]:
         """Those of one program."""
-        return [one for (owner, _), one in self.kept.items() if owner == program]
+        return [alive for (owner, _), alive in self.kept.items() if owner == program]

@@ -111,15 +111,17 @@ class WriteLeases:
         """Let a program write no more, to any device unless one is named."""
         with self._lock:
             rest = {
-                key: one
-                for key, one in self._leases.items()
+                key: lease
+                for key, lease in self._leases.items()
                 if key[0] != program or device not in (None, key[1])
             }
             self._leases = MappingProxyType(rest)
 
     def of(self, program: str) -> dict[int, WriteLease]:
         """The leases of a program, by device."""
-        return {device: one for (owner, device), one in self._leases.items() if owner == program}
+        return {
+            device: lease for (owner, device), lease in self._leases.items() if owner == program
+        }
 
     def refusal(self, program: str, device: int) -> str:
         """Why a program may not write to a device now, for a person; empty if it may."""

@@ -25,7 +25,7 @@ class MinuteWindow:
     def count(self, kind: str, now: float, number: int = 1) -> None:
         """Count so many of a field of LastMinute; a negative number corrects an earlier count."""
         newest = int(now // BUCKET)
-        kept = [one for one in self._buckets if newest - BUCKETS < one[0] <= newest]
+        kept = [bucket for bucket in self._buckets if newest - BUCKETS < bucket[0] <= newest]
         counts = [0] * len(_KINDS)
         if kept and kept[-1][0] == newest:
             counts = list(kept.pop()[1])
@@ -42,6 +42,6 @@ class MinuteWindow:
             return total
         counted = [counts for bucket, counts in buckets if bucket > newest - BUCKETS]
         # what corrects a count may be kept for longer than the count
-        total = LastMinute(*(max(0, sum(one)) for one in zip(*counted, strict=True)))
+        total = LastMinute(*(max(0, sum(pair)) for pair in zip(*counted, strict=True)))
         self._summed = (buckets, newest, total)
         return total

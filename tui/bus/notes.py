@@ -84,14 +84,14 @@ class Notes:
 
     def of(self, device: int, kind: str) -> tuple[LineNote, ...]:
         """The notes of a device and kind, the oldest first."""
-        return tuple(one for one in self.all if (one.device, one.kind) == (device, kind))
+        return tuple(note for note in self.all if (note.device, note.kind) == (device, kind))
 
     @property
     def all(self) -> tuple[LineNote, ...]:
         """All notes that are kept, the oldest first."""
         with self._lock:
             oldest = self._clock() - NOTES_KEPT
-            return tuple(one for one, when in self._kept.items() if when >= oldest)
+            return tuple(note for note, when in self._kept.items() if when >= oldest)
 
 
 def _size(note: LineNote) -> int:

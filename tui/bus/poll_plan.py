@@ -64,7 +64,7 @@ class PolledTurn:
         self.turn, self.begun = turn, begun
         self._left = dict(replies)
         self._missed = False
-        times = (one.time for one in replies.values() if isinstance(one, Reply))
+        times = (reply.time for reply in replies.values() if isinstance(reply, Reply))
         self.ended = max(times, default=begun)
         """The time of the last reply."""
 

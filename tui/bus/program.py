@@ -32,7 +32,7 @@ LONGEST_NAME, LONGEST_SAID = 40, 500
 
 def readable(text: str, longest: int = LONGEST_SAID) -> str:
     """A text of another program as it may be shown: not endless, and nothing for the terminal."""
-    plain = "".join(one if one.isprintable() else "?" for one in text[:longest])
+    plain = "".join(item if item.isprintable() else "?" for item in text[:longest])
     return plain if len(text) <= longest else f"{plain[:-1]}…"
 
 

@@ -30,19 +30,21 @@ class ProgramUse:
         faded = dict(self.shares)
         faded[program] = faded.get(program, 0.0) + seconds / USE_WINDOW
         most = sorted(faded, key=faded.__getitem__, reverse=True)[:MOST_PROGRAMS]
-        self._shares, self._when = {one: faded[one] for one in most}, self._clock()
+        self._shares, self._when = {text: faded[text] for text in most}, self._clock()
 
     @property
     def shares(self) -> dict[str, float]:
         """The present shares, by the programs' ids."""
         fades = math.exp(-max(0.0, self._clock() - self._when) / USE_WINDOW)
-        now = ((one, share * fades) for one, share in self._shares.items())
-        return {one: min(share, 1.0) for one, share in now if share >= LEAST_USE}
+        now = ((text, share * fades) for text, share in self._shares.items())
+        return {text: min(share, 1.0) for text, share in now if share >= LEAST_USE}
 
 
 def use_by_program(
     programs: Iterable[Program], shares: Mapping[str, float]
 ) -> list[tuple[Program, float]]:
     """The programs on a line without its keeper; their order stays while shares change."""
-    found = [(one, shares.get(one.id, 0.0)) for one in programs if one.name != KEEPER]
-    return sorted(found, key=lambda one: (one[0].pid, one[0].id))
+    found = [
+        (program, shares.get(program.id, 0.0)) for program in programs if program.name != KEEPER
+    ]
+    return sorted(found, key=lambda pair: (pair[0].pid, pair[0].id))

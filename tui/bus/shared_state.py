@@ -74,11 +74,13 @@ class SharedState(StateListeners):
     def others(self) -> tuple[Program, ...]:
         """The other programs on the line; its keeper is none."""
         mine = self.me.id
-        return tuple(one for one in self.programs if one.id != mine and one.name != KEEPER)
+        return tuple(
+            program for program in self.programs if program.id != mine and program.name != KEEPER
+        )
 
     def program(self, id: str) -> Program | None:
         """A program on the line."""
-        return next((one for one in self.programs if one.id == id), None)
+        return next((item for item in self.programs if item.id == id), None)
 
     def learn(
         self,
@@ -93,15 +95,15 @@ class SharedState(StateListeners):
         Returns the devices with stops that this program did not know of.
         """
         with self._lock:
-            others = {d: one for d, one in commanders.items() if one != self.me.id}
-            mine = {d: one for d, one in self.commanders.items() if one == self.me.id}
-            reported = {d: one for d, one in paused.items() if one[0] != self.me.id}
-            own = {d: one for d, one in self.paused.items() if one[0] == self.me.id}
+            others = {d: text for d, text in commanders.items() if text != self.me.id}
+            mine = {d: text for d, text in self.commanders.items() if text == self.me.id}
+            reported = {d: pair for d, pair in paused.items() if pair[0] != self.me.id}
+            own = {d: pair for d, pair in self.paused.items() if pair[0] == self.me.id}
             self.paused = MappingProxyType({**reported, **own})
             self.commanders = MappingProxyType({**others, **mine})
             unheard = self.stops.replace(given, self.me.id)
-            known = {one.id for one in (*self.departed, *programs, self.me)}
-            earlier = tuple(one for one in departed if one.id not in known)
+            known = {program.id for program in (*self.departed, *programs, self.me)}
+            earlier = tuple(program for program in departed if program.id not in known)
             self.departed = (*earlier, *self.departed)[-DEPARTED_KEPT:]
         self.leases.forget_ended(others)
         self.set_programs(programs)
@@ -110,9 +112,13 @@ class SharedState(StateListeners):
     def set_programs(self, programs: tuple[Program, ...]) -> None:
         """The programs on the line, as their owner knows them."""
         with self._lock:
-            here = {one.id for one in programs}
-            left = [one for one in self.programs if one.id not in here and one.id != self.me.id]
-            stay = [one for one in self.departed if one.id not in here]
+            here = {program.id for program in programs}
+            left = [
+                program
+                for program in self.programs
+                if program.id not in here and program.id != self.me.id
+            ]
+            stay = [program for program in self.departed if program.id not in here]
             self.departed = (*stay, *left)[-DEPARTED_KEPT:]
             self.programs = programs
         self.on_change.tell()
@@ -144,7 +150,7 @@ class SharedState(StateListeners):
     def note_pause(self, device: int, program: str, why: str) -> None:
         """A program leaves a device alone, or with no reason no longer."""
         with self._lock:
-            rest = {d: one for d, one in self.paused.items() if d != device}
+            rest = {d: pair for d, pair in self.paused.items() if d != device}
             self.paused = MappingProxyType({**rest, device: (program, why)} if why else rest)
 
     def _leave_alone_no_more(self, devices: Iterable[int]) -> None:
@@ -160,7 +166,7 @@ class SharedState(StateListeners):
         # counted before it is told: a program that attaches in between tells the counts
         self.stops.give(self.me.id, stopped, by)
         self._leave_alone_no_more(stopped)
-        when = max(self.stops.times.get(one, 0.0) for one in stopped) if stopped else None
+        when = max(self.stops.times.get(number, 0.0) for number in stopped) if stopped else None
         counts = self.stops.of(self.me.id, stopped)
         self._tell(StopGiven(stopped, counts, by[:MOST_TEXT], self.me, when))
 
@@ -193,7 +199,7 @@ class SharedState(StateListeners):
         with self._lock:
             if self.commanders.get(device) == program:
                 return
-            held = {d: one for d, one in self.commanders.items() if d != device}
+            held = {d: text for d, text in self.commanders.items() if d != device}
             if program is not None:
                 held[device] = program
             self.commanders = MappingProxyType(held)
@@ -222,11 +228,11 @@ class SharedState(StateListeners):
     def hear_gone(self, program: Program) -> None:
         """A program is on the line no more; called where this program owns it."""
         with self._lock:
-            held = {d: one for d, one in self.commanders.items() if one != program.id}
+            held = {d: text for d, text in self.commanders.items() if text != program.id}
             self.commanders = MappingProxyType(held)
-            left = {d: one for d, one in self.paused.items() if one[0] != program.id}
+            left = {d: pair for d, pair in self.paused.items() if pair[0] != program.id}
             self.paused = MappingProxyType(left)
-            rest = tuple(one for one in self.programs if one.id != program.id)
+            rest = tuple(item for item in self.programs if item.id != program.id)
         self.leases.end(program.id)
         self.keep_alives.end(program.id)
         self.set_programs(rest)
@@ -243,12 +249,12 @@ class SharedState(StateListeners):
         if stamp != self.stops.stamp(device):
             by = self.stops.by.get(device, "")
             return f"Not sent: a stop came after it{f' ({by})' if by else ''}."
-        for one in (device,) if device else tuple(self.commanders):
-            holder = self.commanders.get(one)
+        for commander in (device,) if device else tuple(self.commanders):
+            holder = self.commanders.get(commander)
             if holder is not None and holder != program:
                 other = self.program(holder)
                 if other is not None:
-                    return commanded_by(one, other)
+                    return commanded_by(commander, other)
         return self.leases.refusal(program, device) if writes and self.gated else ""
 
 

@@ -79,7 +79,7 @@ class StopCounts:
         with self._lock:
             self.by = MappingProxyType({**self.by, **dict.fromkeys(devices, by)})
             news = self.learn(
-                {one: {program: count} for one, count in zip(devices, counts, strict=False)}
+                {number: {program: count} for number, count in zip(devices, counts, strict=False)}
             )
             self.learn_times(dict.fromkeys(news, when or time.monotonic()))
             return news
@@ -143,7 +143,7 @@ class StopCounts:
             others = set(present) - {program}
             news = self.learn(
                 {
-                    device: {one: count for one, count in counts.items() if one not in others}
+                    device: {text: count for text, count in counts.items() if text not in others}
                     for device, counts in greeting.items()
                 }
             )
@@ -169,9 +169,9 @@ class StopCounts:
         with self._lock:
             folded: dict[int, dict[str, int]] = {}
             for device, counts in self.given.items():
-                rest = {one: count for one, count in counts.items() if one not in programs}
-                for one in counts.keys() - rest.keys():
-                    _add(rest, GIVEN_BY_NOBODY, counts[one])
+                rest = {text: count for text, count in counts.items() if text not in programs}
+                for text in counts.keys() - rest.keys():
+                    _add(rest, GIVEN_BY_NOBODY, counts[text])
                 folded[device] = rest
             self._put(folded)
 
@@ -179,12 +179,14 @@ class StopCounts:
         before = self.totals
         self.given = MappingProxyType(dict(given))
         self.totals = MappingProxyType(
-            {one: sum(of.values()) % STOPS_WRAP for one, of in given.items()}
+            {number: sum(of.values()) % STOPS_WRAP for number, of in given.items()}
         )
         return self._risen(before)
 
     def _risen(self, before: Mapping[int, int]) -> tuple[int, ...]:
-        return tuple(one for one, n in self.totals.items() if is_newer(n, before.get(one, 0)))
+        return tuple(
+            number for number, n in self.totals.items() if is_newer(n, before.get(number, 0))
+        )
 
 
 def _add(counts: dict[str, int], program: str, more: int) -> None:

@@ -86,18 +86,18 @@ class Tally:
 
     def count_sent(self, device: int, size: int) -> None:
         """A frame of so many bytes has gone out to a device."""
-        one = self.of(device)
+        tally = self.of(device)
         self.requests += 1
         self.bytes_out += size
-        one.requests += 1
-        one.bytes_out += size
+        tally.requests += 1
+        tally.bytes_out += size
 
     def count_end(self, device: int, seconds: float, received: int) -> None:
         """Its exchange is over; bytes of the line were counted as they came."""
-        one = self.of(device)
+        tally = self.of(device)
         self.busy_seconds += seconds
-        one.busy_seconds += seconds
-        one.bytes_in += received
+        tally.busy_seconds += seconds
+        tally.bytes_in += received
 
     def count_reply(self, device: int, turnaround: float) -> None:
         """A right reply came, or a refusal."""
@@ -157,15 +157,15 @@ class Tally:
             setattr(self, name, getattr(counters, name))
         self.shares = dict(counters.programs)
         self.minute = MinuteWindow(counters.minute)
-        for device, one in devices.items():
-            plain = {n: getattr(one, n) for n in _PLAIN_OF_DEVICE}
-            self.devices[device] = DeviceTally(**plain, minute=MinuteWindow(one.minute))
+        for device, device_counters in devices.items():
+            plain = {n: getattr(device_counters, n) for n in _PLAIN_OF_DEVICE}
+            self.devices[device] = DeviceTally(**plain, minute=MinuteWindow(device_counters.minute))
 
     def frozen(self) -> LineCounters:
         """The counts of this moment, of each device too."""
         # copy() runs without giving up the interpreter, so no device comes in between
         each, now = self.devices.copy(), self.clock()
-        found = {device: one.frozen(now) for device, one in each.items()}
+        found = {device: tally.frozen(now) for device, tally in each.items()}
         plain = {name: getattr(self, name) for name in _PLAIN}
         shares, minute = self.use.shares or self.shares, self.minute.total(now)
         return LineCounters(**plain, devices=found, programs=shares, minute=minute)

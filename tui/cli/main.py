@@ -103,8 +103,8 @@ class Commands(click.Group):
         """Take the arguments apart; `-v` is accepted anywhere among them."""
         end = args.index("--") if "--" in args else len(args)
         as_json = "--json" in args[:end]
-        verbose = [one for one in args[:end] if one in VERBOSE]
-        rest = [one for one in args[:end] if one not in VERBOSE]
+        verbose = [arg for arg in args[:end] if arg in VERBOSE]
+        rest = [arg for arg in args[:end] if arg not in VERBOSE]
         with plain_errors(as_json=as_json):
             context = super().make_context(
                 info_name, [*verbose, *rest, *args[end:]], parent, **extra

@@ -92,10 +92,10 @@ def parse_stop(words: list[str]) -> tuple[str, tuple[int, ...]] | None:
     line = lines[0] if lines else os.environ.get("DRIVEPANEL_LINE")
     if not line or len(lines) > 1 or (every and typed):
         return None
-    if any(one not in _ADDRESSES for one in typed):
+    if any(text not in _ADDRESSES for text in typed):
         return None
     line, usual = _written_out(line)
-    devices = tuple(dict.fromkeys(_ADDRESSES[one] for one in typed)) or (usual,)
+    devices = tuple(dict.fromkeys(_ADDRESSES[text] for text in typed)) or (usual,)
     return (line, () if every else devices) if line else None
 
 
@@ -188,13 +188,13 @@ def _host_number(name: str) -> str:
     numbers = [name] if name[:1].isdigit() else []
     for line in [] if numbers else _content(_HOSTS_FILE).splitlines():
         number, *called = line.partition("#")[0].split() or [""]
-        if name in [one.lower().rstrip(".") for one in called]:
+        if name in [text.lower().rstrip(".") for text in called]:
             numbers.append(number)
     if not numbers:
         return name
-    number = next((one for one in numbers if ":" not in one), "")
+    number = next((text for text in numbers if ":" not in text), "")
     parts = number.split(".")
-    plain = all(_is_number(one) and one == str(int(one)) and int(one) <= 255 for one in parts)
+    plain = all(_is_number(part) and part == str(int(part)) and int(part) <= 255 for part in parts)
     return number if plain and len(parts) == 4 else ""
 
 
@@ -241,7 +241,7 @@ def _state_folder() -> str:
 
 
 def _lock_name(key: str) -> str:
-    readable = "".join(one if one.isascii() and one.isalnum() else "-" for one in key)
+    readable = "".join(text if text.isascii() and text.isalnum() else "-" for text in key)
     readable = "-".join(filter(None, readable.split("-")))[-24:]
     return f"{readable}-{_digest(key)[:12]}.lock"
 

@@ -44,7 +44,11 @@ def telling_codes(profile: Profile) -> tuple[str, ...]:
         roles.setdefault(setting.role, setting.parameter)  # of the first port: others may lack
     first = (profile.get(code) for code in roles.values())
     more = (profile.quantity(quantity) for quantity in USUAL_SETTINGS)
-    found = [one.code for one in (*first, *more) if one is not None and _has_limits(profile, one)]
+    found = [
+        parameter.code
+        for parameter in (*first, *more)
+        if parameter is not None and _has_limits(profile, parameter)
+    ]
     return tuple(dict.fromkeys(found))[:ENOUGH]
 
 

@@ -46,7 +46,7 @@ def channel_codes(profile: Profile) -> list[str]:
     rows = [*channels.command, *channels.reference]
     reported = [(row.parameter, row.when) for row in rows]
     reported += [(switch.parameter, switch.when) for switch in channels.switches]
-    codes = [code for own, when in reported for code in (*(one.parameter for one in when), own)]
+    codes = [code for own, when in reported for code in (*(item.parameter for item in when), own)]
     return list(dict.fromkeys(codes))
 
 

@@ -102,10 +102,10 @@ def _flowed(row: PageRow, width: int) -> Iterator[PageLine]:
 
 def _warnings(data: ProfileData) -> Iterator[PageRow]:
     message = [*data.wiring.warnings]
-    for one in message:
-        yield PageRow("!", one.text, SURENESS[one.confidence], True)
+    for warning in message:
+        yield PageRow("!", warning.text, SURENESS[warning.confidence], True)
     watch = data.communication_fault
-    known = {one.text for one in message}
+    known = {warning.text for warning in message}
     for text in watch.warnings if watch else ():
         if text not in known:
             yield PageRow("!", text, "", True)
@@ -130,8 +130,10 @@ def _pins(connector: Connector) -> Iterator[PageRow]:
 
 
 def _signals(data: ProfileData) -> Iterator[PageRow]:
-    for one in data.wiring.signals:
-        yield PageRow(one.signal, "; ".join(f"{std}: {name}" for std, name in one.names.items()))
+    for signal in data.wiring.signals:
+        yield PageRow(
+            signal.signal, "; ".join(f"{std}: {name}" for std, name in signal.names.items())
+        )
 
 
 def _line(data: ProfileData) -> Iterator[PageRow]:
@@ -173,30 +175,32 @@ def _silence(data: ProfileData) -> Iterator[PageRow]:
     off = f"; {watch.off} switches it off" if watch.off is not None else ""
     yield PageRow("Timeout", f"{watch.timeout}{off}")
     yield PageRow("It begins", watch.starts)
-    for one in watch.reactions:
-        head = f"{watch.reaction} = {one.raw}" if watch.reaction else one.name
-        yield PageRow(head, f"{one.name}: {one.does}", "", one.motor_keeps_running)
+    for reaction in watch.reactions:
+        head = f"{watch.reaction} = {reaction.raw}" if watch.reaction else reaction.name
+        yield PageRow(head, f"{reaction.name}: {reaction.does}", "", reaction.motor_keeps_running)
     if watch.note:
         yield PageRow("", watch.note)
 
 
 def _after_reset(data: ProfileData) -> Iterator[PageRow]:
-    for one in data.faults.after_reset:
-        yield PageRow("*", one.text, SURENESS[one.confidence], one.by == "others")
+    for reset in data.faults.after_reset:
+        yield PageRow("*", reset.text, SURENESS[reset.confidence], reset.by == "others")
 
 
 def _lamps(data: ProfileData) -> Iterator[PageRow]:
-    for one in data.wiring.lamps:
-        yield PageRow(one.name, one.tells, SURENESS[one.confidence])
+    for lamp in data.wiring.lamps:
+        yield PageRow(lamp.name, lamp.tells, SURENESS[lamp.confidence])
 
 
 def _commands(data: ProfileData) -> Iterator[PageRow]:
-    for one in data.command_examples:
-        text = f"{one.does}. {one.note}" if one.note else one.does
-        yield PageRow(f"16#{one.word:04X}", text, SURENESS[one.confidence])
+    for example in data.command_examples:
+        text = f"{example.does}. {example.note}" if example.note else example.does
+        yield PageRow(f"16#{example.word:04X}", text, SURENESS[example.confidence])
 
 
 def _errata(data: ProfileData) -> Iterator[PageRow]:
-    for one in data.errata:
-        why = f" {one.why}" if one.why else ""
-        yield PageRow("*", f"{one.place}. Printed: {one.printed}. Right: {one.right}.{why}")
+    for erratum in data.errata:
+        why = f" {erratum.why}" if erratum.why else ""
+        yield PageRow(
+            "*", f"{erratum.place}. Printed: {erratum.printed}. Right: {erratum.right}.{why}"
+        )

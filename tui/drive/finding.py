@@ -89,7 +89,7 @@ def silent_cost(setting: LineSetting, wait: float, probes: int = 1) -> float:
 
 def longest_turnaround(profiles: Iterable[Profile]) -> float:
     """Seconds that the slowest family takes before it answers, as it leaves the factory."""
-    return max((float(one.data.link.turnaround_ms) / 1000 for one in profiles), default=0.0)
+    return max((float(profile.data.link.turnaround_ms) / 1000 for profile in profiles), default=0.0)
 
 
 def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[LineSetting]:
@@ -102,26 +102,32 @@ def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[Li
     for link in links:
         for baud, baud_share in _shares(link.baud, link.bauds).items():
             for form, form_share in _shares(link.format, link.formats).items():
-                one = LineSetting(baud, form)
-                shares[one] = shares.get(one, Decimal(0)) + baud_share * form_share
+                setting = LineSetting(baud, form)
+                shares[setting] = shares.get(setting, Decimal(0)) + baud_share * form_share
     factory = {LineSetting(link.baud, link.format) for link in links}
 
-    def worth(one: LineSetting) -> tuple[bool, bool, float, int, str]:
-        cost = silent_cost(one, wait_for_reply(one, turnaround))
-        return one not in factory, one.slow, -float(shares[one]) / cost, -one.baud, one.format
+    def worth(setting: LineSetting) -> tuple[bool, bool, float, int, str]:
+        cost = silent_cost(setting, wait_for_reply(setting, turnaround))
+        return (
+            setting not in factory,
+            setting.slow,
+            -float(shares[setting]) / cost,
+            -setting.baud,
+            setting.format,
+        )
 
     return sorted(shares, key=worth)
 
 
 def families_at(profiles: Iterable[Profile], settings: Iterable[LineSetting]) -> list[str]:
     """Names of the families that can be set to one of these."""
-    wanted = {(one.baud, one.format) for one in settings}
+    wanted = {(setting.baud, setting.format) for setting in settings}
     found = []
-    for one in profiles:
-        link = one.data.link
+    for profile in profiles:
+        link = profile.data.link
         bauds, formats = {link.baud, *link.bauds}, {link.format, *link.formats}
         if any(baud in bauds and form in formats for baud, form in wanted):
-            found.append(one.data.profile.name)
+            found.append(profile.data.profile.name)
     return found
 
 
@@ -133,7 +139,9 @@ def names_text(names: Sequence[str]) -> str:
 
 def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
     """Return how likely each value is: half for the factory's, the rest shared evenly."""
-    others = [one for one in dict.fromkeys(all_of_them) if one != factory]
+    others = [
+        type_var_type for type_var_type in dict.fromkeys(all_of_them) if type_var_type != factory
+    ]
     if not others:
         return {factory: Decimal(1)}
     rest = (1 - FACTORY_SHARE) / len(others)
@@ -148,12 +156,12 @@ def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
     """
     registers: dict[int, tuple[str, ...]] = {}
     needs_identification = False
-    for one in profiles:
-        status = one.quantity("status_word")
-        if any(function.code == IDENTIFY for function in one.data.functions):
-            needs_identification |= one.data.reading.unknown_exception is None
+    for profile in profiles:
+        status = profile.quantity("status_word")
+        if any(function.code == IDENTIFY for function in profile.data.functions):
+            needs_identification |= profile.data.reading.unknown_exception is None
         elif status is not None and status.function == 3:
-            registers[status.address] = (*registers.get(status.address, ()), one.id)
+            registers[status.address] = (*registers.get(status.address, ()), profile.id)
     found = [PresenceProbe(register, families) for register, families in registers.items()]
     if needs_identification or not found:
         found.append(PresenceProbe(None))
@@ -163,19 +171,19 @@ def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
 def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
     """Families whose communication timeout begins with any request; the documented ones first."""
     found = []
-    for one in profiles:
-        rules = one.data.communication_fault
+    for profile in profiles:
+        rules = profile.data.communication_fault
         if rules is None or not rules.timeout or rules.needs_write:
             continue
         sure = rules.starts_confidence != "unverified"
-        found.append(WatchingFamily(one.id, one.data.profile.name, rules.timeout, sure))
-    return sorted(found, key=lambda one: not one.sure)
+        found.append(WatchingFamily(profile.id, profile.data.profile.name, rules.timeout, sure))
+    return sorted(found, key=lambda family: not family.sure)
 
 
 def watching_text(families: Sequence[WatchingFamily]) -> str:
     """Name the families that react to lost polling, in a sentence; empty for none."""
-    sure = ", ".join(f"{one.name} ({one.code})" for one in families if one.sure)
-    likely = ", ".join(f"{one.name} ({one.code})" for one in families if not one.sure)
+    sure = ", ".join(f"{family.name} ({family.code})" for family in families if family.sure)
+    likely = ", ".join(f"{family.name} ({family.code})" for family in families if not family.sure)
     if not families:
         return ""
     parts = [part for part in (sure, f"and perhaps {likely}" if likely else "") if part]

@@ -39,28 +39,28 @@ class StopPlace:
     def status(self) -> tuple[int, ...]:
         """Addresses of the words that show their states: a drive without any of them is of another
         family."""
-        return self._addresses(chart.status for one in self.families for chart in one.charts)
+        return self._addresses(chart.status for family in self.families for chart in family.charts)
 
     @property
     def deciding(self) -> tuple[int, ...]:
         """Addresses of what else decides by which word they stop."""
         codes = (
             code
-            for one in self.families
-            for chart in one.charts
+            for family in self.families
+            for chart in family.charts
             for code in (
                 *((chart.when.parameter,) if chart.when else ()),
                 *(w.parameter for order in _stops(chart) for w in order.when),
             )
         )
-        return tuple(one for one in self._addresses(codes) if one not in self.status)
+        return tuple(address for address in self._addresses(codes) if address not in self.status)
 
     def _addresses(self, codes: Iterator[str]) -> tuple[int, ...]:
         wanted = set(codes)
         found = {
             address
-            for one in self.families
-            for code, address in one.places.items()
+            for family in self.families
+            for code, address in family.places.items()
             if code in wanted
         }
         return tuple(sorted(found))
@@ -72,26 +72,26 @@ def stop_places(families: Sequence[StopProfile], named: Sequence[str] = ()) -> l
     The others refuse at once a word that they do not have.
     """
     places: dict[int, list[StopProfile]] = {}
-    for one in families:
+    for profile in families:
         for address in {
-            _place(one, chart, order) for chart in one.charts for order in _stops(chart)
+            _place(profile, chart, order) for chart in profile.charts for order in _stops(chart)
         }:
             if address is not None:
-                places.setdefault(address, []).append(one)
+                places.setdefault(address, []).append(profile)
     rank = {id: number for number, id in enumerate(named)}
 
-    def place_of(one: StopProfile) -> int:
-        return rank.get(one.id, len(rank))
+    def place_of(profile: StopProfile) -> int:
+        return rank.get(profile.id, len(rank))
 
     found = [
         StopPlace(address, tuple(sorted(group, key=place_of))) for address, group in places.items()
     ]
     return sorted(
         found,
-        key=lambda one: (
-            min(place_of(family) for family in one.families),
-            all(family.names_itself for family in one.families),
-            one.address,
+        key=lambda place: (
+            min(place_of(family) for family in place.families),
+            all(family.names_itself for family in place.families),
+            place.address,
         ),
     )
 
@@ -103,12 +103,12 @@ def families_beside(families: Sequence[StopProfile], named: str) -> tuple[StopPr
     """
     places = stop_places(families, [named])
     ids = {
-        one.id
+        profile.id
         for place in places
         if any(family.id == named for family in place.families)
-        for one in place.families
+        for profile in place.families
     }
-    return tuple(one for one in families if one.id in ids)
+    return tuple(profile for profile in families if profile.id in ids)
 
 
 def first_word(
@@ -118,7 +118,11 @@ def first_word(
 
     A family that lacks a word which the drive has answered is another, unless it was named.
     """
-    may_be = tuple(one for one in place.families if one.id in named or raws.keys() <= one.addresses)
+    may_be = tuple(
+        profile
+        for profile in place.families
+        if profile.id in named or raws.keys() <= profile.addresses
+    )
     ways = (wanted, *(way for way in GENTLE_FIRST if way != wanted))
     for way in ways:
         for family in may_be:
@@ -156,9 +160,9 @@ def blind_stops(families: Sequence[StopProfile]) -> list[FirstWord]:
 
     Nothing needs to be known of the drive. Empty if no word stops them all.
     """
-    named = [one.id for one in families]
+    named = [family.id for family in families]
     found = [first_word(place, {}, "stop", named) for place in stop_places(families, named)]
-    return [one for one in found if one is not None] if all(found) else []
+    return [word for word in found if word is not None] if all(found) else []
 
 
 def _stopped_by(family: StopProfile, address: int, word: int, raws: Mapping[int, int]) -> bool:
@@ -167,7 +171,7 @@ def _stopped_by(family: StopProfile, address: int, word: int, raws: Mapping[int,
     charts = _charts(family, known)
     return bool(charts) and all(
         any(
-            [one & 0xFFFF for one in order.words] == [word]
+            [number & 0xFFFF for number in order.words] == [word]
             and _place(family, chart, order) == address
             and _holds(order, chart, known)
             for order in _stops(chart)
@@ -181,12 +185,14 @@ def _charts(family: StopProfile, known: Mapping[str, int]) -> list[Chart]:
 
     There no word is known to stop, so none is sent.
     """
-    sure = [one for one in family.charts if one.when is not None and one.when.holds(known)]
+    sure = [chart for chart in family.charts if chart.when is not None and chart.when.holds(known)]
     if sure:
         return sure
-    may = [one for one in family.charts if one.when is None or one.when.holds(known) is None]
+    may = [
+        chart for chart in family.charts if chart.when is None or chart.when.holds(known) is None
+    ]
     may = may or list(family.charts)  # a value of no chart decides nothing
-    return [one for one in may if one.orders]
+    return [chart for chart in may if chart.orders]
 
 
 def _holds(order: Order, chart: Chart, known: Mapping[str, int]) -> bool:

@@ -67,17 +67,19 @@ def classify_words(
 
 def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) -> ExternalWord:
     found = _places(profile).get(address, ())
-    if any(is_order(profile, one) or one.code in _ordered(profile) for one in found):
-        stops = any(only_stops(profile, one, word, raws) for one in found)
+    if any(
+        is_order(profile, parameter) or parameter.code in _ordered(profile) for parameter in found
+    ):
+        stops = any(only_stops(profile, parameter, word, raws) for parameter in found)
         return ExternalWord(address, word, WordKind.STOP if stops else WordKind.COMMAND, found)
-    if found and all(is_setting(profile, one) for one in found):
+    if found and all(is_setting(profile, parameter) for parameter in found):
         return ExternalWord(address, word, WordKind.SETTING, found)
     return ExternalWord(address, word, WordKind.UNKNOWN, found)
 
 
 def parameters_at(words: Collection[ExternalWord]) -> list[Parameter]:
     """The parameters of several words, each once."""
-    return list({p.code: p for one in words for p in one.parameters}.values())
+    return list({p.code: p for word in words for p in word.parameters}.values())
 
 
 def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirection | None:
@@ -87,12 +89,12 @@ def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirecti
     """
     references = {reference.parameter for reference in profile.data.references}
     found = [
-        one
-        for one in words
-        if one.kind is WordKind.COMMAND
+        word
+        for word in words
+        if word.kind is WordKind.COMMAND
         and not all(
             p.code in references or p.quantity in ("command_frequency", "command_speed")
-            for p in one.parameters
+            for p in word.parameters
         )
     ]
     back = {
@@ -103,7 +105,7 @@ def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirecti
     }
     if not found:
         return None
-    return "reverse" if any(one.word in back for one in found) else "forward"
+    return "reverse" if any(word.word in back for word in found) else "forward"
 
 
 @lru_cache(maxsize=32)
@@ -182,7 +184,7 @@ def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]
     return [
         code
         for code in dict.fromkeys(codes)
-        if (one := profile.get(code)) is not None and one.access != "w"
+        if (parameter := profile.get(code)) is not None and parameter.access != "w"
     ]
 
 
@@ -192,26 +194,26 @@ def setting_refusal(profile: Profile, found: ExternalWord, allowed: Collection[s
     `allowed` are codes, or `ALL`: that leaves out what decides who commands the drive, what cuts
     the line, and what no document confirms. These are written where they are named.
     """
-    for one in found.parameters:
-        if one.forbidden:
-            return f"{one.code} is never written by Drive Panel: {one.forbidden}"
-        if one.code in allowed:
+    for parameter in found.parameters:
+        if parameter.forbidden:
+            return f"{parameter.code} is never written by Drive Panel: {parameter.forbidden}"
+        if parameter.code in allowed:
             continue
         if ALL not in allowed:
-            return f"{one.code} is not allowed: --allow-writes {one.code} allows it."
-        if one.code in _named_only(profile) or not is_verified(one):
-            return f"{one.code} is allowed by its name only: --allow-writes {one.code}."
+            return f"{parameter.code} is not allowed: --allow-writes {parameter.code} allows it."
+        if parameter.code in _named_only(profile) or not is_verified(parameter):
+            return f"{parameter.code} is allowed by its name only: --allow-writes {parameter.code}."
     return ""
 
 
 @lru_cache(maxsize=32)
 def _named_only(profile: Profile) -> frozenset[str]:
     """Settings that decide who commands or gives the reference, and those that cut the line."""
-    cutting = {one.code for one in profile.parameters if cuts_line(profile, one)}
+    cutting = {parameter.code for parameter in profile.parameters if cuts_line(profile, parameter)}
     channels = {
-        one.code
-        for one in profile.parameters
-        if one.quantity in ("command_channel", "reference_channel")
+        parameter.code
+        for parameter in profile.parameters
+        if parameter.quantity in ("command_channel", "reference_channel")
     }
     return frozenset({*cutting, *channels, *channel_codes(profile)})
 

@@ -144,7 +144,7 @@ def hint_markdown(
         lines.append(f"- Probably ({TRUST[left.confidence]}): {_joined(left.probable)}")
     if left.check:
         lines.append(f"- Check (general practice): {_joined(left.check)}")
-    lines += [f"- {one.text}: {one.reason}." for one in left.excluded]
+    lines += [f"- {advice.text}: {advice.reason}." for advice in left.excluded]
     lines += [
         f"- Look at {look.code}, {profile[look.code].name}: {value(look.code)} ({look.why})"
         for look in hint.look_at

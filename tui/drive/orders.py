@@ -136,15 +136,17 @@ def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int
 
 def last_word(chart: Chart, order: Order) -> Order | None:
     """Return the command that ends operation after an enabled ramp stop to 0 Hz."""
-    same = (one for one in chart.orders if one.id == order.id and not one.states and not one.when)
-    return next((one for one in same if one is not order), None) if order.states else None
+    same = (
+        item for item in chart.orders if item.id == order.id and not item.states and not item.when
+    )
+    return next((item for item in same if item is not order), None) if order.states else None
 
 
 def stop_alike(profiles: Sequence[Profile]) -> bool:
     """Return True if the same words stop the drives of all these families, told by the same
     states."""
     ways = [_ways_to_stop(profile) for profile in profiles]
-    return bool(ways) and all(one == ways[0] for one in ways)
+    return bool(ways) and all(way == ways[0] for way in ways)
 
 
 def _ways_to_stop(profile: Profile) -> tuple[object, ...]:

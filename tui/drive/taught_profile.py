@@ -48,13 +48,13 @@ def teachable_codes(family: Profile) -> list[str]:
 def reference_of(family: Profile, code: str) -> TeachableReference | None:
     """Return the facts on a parameter that can become the reference once taught, or None."""
     found = family.data.teachable_references
-    return next((one for one in found if one.parameter == code), None)
+    return next((reference for reference in found if reference.parameter == code), None)
 
 
 def why_no_reference(family: Profile, code: str, taught: Mapping[str, TaughtScale]) -> str:
     """Why a parameter cannot take the reference; empty if it can, once a person confirms it."""
     if reference_of(family, code) is None:
-        known = ", ".join(one.parameter for one in family.data.teachable_references)
+        known = ", ".join(reference.parameter for reference in family.data.teachable_references)
         may = f"{known} may." if known else f"{family.name} has none that may."
         return f"{code} does not take the reference; {may}"
     if (scale := taught.get(code)) is None:
@@ -77,8 +77,10 @@ def with_taught(family: Profile, taught: Mapping[str, TaughtScale], reference: s
     if reference and why_no_reference(family, reference, known):
         reference = ""
     parameters = [
-        _taught(one, known[one.code], one.code == reference) if one.code in known else one
-        for one in family.parameters
+        _taught(parameter, known[parameter.code], parameter.code == reference)
+        if parameter.code in known
+        else parameter
+        for parameter in family.parameters
     ]
     charts = family.data.charts
     way = reference_of(family, reference) if reference else None

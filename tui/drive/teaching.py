@@ -131,7 +131,7 @@ def unit_named(text: str) -> str:
         return ""
     if folded in _ALIASES:
         return _ALIASES[folded]
-    if (known := next((one for one in UNITS if one.casefold() == folded), None)) is not None:
+    if (known := next((unit for unit in UNITS if unit.casefold() == folded), None)) is not None:
         return known
     if folded == "raw" or not _UNIT.fullmatch(typed):
         usual = ", ".join(UNITS[:6])
@@ -146,7 +146,9 @@ def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
     reported = any(look.word >= SIGN_FROM for look in looks)
     signs: tuple[bool | None, ...] = (False, True) if reported else (None,)
     tried = (TaughtScale(scale, unit, signed) for scale in SCALES for signed in signs)
-    return [one for one in tried if all(_agrees(look, one) for look in looks)]
+    return [
+        taught_scale for taught_scale in tried if all(_agrees(look, taught_scale) for look in looks)
+    ]
 
 
 def taught_by(looks: Sequence[DisplayLook]) -> TaughtScale | None:
@@ -165,14 +167,16 @@ def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson
     scale = taught_by(looks)
     if scale is not None:
         kind = LessonKind.TAUGHT if known is None else LessonKind.AGREES
-        seen = ", ".join(one.text for one in looks)
+        seen = ", ".join(item.text for item in looks)
         return Lesson(kind, looks, f"{code}: {scale.text} ({seen}).{_sign_text(scale)}", scale)
-    if len({one.word for one in looks}) < 2:
+    if len({item.word for item in looks}) < 2:
         kind = LessonKind.SAME if before else LessonKind.FIRST
         again = " again" if before else ""
         text = f"{code}: {look.text}{again}. Look again at another value."
         return Lesson(kind, looks, text)
-    fits = " or ".join(dict.fromkeys(f"{one.scale:f}" for one in scales_that_fit(looks)))
+    fits = " or ".join(
+        dict.fromkeys(f"{taught_scale.scale:f}" for taught_scale in scales_that_fit(looks))
+    )
     text = f"{code}: 1 count is {fits}. Look again at a larger value ({look.text})."
     return Lesson(LessonKind.UNSURE, looks, text)
 
@@ -187,7 +191,7 @@ def _contradiction(
     if not alone:
         why = f"no usual scale gives {look.shown:f} for raw {look.word}"
     else:
-        why = f"no usual scale fits {' and '.join(one.text for one in (*before[-2:], look))}"
+        why = f"no usual scale fits {' and '.join(item.text for item in (*before[-2:], look))}"
     check = "Was it the same parameter, and was the value steady?"
     if known is not None:
         text = f"{code} is no longer taught ({known.text} before): {why}. It is shown raw. {check}"
@@ -201,11 +205,11 @@ def _with(before: Sequence[DisplayLook], look: DisplayLook) -> tuple[DisplayLook
 
     Of too many those are left out first without which the same is known.
     """
-    same = [one for one in before if (one.word, one.shown) == (look.word, look.shown)]
+    same = [item for item in before if (item.word, item.shown) == (look.word, look.shown)]
     if same and look.unit in ("", same[0].unit):
         return tuple(before)
     if same and not same[0].unit:
-        return tuple(replace(one, unit=look.unit) if one is same[0] else one for one in before)
+        return tuple(replace(item, unit=look.unit) if item is same[0] else item for item in before)
     looks = (*before, look)
     if len(looks) <= LOOKS_KEPT:
         return looks

@@ -105,25 +105,25 @@ class Panel(LeanApp):
     def fleets(self) -> list[Fleet]:
         """The drives of every open line, of the one that is shown first."""
         shown = [self.fleet] if self.fleet is not None else []
-        return [*shown, *(one.fleet for one in self.panel_lines if one.fleet is not self.fleet)]
+        return [*shown, *(line.fleet for line in self.panel_lines if line.fleet is not self.fleet)]
 
     @property
     def open_texts(self) -> list[str]:
         """Every open line as it was typed."""
-        return [self.line_text, *(one.opened.text for one in self.panel_lines)]
+        return [self.line_text, *(line.opened.text for line in self.panel_lines)]
 
     @property
     def faulty_texts(self) -> list[str]:
         """The open lines with a drive in fault, as they were typed."""
         lines = self.panel_lines
-        return [one.opened.text for one in lines if one.fleet.alarms.active]
+        return [line.opened.text for line in lines if line.fleet.alarms.active]
 
     @abstractmethod
     def open_line_of(self, text: str) -> PanelLine | None:
         """The open line that a text means, whatever its settings; None where it is not open."""
 
     @abstractmethod
-    def show_line(self, one: PanelLine | None) -> None:
+    def show_line(self, line: PanelLine | None) -> None:
         """Show another of the open lines; no drive is open then."""
 
     @abstractmethod

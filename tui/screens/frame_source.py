@@ -55,8 +55,8 @@ class FrameSource:
         strip = StripView(
             drive=drive,
             line=self._line(fleet),
-            faults=sum(len(one.alarms.active) for one in app.fleets),
-            unseen=any(one.alarms.unseen for one in app.fleets),
+            faults=sum(len(item.alarms.active) for item in app.fleets),
+            unseen=any(item.alarms.unseen for item in app.fleets),
             load=self._measured(now),
             clock=app.clock.time_of_day(),
             read_only=app.read_only,
@@ -125,11 +125,11 @@ class FrameSource:
 
     def _trouble_below(self, now: float) -> str:
         """The first trouble of the lines that are open and not shown."""
-        for one in self._app.panel_lines:
-            if one.opened is not self._app.opened and (
-                trouble := self._line_trouble(now, one.opened) or self._not_heard(one.fleet)
+        for line in self._app.panel_lines:
+            if line.opened is not self._app.opened and (
+                trouble := self._line_trouble(now, line.opened) or self._not_heard(line.fleet)
             ):
-                return f"{one.opened.label}: {trouble}"
+                return f"{line.opened.label}: {trouble}"
         return ""
 
     def _line_trouble(self, now: float, other: OpenLine | None = None) -> str:
@@ -152,11 +152,12 @@ class FrameSource:
         warnings = fleet.line_watch.warnings() if fleet else []
         if not warnings:
             return ""
-        one = min(warnings, key=lambda warning: warning.left)
-        does = f": {one.watch.reaction.name.lower()}" if one.watch.reaction else ""
-        when = f"in {one.left:.1f} s" if one.left > 0 else "by now"
+        first = min(warnings, key=lambda warning: warning.left)
+        reaction = first.watch.reaction
+        does = f": {reaction.name.lower()}" if reaction else ""
+        when = f"in {first.left:.1f} s" if first.left > 0 else "by now"
         return (
-            f"Drive {one.device} NOT HEARD for {one.silent:.1f} s: it acts on its communication"
+            f"Drive {first.device} NOT HEARD for {first.silent:.1f} s: it acts on its communication"
             f" timeout {when}{does}."
         )
 

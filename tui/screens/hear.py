@@ -34,19 +34,19 @@ def why_not_hear(fleet: Fleet) -> str:
     if not isinstance(line.link, SerialLink):
         return "Over a network other masters cannot be monitored; this list shows all its traffic."
     if others := line.facts.others:
-        who = ", ".join(one.text for one in others)
+        who = ", ".join(other.text for other in others)
         return f"Not listened to: {who} uses the line too, and a port like that has no other user."
     if running := watch.under_command():
-        who = "; ".join(names_of([one]) for one in running)
+        who = "; ".join(names_of([session]) for session in running)
         return f"Not monitored: {who} runs by a command of this panel. Stop it first."
     if acting := watch.left_alone():
-        reported = next(one for one in fleet.sessions if one.device in acting)
+        reported = next(session for session in fleet.sessions if session.device in acting)
         text = left_alone_text(reported, watch=acting[reported.device])
         return f"Not listened to, as the panel feeds drives. {text} {CLOSE_FIRST}"
     if unread := watch.unread():
         who = names_of([unread[0]])
         return f"Not monitored yet: the reaction of {who} when polling stops was not read."
-    unknown = [device for device, one in fleet.found.items() if one.console is None]
+    unknown = [device for device, drive in fleet.found.items() if drive.console is None]
     if unknown:
         return (
             f"Not monitored: the reaction of device {unknown[0]} when polling stops is not known."

@@ -283,4 +283,4 @@ def every_fleet(panel: Panel) -> list[Fleet]:
         return panel.fleets
     except Exception:
         log.exception("which line is shown is not known")
-        return [one.fleet for one in panel.panel_lines]
+        return [line.fleet for line in panel.panel_lines]

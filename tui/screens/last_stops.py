@@ -59,7 +59,7 @@ class LineStops:
         begun = [
             s for s in self.fleet.sessions if s.starts is not None and s.starts.holds(s.device)
         ]
-        return [*running, *(one for one in begun if one not in running)]
+        return [*running, *(session for session in begun if session not in running)]
 
     def _stopped(self, sessions: Sequence[DriveSession]) -> bool:
         """Order one stop of them; whether that was done."""
@@ -67,7 +67,7 @@ class LineStops:
             self.fleet.stop(sessions, by=BY)
         except Exception as error:
             log.exception("no stop was ordered")
-            self.troubles |= {one.device: f"{error}" for one in sessions}
+            self.troubles |= {item.device: f"{error}" for item in sessions}
             if len(sessions) == 1 and (console := self.fleet.console(sessions[0].device)):
                 self.fleet.last_stop(error, console)
             return False
@@ -77,7 +77,7 @@ class LineStops:
 
     def wait(self, seconds: float) -> bool:
         """Wait for the standstill of all; True if every motor was seen at rest."""
-        ordered = [one for one in self.sessions if one.device not in self.troubles]
+        ordered = [session for session in self.sessions if session.device not in self.troubles]
         try:
             summary = self.fleet.stopper.wait(ordered, seconds)
         except Exception:
@@ -91,8 +91,8 @@ class LineStops:
         """The result of each stop, for a person."""
         reports = self.fleet.stopper.reports
         return [
-            f"{self.label}Device {one.device}: {self._result(one.device, reports.get(one.device))}"
-            for one in self.sessions
+            f"{self.label}Device {device}: {self._result(device, reports.get(device))}"
+            for device in (session.device for session in self.sessions)
         ]
 
     def _result(self, device: int, report: StopReport | None) -> str:
@@ -115,9 +115,9 @@ class LastStops(NamedTuple):
     def begun(self) -> str:
         """The motors that are being stopped, for a person."""
         devices = [
-            f"{line.label}{one.device}" if line.label else str(one.device)
+            f"{line.label}{session.device}" if line.label else str(session.device)
             for line in self.lines
-            for one in line.sessions
+            for session in line.sessions
         ]
         if not devices:
             return ""

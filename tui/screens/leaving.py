@@ -53,7 +53,7 @@ class Leaving(Panel):
 
     def _motors(self) -> list[DriveSession]:
         """Drives of all lines commanded by this panel whose motors are not surely at standstill."""
-        return [one for fleet in self.fleets for one in fleet.line_watch.under_command()]
+        return [session for fleet in self.fleets for session in fleet.line_watch.under_command()]
 
     def _leaving_report(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
         """Return what happens to the drives of lines that are left; several lines by their names.
@@ -78,9 +78,11 @@ class Leaving(Panel):
         from tui.session.sharing.leaving import peer_effect_text
 
         reported = []
-        for one in sessions:
-            reported.append(left_alone_text(one, watch=fleet.line_watch.watch(one.device)))
-            reported += [others] if (others := peer_effect_text(one, on_purpose=on_purpose)) else []
+        for session in sessions:
+            reported.append(left_alone_text(session, watch=fleet.line_watch.watch(session.device)))
+            reported += (
+                [others] if (others := peer_effect_text(session, on_purpose=on_purpose)) else []
+            )
         return reported
 
     def _left_behind(self, fleet: Fleet) -> list[str]:
@@ -88,9 +90,9 @@ class Leaving(Panel):
         from tui.session.monitor.timeout import names_of
 
         return [
-            f"{names_of([one.session])}: {left[0].lower()}{left[1:]} {STOP_OR_TAKE_OVER}"
-            for one in fleet.consoles
-            if (left := fleet.left_behind(one))
+            f"{names_of([console.session])}: {left[0].lower()}{left[1:]} {STOP_OR_TAKE_OVER}"
+            for console in fleet.consoles
+            if (left := fleet.left_behind(console))
         ]
 
     def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
@@ -106,14 +108,14 @@ class Leaving(Panel):
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
         found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
-            f"{names_of([one])}: what it does on loss of communication was not read yet."
-            for one in line_watch.unread()
-            if one.device not in reported
+            f"{names_of([item])}: what it does on loss of communication was not read yet."
+            for item in line_watch.unread()
+            if item.device not in reported
         ]
         found += [
             f"Device {device}: its reaction when polling stops is not known."
-            for device, one in fleet.found.items()
-            if one.console is None
+            for device, drive in fleet.found.items()
+            if drive.console is None
         ]
         head = "When polling stops, these drives react to their timeout, even at standstill:"
         return [head, *found] if found else []
@@ -158,9 +160,11 @@ class Leaving(Panel):
 
         May be called in any thread, returns at once and raises nothing.
         """
-        labels = {id(one.fleet): f"{one.opened.label}: " for one in self.panel_lines}
+        labels = {id(item.fleet): f"{item.opened.label}: " for item in self.panel_lines}
         several = len(labels) > 1
-        lines = [LineStops(one, labels.get(id(one), "") if several else "") for one in self.fleets]
+        lines = [
+            LineStops(fleet, labels.get(id(fleet), "") if several else "") for fleet in self.fleets
+        ]
         for line in lines:
             line.order()
         return LastStops(lines)
@@ -201,7 +205,7 @@ class Leaving(Panel):
             reported.insert(0, always)
         if not reported:
             return None
-        drives = [one for fleet in fleets for one in _concerned(fleet)]
+        drives = [session for fleet in fleets for session in _concerned(fleet)]
         now = MotorStates(self, drives) if drives else None
         return Confirm(question, "\n".join(reported), yes=yes, no=no, loses=True, now=now)
 
@@ -227,5 +231,5 @@ def _concerned(fleet: Fleet) -> list[DriveSession]:
     """Drives of a line that run by a command from here, or act once they are left alone."""
     turning = {session.device for session in fleet.line_watch.under_command()}
     turning |= fleet.line_watch.left_alone().keys()
-    turning |= {one.device for one in fleet.consoles if fleet.left_behind(one)}
+    turning |= {console.device for console in fleet.consoles if fleet.left_behind(console)}
     return [session for session in fleet.sessions if session.device in turning]

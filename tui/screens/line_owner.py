@@ -83,9 +83,9 @@ class LineOwner(Panel):
             starts.left_running = self.leave_running
         events = LineEvents(self.events, opened.label, lambda: self.opened is opened)
         fleet = Fleet(opened.line, self.journal, starts, events, self.clock)
-        one = PanelLine(opened, fleet)
-        self.panel_lines = (*self.panel_lines, one)
-        self.show_line(one)
+        line = PanelLine(opened, fleet)
+        self.panel_lines = (*self.panel_lines, line)
+        self.show_line(line)
         self._look_after(fleet)
         fleet.event_notes.ask()
         if unkept := opened.line.facts.unkept:
@@ -100,15 +100,17 @@ class LineOwner(Panel):
         from tui.session.connect.line_key import line_key
 
         wanted = line_key(text)
-        return next((one for one in self.panel_lines if line_key(one.opened.text) == wanted), None)
+        return next(
+            (line for line in self.panel_lines if line_key(line.opened.text) == wanted), None
+        )
 
-    def show_line(self, one: PanelLine | None) -> None:
+    def show_line(self, line: PanelLine | None) -> None:
         """Show another of the open lines; no drive is open then."""
         self.chosen = None
-        self.opened, self.fleet = (one.opened, one.fleet) if one is not None else (None, None)
+        self.opened, self.fleet = (line.opened, line.fleet) if line is not None else (None, None)
 
     def _shown(self) -> PanelLine | None:
-        return next((one for one in self.panel_lines if one.opened is self.opened), None)
+        return next((line for line in self.panel_lines if line.opened is self.opened), None)
 
     def _look_after(self, fleet: Fleet) -> None:
         """Show who shares the line, and stop the motors of programs on it that have exited."""
@@ -157,24 +159,24 @@ class LineOwner(Panel):
 
     async def disconnect_all(self) -> None:
         """Close every line."""
-        for one in self.panel_lines:
-            await self._close(one)
+        for line in self.panel_lines:
+            await self._close(line)
 
-    async def _close(self, one: PanelLine) -> None:
-        self.panel_lines = tuple(other for other in self.panel_lines if other is not one)
-        if self.opened is one.opened:
+    async def _close(self, line: PanelLine) -> None:
+        self.panel_lines = tuple(other for other in self.panel_lines if other is not line)
+        if self.opened is line.opened:
             self.show_line(self.panel_lines[-1] if self.panel_lines else None)
-        one.fleet.forget()
+        line.fleet.forget()
         # whole, though the opening that it is closed for may be canceled
-        await asyncio.shield(asyncio.to_thread(_close_all_of, one))
-        log.info("closed %s", one.opened.label)
+        await asyncio.shield(asyncio.to_thread(_close_all_of, line))
+        log.info("closed %s", line.opened.label)
 
 
-def _close_all_of(one: PanelLine) -> None:
+def _close_all_of(line: PanelLine) -> None:
     """Close a line, and wait for what is still to be written of its motors."""
-    one.opened.close()
-    if one.fleet.starts is not None:
-        one.fleet.starts.close()
+    line.opened.close()
+    if line.fleet.starts is not None:
+        line.fleet.starts.close()
 
 
 def _remember(text: str) -> None:

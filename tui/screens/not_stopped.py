@@ -19,7 +19,7 @@ FAILED_SHOWN = 60.0
 
 def not_stopped_texts(app: Panel, now: float) -> tuple[str, ...]:
     """A text for each motor that a stop does not stop."""
-    labels = {id(one.fleet): f"{one.opened.label}, " for one in app.panel_lines}
+    labels = {id(item.fleet): f"{item.opened.label}, " for item in app.panel_lines}
     found = []
     for fleet in app.fleets:
         line = labels.get(id(fleet), "") if len(labels) > 1 else ""

@@ -81,7 +81,7 @@ class StatusRefresher(Panel):
 
     def _judge_lines(self) -> None:
         """Say once of each trouble that the last minute of a line shows, and of its end."""
-        labels = {id(one.fleet): one.opened.label for one in self.panel_lines}
+        labels = {id(item.fleet): item.opened.label for item in self.panel_lines}
         for fleet in self.fleets:
             # not among the events of the line: each program on it sees the same
             label = "" if fleet is self.fleet else f"{labels[id(fleet)]}: "

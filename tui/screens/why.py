@@ -51,7 +51,7 @@ def _open_drive(app: Panel) -> WhyTarget | None:
         session.device,
         app.opened,
         session.profile.id,
-        tuple(one for one in found if one != session.device),
+        tuple(number for number in found if number != session.device),
     )
 
 
@@ -79,7 +79,7 @@ async def _looked(target: WhyTarget) -> Diagnosis:
         seen = await asyncio.to_thread(evidence_of_port, link, target.device, target.trouble)
         return diagnosed(replace(seen, profile=profile))
     line = opened.line
-    answer = [one for one in target.neighbors if line.device_state(one).answers]
+    answer = [neighbor for neighbor in target.neighbors if line.device_state(neighbor).answers]
     changed = opened.known.text if opened.known is not None else ""
     return diagnosed(
         await examine_line(line, target.device, profile, changed=changed, answering=answer)

@@ -63,8 +63,12 @@ class ByteOrder:
 
     def note(self, profile: Profile, found: Mapping[str, Reading], now: float) -> None:
         """Judge by values that were just read."""
-        read = {c: (one, one.raw) for c, one in found.items() if one.raw is not None}
-        votes = {c: only_swapped(profile, one.parameter, raw) for c, (one, raw) in read.items()}
+        read = {
+            c: (reading, reading.raw) for c, reading in found.items() if reading.raw is not None
+        }
+        votes = {
+            c: only_swapped(profile, reading.parameter, raw) for c, (reading, raw) in read.items()
+        }
         right = sum(vote is False for vote in votes.values())
         wrong = sum(vote is True for vote in votes.values())
         with self._lock:

@@ -53,7 +53,7 @@ class EventNotes:
     def _is_known(self, event: Event) -> bool:
         """True if another program has left the same."""
         return any(
-            (one.device, one.kind, one.text) == (event.device, event.kind, event.text)
-            and abs(one.wall - event.wall) < SAME_WITHIN
-            for one in self._heard
+            (item.device, item.kind, item.text) == (event.device, event.kind, event.text)
+            and abs(item.wall - event.wall) < SAME_WITHIN
+            for item in self._heard
         )

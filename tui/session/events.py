@@ -50,7 +50,7 @@ class EventLog:
         """Keep an event of another program at its time; one that is there already is kept once."""
         with self._lock:
             if event not in self._events:
-                events = sorted((*self._events, event), key=lambda one: one.wall)
+                events = sorted((*self._events, event), key=lambda item: item.wall)
                 self._events = deque(events, maxlen=EVENTS_KEPT)
 
     def __bool__(self) -> bool:

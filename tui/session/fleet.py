@@ -109,7 +109,7 @@ class Fleet:
     @property
     def consoles(self) -> list[DriveConsole]:
         """The drives whose profile is known, in the order of the devices."""
-        return [one.console for one in self._found.values() if one.console is not None]
+        return [drive.console for drive in self._found.values() if drive.console is not None]
 
     @property
     def sessions(self) -> list[DriveSession]:
@@ -166,7 +166,7 @@ class Fleet:
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
         """Return True if the same drive is taken for another family while its motor may run;
         reports it."""
-        runs = any(one is before for one in self.line_watch.under_command())
+        runs = any(item is before for item in self.line_watch.under_command())
         if not runs or before.known_identity != session.known_identity:
             return False
         names = before.profile.name, session.profile.name
@@ -185,7 +185,7 @@ class Fleet:
         session, stated = console.session, console.session.known_identity
         if session.guessed or session.contradiction:
             may_be = [stated.profile] if stated.profile else stated.candidates
-            others = [library.load(one) for one in may_be if one != session.profile.id]
+            others = [library.load(text) for text in may_be if text != session.profile.id]
             families = [session.profile, *others]
             session.prepared = prepared_stop(self.line, session.device, families)
         if self.starts is not None:
@@ -227,7 +227,7 @@ class Fleet:
             return
         session = console.session
         codes = session.profile.data.faults.codes
-        raw = next((one.raw for one in codes if one.code == fault.code), 0)
+        raw = next((code.raw for code in codes if code.code == fault.code), 0)
         when = entry_time(None if what == "reset" else fault.wall)
         self.journal.add(
             Entry(
@@ -265,8 +265,8 @@ class Fleet:
 
         Uses nothing that `stop` uses. May be called in any thread.
         """
-        for one in tuple(self._found.values()):
-            console = one.console
+        for drive in tuple(self._found.values()):
+            console = drive.console
             if console is None or only not in (None, console):
                 continue
             try:
@@ -277,7 +277,7 @@ class Fleet:
     @property
     def strangers(self) -> list[int]:
         """Devices that answered and that no stop reaches: nobody knows the word that stops them."""
-        return [device for device, one in self._found.items() if one.console is None]
+        return [device for device, drive in self._found.items() if drive.console is None]
 
     def left_behind(self, console: DriveConsole) -> str:
         """Describe a motor whose program has exited and that no program commands; empty if none."""
@@ -299,6 +299,6 @@ class Fleet:
         return [session for session in self.sessions if session.commanded]
 
 
-def _same(one: DriveSession, other: DriveSession) -> bool:
+def _same(session: DriveSession, other: DriveSession) -> bool:
     """Return True if two sessions are with one drive, by all that it says of itself."""
-    return one.profile.id == other.profile.id and one.known_identity == other.known_identity
+    return session.profile.id == other.profile.id and session.known_identity == other.known_identity

@@ -32,7 +32,7 @@ class _State:
     @cached_property
     def raws(self) -> Mapping[str, int]:
         return MappingProxyType(
-            {code: one.raw for code, one in self.held.items() if one.raw is not None}
+            {code: reading.raw for code, reading in self.held.items() if reading.raw is not None}
         )
 
     @cached_property
@@ -76,7 +76,7 @@ class RegisterImage:
     @property
     def lacking(self) -> frozenset[str]:
         """Codes that the drive itself said it does not have."""
-        return frozenset(code for code, one in self._now.refused.items() if one.absent)
+        return frozenset(code for code, reading in self._now.refused.items() if reading.absent)
 
     def get(self, code: str) -> Reading | None:
         """Return the value of a register; None if it was never read, or is unknown by now."""
@@ -102,20 +102,20 @@ class RegisterImage:
         reported: list[tuple[Callable[[int], None], int]] = []
         with self._lock:
             held, refused = dict(self._now.held), dict(self._now.refused)
-            for code, one in found.items():
-                if one.time < self._doubted.get(code, -math.inf):
+            for code, reading in found.items():
+                if reading.time < self._doubted.get(code, -math.inf):
                     continue
                 before = held.get(code) or refused.get(code)
-                if before is not None and before.time > one.time:
+                if before is not None and before.time > reading.time:
                     continue
                 held.pop(code, None)
                 refused.pop(code, None)
-                if one.raw is None:
-                    refused[code] = one
+                if reading.raw is None:
+                    refused[code] = reading
                 else:
-                    held[code] = one
+                    held[code] = reading
                     if (requested := self._waiting_for.pop(code, None)) is not None:
-                        reported.append((requested, one.raw))
+                        reported.append((requested, reading.raw))
             self._set(held, refused)
         for requested, raw in reported:
             requested(raw)
@@ -134,7 +134,7 @@ class RegisterImage:
         with self._lock:
             self._waiting_for.pop(code, None)
             self._doubted = {**self._doubted, code: self._clock.monotonic()}
-            held = {c: one for c, one in self._now.held.items() if c != code}
+            held = {c: reading for c, reading in self._now.held.items() if c != code}
             self._set(held, self._now.refused)
 
     def believe(self, code: str, before: Reading | None) -> None:
@@ -148,7 +148,7 @@ class RegisterImage:
         """The drive may have been reset: no decision rests on what was read before now."""
         with self._lock:
             self._trusted_from = self._clock.monotonic()
-            silent = {c: one for c, one in self._now.refused.items() if one.silent}
+            silent = {c: reading for c, reading in self._now.refused.items() if reading.silent}
             self._set(self._now.held, silent)
 
     def forget(self, codes: Iterable[str] | None = None) -> None:
@@ -156,7 +156,7 @@ class RegisterImage:
         with self._lock:
             gone = None if codes is None else set(codes)
             held = self._now.held.items()
-            kept = {} if gone is None else {c: one for c, one in held if c not in gone}
+            kept = {} if gone is None else {c: reading for c, reading in held if c not in gone}
             self._set(kept, {} if gone is None else self._now.refused)
 
     def _set(self, held: Mapping[str, Reading], refused: Mapping[str, Reading]) -> None:

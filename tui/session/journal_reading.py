@@ -38,8 +38,8 @@ def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
     Waits a few seconds for entries that are not on the disk yet. Damaged lines are left out.
     """
     journal.flush()
-    found = [one for one in read_journal(journal.files) if isinstance(one, Entry)]
-    return completed(one for one in found if (one.line, one.device) == (line, device))
+    found = [entry for entry in read_journal(journal.files) if isinstance(entry, Entry)]
+    return completed(entry for entry in found if (entry.line, entry.device) == (line, device))
 
 
 def read_journal(files: Iterable[Path]) -> Iterator[Entry | DamagedLine]:
@@ -61,17 +61,17 @@ def completed(entries: Iterable[Entry]) -> list[Entry]:
     """The entries, with those whose answer was lost completed by what was read back later."""
     found: list[Entry] = []
     places: dict[tuple[str, str, int, str], int] = {}
-    for one in entries:
-        if one.kind == "read-back":
-            place = places.get((one.of, one.line, one.device, one.code))
+    for entry in entries:
+        if entry.kind == "read-back":
+            place = places.get((entry.of, entry.line, entry.device, entry.code))
             if place is not None:
                 before = found[place]
-                answer = f"{before.answer} {one.answer}"
-                found[place] = replace(before, answer=answer, read_back=one.read_back)
+                answer = f"{before.answer} {entry.answer}"
+                found[place] = replace(before, answer=answer, read_back=entry.read_back)
                 continue
         else:
-            places[one.time, one.line, one.device, one.code] = len(found)
-        found.append(one)
+            places[entry.time, entry.line, entry.device, entry.code] = len(found)
+        found.append(entry)
     return found
 
 
@@ -89,15 +89,15 @@ def selected(
     key = line_key(line) if line else ""
     keys: dict[str, str] = {}
 
-    def fits(one: Entry) -> bool:
-        if device is not None and one.device != device:
+    def fits(item: Entry) -> bool:
+        if device is not None and item.device != device:
             return False
-        if key and keys.setdefault(one.line, line_key(one.line)) != key:
+        if key and keys.setdefault(item.line, line_key(item.line)) != key:
             return False
-        when = time_of(one)
+        when = time_of(item)
         return since is None or when is None or when >= since
 
-    return [one for one in entries if fits(one)]
+    return [entry for entry in entries if fits(entry)]
 
 
 def time_of(entry: Entry) -> datetime | None:

@@ -179,7 +179,7 @@ class _Report:
         for code, stored in zip(data.history, data.stored, strict=False):
             if self.values.raws.get(code) in (None, data.none):
                 continue
-            kept = [(one, self.profile[one].name, self.text(one)) for one in stored]
+            kept = [(text, self.profile[text].name, self.text(text)) for text in stored]
             head = f"What the drive stored with {code}, {self._fault(code)}:"
             lines += ["", head, "", *_table(("code", "name", "value"), kept)]
         return [*lines, *self._pointed_at(codes)]
@@ -213,13 +213,13 @@ class _Report:
         """The trips of this drive that were seen on this computer, each once."""
         rows = [
             (
-                _when(one.tripped, self.zone) if one.tripped else "not seen",
-                _when(one.seen, self.zone),
-                one.code,
-                one.name,
-                _when(one.reset, self.zone) if one.reset else "",
+                _when(trip.tripped, self.zone) if trip.tripped else "not seen",
+                _when(trip.seen, self.zone),
+                trip.code,
+                trip.name,
+                _when(trip.reset, self.zone) if trip.reset else "",
             )
-            for one in trips_of(self.trips)[-ENTRIES_SHOWN:]
+            for trip in trips_of(self.trips)[-ENTRIES_SHOWN:]
         ]
         head = ("tripped at", "seen since", "fault", "name", "reset seen at")
         return ["## Trips seen by Drive Panel", "", *_table(head, rows)] if rows else []

@@ -20,9 +20,9 @@ def make_folder(folder: Path) -> None:
     """See that a folder is there; those that are made are their owner's alone. Raises OSError."""
     if NOWHERE in (folder, *folder.parents):
         raise OSError(errno.ENOENT, NOWHERE.name)
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    for one in reversed(missing):
-        one.mkdir(mode=FOLDER_MODE, exist_ok=True)
+    missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    for path in reversed(missing):
+        path.mkdir(mode=FOLDER_MODE, exist_ok=True)
     if not folder.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
 

@@ -28,17 +28,17 @@ def trips_of(entries: Iterable[Entry]) -> list[Trip]:
     A fault that is seen again without an end or another fault in between is the same trip.
     """
     found: list[Trip] = []
-    for one in entries:
+    for entry in entries:
         last = found[-1] if found else None
-        ongoing = last is not None and not last.reset and last.code in ("", one.code)
-        if one.answer == "reset":
+        ongoing = last is not None and not last.reset and last.code in ("", entry.code)
+        if entry.answer == "reset":
             if last is not None and ongoing:
-                found[-1] = replace(last, code=one.code, name=one.new, reset=one.time)
+                found[-1] = replace(last, code=entry.code, name=entry.new, reset=entry.time)
             continue
         # older files say "tripped" of each fault that was there when a panel was opened
-        tripped = one.answer == "tripped" and one.why == FAULT_WHYS["tripped"]
+        tripped = entry.answer == "tripped" and entry.why == FAULT_WHYS["tripped"]
         if last is not None and ongoing and not tripped:
-            found[-1] = replace(last, code=one.code, name=one.new)
+            found[-1] = replace(last, code=entry.code, name=entry.new)
         else:
-            found.append(Trip(one.code, one.new, one.time, one.time if tripped else ""))
+            found.append(Trip(entry.code, entry.new, entry.time, entry.time if tripped else ""))
     return found

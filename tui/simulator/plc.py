@@ -103,14 +103,17 @@ def plc_cycle(drives: Sequence[tuple[int, Profile]]) -> list[bytes]:
     for address, profile in drives:
         if profile.function(43):
             found.append(bytes([address, 43, 14, 1, 0]))
-        requested = [profile.quantity(one) for one in _ASKED]  # type: ignore[arg-type]
+        requested = [profile.quantity(text) for text in _ASKED]  # type: ignore[arg-type]
         found += [
-            bytes([address, one.function, *one.address.to_bytes(2, "big"), 0, 1])
-            for one in requested
-            if one is not None
+            bytes([address, parameter.function, *parameter.address.to_bytes(2, "big"), 0, 1])
+            for parameter in requested
+            if parameter is not None
         ]
-        given = [profile.quantity(one) for one in _GIVEN]  # type: ignore[arg-type]
-        written = next((one for one in given if one is not None and "w" in one.access), None)
+        given = [profile.quantity(text) for text in _GIVEN]  # type: ignore[arg-type]
+        written = next(
+            (parameter for parameter in given if parameter is not None and "w" in parameter.access),
+            None,
+        )
         if written is not None:
             found.append(bytes([address, 6, *written.address.to_bytes(2, "big"), 0, 0]))
     return found

@@ -211,9 +211,9 @@ def _read_keys(driver: Any) -> None:
     with selectors.SelectSelector() as selector:
         selector.register(driver.fileno, selectors.EVENT_READ)
         while not driver.exit_event.is_set():
-            for one in _look(driver, selector, keys):
+            for paste in _look(driver, selector, keys):
                 try:
-                    for message in _messages(one, reports):
+                    for message in _messages(paste, reports):
                         driver.process_message(message)
                 except Exception:
                     # the next key may be a stop

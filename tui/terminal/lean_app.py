@@ -63,7 +63,9 @@ class LeanApp(App[None]):
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """Textual's own, but for its way to leave colors out, and those of this terminal."""
-        own = [one for one in super().get_line_filters() if not isinstance(one, Monochrome)]
+        own = [
+            filter_ for filter_ in super().get_line_filters() if not isinstance(filter_, Monochrome)
+        ]
         return [*own, *self._instead]
 
     def take_styles(self, screen: object) -> None:

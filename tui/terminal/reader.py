@@ -97,7 +97,7 @@ class KeyReader:
         """Stop every drive if the lost bytes may have been a stop key; then begin again."""
         log.error("keys could not be read", exc_info=error)
         try:
-            if any(one in data for one in MAY_STOP):
+            if any(item in data for item in MAY_STOP):
                 self._stops.last_stop(error)
         except Exception:
             log.exception("no drive was stopped")
@@ -124,7 +124,7 @@ class KeyReader:
                 self._left_at = self._left(token)
                 self._bursts.key(token)
         given = self._bursts.given(now, self._tokens.pending)
-        return [*reports, *(_to_input(one) for one in given)]
+        return [*reports, *(_to_input(key_input) for key_input in given)]
 
     def _stopped(self, key: KeyToken) -> bool:
         """Return True if a key was a stop."""

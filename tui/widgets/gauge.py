@@ -32,8 +32,8 @@ def gauge(
         if mark is not None:
             cells[min(inner - 1, _halves(mark, low, high, inner) // 2)] = ("┃", MARK)
     text = Text("├", LINE, no_wrap=True)
-    for character, one in cells:
-        text.append(character, one)
+    for character, item in cells:
+        text.append(character, item)
     return text.append("┤", LINE)
 
 

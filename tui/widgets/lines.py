@@ -91,9 +91,9 @@ class Lines(Widget):
         if self.size != self.outer_size:
             return super().render_lines(crop)
         strips = [self._strip(y, width) for y in crop.line_range]
-        for one in self.get_line_filters():
+        for filter_ in self.get_line_filters():
             background = self.background_colors[1]
-            strips = [strip.apply_filter(one, background) for strip in strips]
+            strips = [strip.apply_filter(filter_, background) for strip in strips]
         if crop.column_span != (0, width):
             strips = [strip.crop(*crop.column_span) for strip in strips]
         return strips
@@ -195,8 +195,8 @@ def looks(strip: Strip) -> tuple[str, list[Style | None]]:
     return strip.text, styles
 
 
-def same(one: Text, other: Text) -> bool:
+def same(text: Text, other: Text) -> bool:
     """Return True if two lines look the same, their colors too."""
-    if one is other:
+    if text is other:
         return True
-    return one.plain == other.plain and one.spans == other.spans and one.style == other.style
+    return text.plain == other.plain and text.spans == other.spans and text.style == other.style

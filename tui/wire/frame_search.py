@@ -48,8 +48,8 @@ def frame_ends(data: bytes | bytearray) -> dict[int, int]:
         if length < MIN_FRAME:
             continue
         held = 0
-        for one in register:
-            held |= one
+        for number in register:
+            held |= number
         # beginnings whose frame would end behind the last byte are none
         whole = ~held & ((1 << (count - length + 1)) - 1)
         while whole:
@@ -62,6 +62,6 @@ def frame_ends(data: bytes | bytearray) -> dict[int, int]:
 
 def _next(bit: int, register: list[int], mixed: list[int]) -> int:
     value = register[bit + 8] if bit < 8 else 0
-    for one in _ROWS[bit]:
-        value ^= mixed[one]
+    for row in _ROWS[bit]:
+        value ^= mixed[row]
     return value

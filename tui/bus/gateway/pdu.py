@@ -175,10 +175,10 @@ def identified_pdu(
         wanted = {number: value for number, value in wanted.items() if number >= requested.first}
     body, count, more = b"", 0, 0
     for number, value in wanted.items():
-        one = bytes([number, len(value)]) + value
-        if len(body) + len(one) > LONGEST_OBJECTS:
+        data = bytes([number, len(value)]) + value
+        if len(body) + len(data) > LONGEST_OBJECTS:
             more = number
             break
-        body, count = body + one, count + 1
+        body, count = body + data, count + 1
     follows = bytes([0xFF if more else 0, more, count])
     return bytes([IDENTIFY, MEI_IDENTIFICATION, requested.read_code, conformity]) + follows + body

@@ -32,10 +32,12 @@ def makes_room(address: str, here: Mapping[K, ServedConnection]) -> K:
 
     Of the address that would have the most connections it is the one that was idle for longest.
     """
-    counts = Counter(one.address for one in here.values())
+    counts = Counter(connection.address for connection in here.values())
     counts[address] += 1
-    most = max(counts[one.address] for one in here.values())
-    busiest = {key: one for key, one in here.items() if counts[one.address] == most}
+    most = max(counts[connection.address] for connection in here.values())
+    busiest = {
+        key: connection for key, connection in here.items() if counts[connection.address] == most
+    }
     return max(busiest, key=lambda key: (not busiest[key].writes, busiest[key].idle))
 
 

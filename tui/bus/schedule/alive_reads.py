@@ -46,32 +46,32 @@ class AliveReads:
         if kept is not self._seen or now >= self._due:
             self._seen = kept
             shortest: dict[int, tuple[str, KeepAlive]] = {}
-            for (program, device), one in kept.items():
+            for (program, device), alive in kept.items():
                 best = shortest.get(device)
-                lasts = one.until is None or now < one.until
-                if lasts and (best is None or one.timeout < best[1].timeout):
-                    shortest[device] = program, one
+                lasts = alive.until is None or now < alive.until
+                if lasts and (best is None or alive.timeout < best[1].timeout):
+                    shortest[device] = program, alive
             self._since = {device: self._since.get(device, now) for device in shortest}
             self._jobs = {device: job for device, job in self._jobs.items() if device in shortest}
-            due = [self._look(program, one, now) for program, one in shortest.values()]
+            due = [self._look(program, alive, now) for program, alive in shortest.values()]
             self._due = min(due, default=math.inf)
         return self._due
 
-    def _look(self, program: str, one: KeepAlive, now: float) -> float:
+    def _look(self, program: str, alive: KeepAlive, now: float) -> float:
         """Queue the read of a device if it is due; returns when to look again."""
-        period = one.timeout / READS_PER_TIMEOUT
+        period = alive.timeout / READS_PER_TIMEOUT
         retry = min(LONGEST_RETRY, period / 2)
-        heard = max(self._devices[one.device].heard or 0.0, self._since[one.device])
-        due, last = heard + period, self._jobs.get(one.device)
+        heard = max(self._devices[alive.device].heard or 0.0, self._since[alive.device])
+        due, last = heard + period, self._jobs.get(alive.device)
         if last is not None and last.requested > heard:
             # it waits for the line, or was not answered
             due = max(due, last.requested + retry) if last.answer.done() else now + retry
         if due > now:
             return due
         # beyond its timeout it has acted: it need no longer go before the others
-        priority = Priority.FEED if now - heard < one.timeout else Priority.POLL
-        job = Job(one.request, priority, self._devices[one.device].limits)
+        priority = Priority.FEED if now - heard < alive.timeout else Priority.POLL
+        job = Job(alive.request, priority, self._devices[alive.device].limits)
         job.program, job.requested = program, now
-        self._jobs[one.device] = job
+        self._jobs[alive.device] = job
         self._submit(job)
         return now + retry

@@ -223,7 +223,10 @@ class InStep:
         function = piece.pdu[0] & ~EXCEPTION
         refused = function != piece.pdu[0]
         sent = self._probes.sent(piece.device)
-        return any(one.function == function if refused else one.fits(piece.pdu) for one in sent)
+        return any(
+            expectation.function == function if refused else expectation.fits(piece.pdu)
+            for expectation in sent
+        )
 
     def _shift(self, sent: float, now: float) -> None:
         self._shifts += 1

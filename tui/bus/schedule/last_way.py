@@ -79,11 +79,11 @@ class LastWay:
     async def send_waiting(self) -> None:
         """Send all that waits."""
         waiting, self._waiting = self._waiting, []
-        for one in waiting:
+        for item in waiting:
             why = ""
-            for write in one.writes:
+            for write in item.writes:
                 why = await self._send(write) or why
-            one.ended(why)
+            item.ended(why)
 
     async def _send(self, write: PreparedWrite) -> str:
         why = ""

@@ -63,7 +63,7 @@ class Pace:
 def greatest(*wishes: Mapping[int, float]) -> dict[int, float]:
     """The greatest wish about each device."""
     found: dict[int, float] = {}
-    for one in wishes:
-        for device, share in one.items():
+    for wish in wishes:
+        for device, share in wish.items():
             found[device] = max(share, found.get(device, 0.0))
     return found

@@ -92,7 +92,7 @@ class Devices:
     def last_reply_by(self, now: float) -> float:
         """When the last reply that is due may have come, of those who ever answered; else now."""
         there = (record.outstanding for record in self._devices.values() if record.ever_answered)
-        return max((now, *(one.expires for due in there for one in due)))
+        return max((now, *(outstanding.expires for due in there for outstanding in due)))
 
     def time_out(
         self, device: int, function: int, priority: Priority, within: float | None = None

@@ -54,8 +54,8 @@ class Probes:
         if not isinstance(job.request, Read) or not job.limits.answers_all:
             return False
         forms = self.forms.longer(job.request, job.limits)
-        found = (one for one in forms if one.expectation() != job.expectation)
-        form = next((one for one in found if self._is_new(one)), None)
+        found = (read for read in forms if read.expectation() != job.expectation)
+        form = next((read for read in found if self._is_new(read)), None)
         if form is not None:
             job.take_form(form)
         return form is not None
@@ -63,12 +63,12 @@ class Probes:
     def find(self, job: Job, depth: int = LOOKED_BACK) -> Request | None:
         """A request that changes nothing, with a reply unlike those to so many before, and to the
         job."""
-        found = (one for one in self._of(job) if one.expectation() != job.expectation)
-        return next((one for one in found if self._is_new(one, depth)), None)
+        found = (request for request in self._of(job) if request.expectation() != job.expectation)
+        return next((request for request in found if self._is_new(request, depth)), None)
 
     def find_alone(self, job: Job, depth: int) -> Request | None:
         """The same where the job itself is not sent; it may be the job."""
-        return next((one for one in self._alone(job) if self._is_new(one, depth)), None)
+        return next((request for request in self._alone(job) if self._is_new(request, depth)), None)
 
     def _alone(self, job: Job) -> Iterator[Request]:
         yield from self._of(job, away=False)

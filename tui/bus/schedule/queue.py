@@ -132,7 +132,7 @@ class JobQueue:
             self._jobs.append(job)
             return
         room = self._length if job.priority < Priority.POLL else self._length // 2
-        waiting = sum(one.program == job.program for one in self._jobs)
+        waiting = sum(item.program == job.program for item in self._jobs)
         if job.priority is not Priority.STOP and waiting >= room:
             raise LineBusy(f"{waiting} requests wait for the line already; try again.")
         job.order = next(self._orders)
@@ -165,7 +165,7 @@ class JobQueue:
 
     def keep(self, stop: Job) -> None:
         """Queue a stop for whose answer nobody waits, unless the same one waits."""
-        if not any(stop.request == one.request for one in self._jobs):
+        if not any(stop.request == job.request for job in self._jobs):
             self._jobs.append(stop)
 
     def take(

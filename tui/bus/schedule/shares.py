@@ -51,12 +51,12 @@ class LineShares:
         kind = kind_of(job.priority)
         if kind not in self._owed:
             return
-        others = [one.program for one in waiting if kind_of(one.priority) is kind]
+        others = [item.program for item in waiting if kind_of(item.priority) is kind]
         if not others:
             self._had = {which: had for which, had in self._had.items() if which[0] is not kind}
         elif job.program not in others:
             least, mine = (
-                min(self._had.get((kind, one), 0.0) for one in others),
+                min(self._had.get((kind, other), 0.0) for other in others),
                 (kind, job.program),
             )
             self._had[mine] = max(least, self._had.get(mine, 0.0))
@@ -69,14 +69,16 @@ class LineShares:
         if job.priority is Priority.STOP:
             return
         seconds = max(seconds, LEAST_COUNTED)
-        kinds = {kind_of(one.priority) for one in waiting}
+        kinds = {kind_of(item.priority) for item in waiting}
         kind = kind_of(job.priority)
-        for one, share in MINIMUM_SHARES.items():
-            due = self._owed[one] + share * seconds
-            if one is kind:
+        for priority, share in MINIMUM_SHARES.items():
+            due = self._owed[priority] + share * seconds
+            if priority is kind:
                 # what it takes beyond its share while nothing else waits is no debt
                 due = max(due - seconds, -seconds)
-            self._owed[one] = min(due, MOST_OWED if one is kind or one in kinds else 0.0)
+            self._owed[priority] = min(
+                due, MOST_OWED if priority is kind or priority in kinds else 0.0
+            )
         if kind in self._owed:
             mine = kind, job.program
             self._had[mine] = self._had.get(mine, 0.0) + seconds

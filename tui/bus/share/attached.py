@@ -88,7 +88,7 @@ class Client:
 
     def due_stops(self, now: float) -> tuple[int, ...]:
         """Devices that it has stopped of late, and that have answered no word of it."""
-        return tuple(one for one, when in self.stops_due.items() if now - when < STOP_DUE)
+        return tuple(number for number, when in self.stops_due.items() if now - when < STOP_DUE)
 
     def hears(self, message: AnyMessage, now: float) -> None:
         """It said something; a stop is acknowledged on receipt."""
@@ -174,7 +174,11 @@ class Client:
         frames = seen_frames(inside.around.trace.frames()[-new:]) if new else ()
         self.frames = count
         counters = inside.around.tally.frozen()
-        counted = {d: one for d, one in counters.devices.items() if self.counted.get(d) != one}
+        counted = {
+            d: device_counters
+            for d, device_counters in counters.devices.items()
+            if self.counted.get(d) != device_counters
+        }
         self.counted = counters.devices
         plain = replace(counters, devices={})
         error = inside.error()

@@ -108,8 +108,8 @@ def look_answer(
 ) -> bytes:
     """The answer to a program that looks."""
     clients = [
-        LineClient(readable(one.name, LONGEST_NAME), one.pid, round(share, 3))
-        for one, share in use_by_program(programs, shares)
+        LineClient(readable(program.name, LONGEST_NAME), program.pid, round(share, 3))
+        for program, share in use_by_program(programs, shares)
     ]
     return msgspec.json.encode(LineLook(clients, minute))
 
@@ -172,7 +172,7 @@ def line_past(owner: Owner) -> tuple[tuple[Frame, ...], tuple[LineNote, ...]]:
                     piece = msgspec.msgpack.decode(data, type=LinePast)
                 except (msgspec.MsgspecError, UnicodeDecodeError) as error:
                     raise OSError(f"its answer is damaged: {error}") from error
-                frames += [Frame(*one) for one in piece.frames]
+                frames += [Frame(*frame) for frame in piece.frames]
                 notes += piece.notes
                 received = True
                 connection.settimeout(max(0.01, end - monotonic()))

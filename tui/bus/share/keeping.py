@@ -50,14 +50,14 @@ class KeeperOrder(msgspec.Struct, frozen=True):
     @classmethod
     def of(cls, place: SharePlace, line: str, before: tuple[Program, ...]) -> KeeperOrder:
         """The order for a line that meets at a place."""
-        folders = tuple(str(one.absolute()) for one in place.socket_folders)
+        folders = tuple(str(folder.absolute()) for folder in place.socket_folders)
         locks = str(place.lock_folder.absolute())
         return cls(line, place.key, locks, folders, place.group, before)
 
     @property
     def place(self) -> SharePlace:
         """The meeting place of the line."""
-        folders = tuple(Path(one) for one in self.socket_folders)
+        folders = tuple(Path(folder) for folder in self.socket_folders)
         return SharePlace(self.key, Path(self.lock_folder), folders, self.group)
 
 
@@ -92,7 +92,7 @@ def start_keeper(
     It inherits nothing but the lock: no terminal, no output, no folder. `started` is called with
     its id before it does anything. Raises OSError.
     """
-    _STARTED[:] = [one for one in _STARTED if one.poll() is None]
+    _STARTED[:] = [item for item in _STARTED if item.poll() is None]
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", MODULE, str(lock)],
         stdin=subprocess.PIPE,

@@ -280,7 +280,9 @@ class NoMessage(Exception):
 
 def seen_frames(frames: Iterable[Frame]) -> tuple[SeenFrame, ...]:
     """Frames as messages carry them."""
-    return tuple((one.time, one.direction, one.data[:MOST_BYTES], one.note) for one in frames)
+    return tuple(
+        (frame.time, frame.direction, frame.data[:MOST_BYTES], frame.note) for frame in frames
+    )
 
 
 def packed(message: AnyMessage) -> bytes:

@@ -28,8 +28,8 @@ class NewsHeard:
             inside.devices.copy(device, state)
         inside.around.tally.copy(news.counters, news.counted)
         inside.pace.others, inside.pace.stretch = news.shares, news.stretch
-        for one in news.frames:
-            inside.around.trace.append(Frame(*one))
+        for frame in news.frames:
+            inside.around.trace.append(Frame(*frame))
         if news.state != self._state:
             self._state = news.state
             self._failure = error_of(*news.failure) if news.failure is not None else None
@@ -44,5 +44,5 @@ class NewsHeard:
 
     def _shared_with(self) -> str:
         """The programs that share the line, and its settings if others were meant."""
-        names = ", ".join(one.text for one in self._inside.facts.others)
+        names = ", ".join(other.text for other in self._inside.facts.others)
         return f"{f'Shared with {names}.' if names else ''}{self.note}".strip()

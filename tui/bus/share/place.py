@@ -152,7 +152,7 @@ class OwnerLock:
         before = owner_of(self._place)
         if before is not None:
             now, died = monotonic(), before.is_dead
-            recent = [one for one in before.deaths if now - one < DEATHS_WITHIN]
+            recent = [death for death in before.deaths if now - death < DEATHS_WITHIN]
             self.deaths = (*recent, *([now] if died else ()))[-MOST_DEATHS:]
 
     @property

@@ -68,28 +68,28 @@ class PollsServed:
         """Carry a plan out from now on. Raises NoMessage."""
         self.end(client, message.number)
         served = self._served.setdefault(client, {})
-        plan, one = message.plan, ServedPlan(client, message, message.plan.rates)
+        plan, served_plan = message.plan, ServedPlan(client, message, message.plan.rates)
         if len(served) >= MOST_DEVICES:
             raise NoMessage("too many plans")
         limits = client.limits.get(plan.device, CAUTIOUS)
         why = plan_refusal(plan, limits)
-        if one.size + sum(other.size for other in served.values()) > MOST_PLANNED:
+        if served_plan.size + sum(other.size for other in served.values()) > MOST_PLANNED:
             why = why or f"Not polled: more than {MOST_PLANNED} reads."
         if why:
             failure = PolledReply(b"", 0.0, failure_message(RequestRefused(why)))
             client.say(Polled(message.number, 0, self._inside.clock(), (failure,)))
             return
-        served[message.number] = one
-        one.task = asyncio.get_running_loop().create_task(
-            self._work(one), name=f"polls of device {plan.device}"
+        served[message.number] = served_plan
+        served_plan.task = asyncio.get_running_loop().create_task(
+            self._work(served_plan), name=f"polls of device {plan.device}"
         )
-        one.task.add_done_callback(_note_error)
+        served_plan.task.add_done_callback(_note_error)
 
     def end(self, client: Client, number: int) -> None:
         """Poll for a plan no longer."""
-        one = self._served.get(client, {}).pop(number, None)
-        if one is not None and one.task is not None:
-            one.task.cancel()
+        plan = self._served.get(client, {}).pop(number, None)
+        if plan is not None and plan.task is not None:
+            plan.task.cancel()
 
     def end_all(self, client: Client) -> None:
         """A program has left."""
@@ -120,14 +120,14 @@ class PollsServed:
     def _shares(self) -> dict[int, float]:
         """The share of the line's time that plans want, by device; the same read counts once."""
         rates: dict[int, dict[PlannedRead, float]] = {}
-        for one in self._all():
-            known = rates.setdefault(one.message.plan.device, {})
-            for read, rate in one.rates.items():
+        for plan in self._all():
+            known = rates.setdefault(plan.message.plan.device, {})
+            for read, rate in plan.rates.items():
                 known[read] = max(rate, known.get(read, 0.0))
         return {device: self._share(device, reads) for device, reads in rates.items()}
 
     def _all(self) -> list[ServedPlan]:
-        return [one for plans in self._served.values() for one in plans.values()]
+        return [plan for plans in self._served.values() for plan in plans.values()]
 
     def _share(self, device: int, rates: Mapping[PlannedRead, float]) -> float:
         """The share of the time that reads of a device take on the wire, without repeats."""
@@ -142,43 +142,43 @@ class PollsServed:
 
     # Reading
 
-    async def _work(self, one: ServedPlan) -> None:
-        clock, plan = self._inside.clock, one.message.plan
+    async def _work(self, served_plan: ServedPlan) -> None:
+        clock, plan = self._inside.clock, served_plan.message.plan
         due, turn = min(plan.begin, clock() + plan.period), 0
         while True:
             await asyncio.sleep(max(0.0, due - clock()))
             begun = clock()
-            if one.client.unread <= MOST_UNTAKEN:
-                replies = await self._cycle(one, turn)
-                one.client.say(Polled(one.message.number, turn, begun, replies))
+            if served_plan.client.unread <= MOST_UNTAKEN:
+                replies = await self._cycle(served_plan, turn)
+                served_plan.client.say(Polled(served_plan.message.number, turn, begun, replies))
                 turn = (turn + 1) % len(plan.turns)
             due = begun + plan.period * self._inside.pace.stretch
 
-    async def _cycle(self, one: ServedPlan, turn: int) -> tuple[PolledReply, ...]:
+    async def _cycle(self, plan: ServedPlan, turn: int) -> tuple[PolledReply, ...]:
         """The replies of one cycle; a device that is silent is not asked for the rest of it."""
         found: list[PolledReply] = []
-        for read in one.message.plan.turns[turn]:
+        for read in plan.message.plan.turns[turn]:
             try:
-                reply = await self._read(one, read)
+                reply = await self._read(plan, read)
             except LineError as error:
                 found.append(PolledReply(b"", 0.0, failure_message(error)))
                 if not isinstance(error, DeviceException):
                     break
             else:
-                one.read_at[read] = reply.time
+                plan.read_at[read] = reply.time
                 found.append(PolledReply(reply.pdu, reply.time))
         return tuple(found)
 
-    async def _read(self, one: ServedPlan, read: PlannedRead) -> Reply:
+    async def _read(self, plan: ServedPlan, read: PlannedRead) -> Reply:
         """One read, as a single poll of the program. Raises the line's errors."""
-        device, now = one.message.plan.device, self._inside.clock()
+        device, now = plan.message.plan.device, self._inside.clock()
         request = read_request(device, read.address, read.count, read.function)
-        limits = one.client.limits.get(device, CAUTIOUS)
+        limits = plan.client.limits.get(device, CAUTIOUS)
         job = Job(request, Priority.POLL, limits)
-        job.program, job.requested = one.client.program.id, now
-        period = one.message.plan.period * self._inside.pace.stretch
+        job.program, job.requested = plan.client.program.id, now
+        period = plan.message.plan.period * self._inside.pace.stretch
         # nothing that this program has been given already
-        since = now - one.read_at.get(read, 0.0) - CLOCK_STEP
+        since = now - plan.read_at.get(read, 0.0) - CLOCK_STEP
         job.max_age = max(0.0, min(period * SHARED_AGE, since))
         self._inside.submit(job)
         await _ended(job)
@@ -240,7 +240,9 @@ class PollsSubmitted:
     def hear(self, message: Polled) -> None:
         """A cycle has come. Raises NoMessage."""
         found = self._subscriptions.get(message.number)
-        closed = any(one.failure and one.failure[0] == "LineClosed" for one in message.replies)
+        closed = any(
+            reply.failure and reply.failure[0] == "LineClosed" for reply in message.replies
+        )
         if found is None or closed:
             return  # on its way when the plan ended, or the owner, whose end is not this program's
         plan = found.plan
@@ -248,10 +250,10 @@ class PollsSubmitted:
             raise NoMessage(f"turn {message.turn} of {len(plan.turns)}")
         reads = plan.turns[message.turn]
         answers = {
-            read: _answer_of(one, plan.device, read.address, read.count, read.function)
-            for read, one in zip(reads, message.replies, strict=False)
+            read: _answer_of(reply, plan.device, read.address, read.count, read.function)
+            for read, reply in zip(reads, message.replies, strict=False)
         }
-        times = [one.time for one in answers.values() if isinstance(one, Reply)]
+        times = [answer.time for answer in answers.values() if isinstance(answer, Reply)]
         if times:
             self._inside.devices[plan.device].heard = max(times)
         found.hear(PolledTurn(message.turn, message.begun, answers))
@@ -259,15 +261,15 @@ class PollsSubmitted:
     def lose_all(self) -> None:
         """The owner is gone, or does not answer: it is to carry nothing out when it does again."""
         lost, self._subscriptions = self._subscriptions, {}
-        for number, one in lost.items():
-            one.lose()
+        for number, subscription in lost.items():
+            subscription.lose()
             self._tell(Unsubscribe(number))
 
 
 def plan_refusal(plan: PollPlan, limits: Limits) -> str:
     """Why a plan must not be carried out, as for a single read of it; empty if it may."""
-    for one in plan.rates:
-        request = read_request(plan.device, one.address, one.count, one.function)
+    for rate in plan.rates:
+        request = read_request(plan.device, rate.address, rate.count, rate.function)
         if why := send_refusal(request, limits):
             return why
     return ""

@@ -40,8 +40,8 @@ def tell_own(facts: SharedState, send: Callable[[AnyMessage], None]) -> None:
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
         send(Armed(device, lease.stamp, lease.until, lease.care))
-    for one in facts.keep_alives.of(me):
-        send(one)
+    for alive in facts.keep_alives.of(me):
+        send(alive)
     for device, holder in facts.commanders.items():
         if holder == me:
             send(Claim(device, True))

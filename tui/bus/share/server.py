@@ -103,7 +103,7 @@ class ShareServer:
     @property
     def stops_wait(self) -> bool:
         """True while a stop is not sent yet that a program has left behind."""
-        return not all(one.answer.done() for one in self._stops_left)
+        return not all(job.answer.done() for job in self._stops_left)
 
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
@@ -150,12 +150,12 @@ class ShareServer:
         self._clients[client.program.id] = client
         if before is not None:
             before.drop()
-        others = [one for one in facts.programs if one.id != client.program.id]
+        others = [program for program in facts.programs if program.id != client.program.id]
         facts.set_programs((*others, client.program))
         client.frames = inside.around.trace.count
         log.info("%s shares the line", client.program.text)
         facts.stops.learn_times(message.stopped)
-        ids = [one.id for one in facts.programs]
+        ids = [program.id for program in facts.programs]
         if unheard := facts.stops.learn_greeting(client.program.id, message.stops, ids):
             # given while nobody owned the line
             self._hear_stops(unheard, "a stop while the line had no owner", client.program)
@@ -176,7 +176,7 @@ class ShareServer:
         log.info("%s has left the line", client.program.text)
         facts = self._inside.facts
         self._missing(client.program)
-        facts.stops.fold({one.id for one in facts.departed if has_ended(one)})
+        facts.stops.fold({program.id for program in facts.departed if has_ended(program)})
         self._holder.moved(arrived=False)
         self._tell_facts()
 
@@ -187,7 +187,7 @@ class ShareServer:
     def _miss_departed(self, *, ended: bool = False) -> None:
         """Programs of an owner before are gone: they are not back, or surely have `ended`."""
         facts = self._inside.facts
-        here = {one.id for one in facts.programs}
+        here = {item.id for item in facts.programs}
         for program in facts.departed:
             if program.id not in here | self._gone_before and (has_ended(program) or not ended):
                 self._missing(program)
@@ -307,4 +307,4 @@ class ShareServer:
         client.say(client.news(self._inside, shares))
 
     def _wishes(self, but: Client | None = None) -> dict[int, float]:
-        return greatest(*(one.shares for one in self._clients.values() if one is not but))
+        return greatest(*(client.shares for client in self._clients.values() if client is not but))

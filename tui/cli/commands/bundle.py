@@ -154,14 +154,14 @@ def _subject(
 
     async def open_drive(device: int) -> DriveSession:
         assert opened is not None
-        one = target._replace(device=device, profile_id=None)
+        item = target._replace(device=device, profile_id=None)
         try:
-            return await connect_drive(opened, one)
+            return await connect_drive(opened, item)
         except click.UsageError as error:
             profile = await asyncio.to_thread(expected, device)
             if profile is None:
                 raise Missing(error.format_message()) from None
-            return await connect_drive(opened, one._replace(profile_id=profile.id))
+            return await connect_drive(opened, item._replace(profile_id=profile.id))
 
     return BundleSubject(
         text=target.line_text,

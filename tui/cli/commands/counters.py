@@ -97,8 +97,8 @@ def counters(
         else:
             for title, text in _rows(found):
                 say_row(title, text, COUNTER_TITLES)
-            for one in found.differences:
-                say(one.text)
+            for difference in found.differences:
+                say(difference.text)
             if found.agree and not found.trouble:
                 say(found.agreeing)
         return found.agree and not found.trouble
@@ -145,10 +145,10 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
         yield "Load of the line", f"{found.line_load:.0%}, {share}"
     seen = [f"{bar.label}: {bar.count}" for bar in bars(ours.turnarounds) if bar.count]
     yield "Turnaround", ", ".join(seen) or "-----"
-    for name, one in found.drive:
-        errors = f"{one.last.damaged}{' or more' if one.last.saturated else ''}"
-        reported = f"{one.last.frames} frames, {errors} with a wrong checksum"
-        meanwhile = f"{one.frames} and {one.damaged} since the first look"
+    for name, comparison in found.drive:
+        errors = f"{comparison.last.damaged}{' or more' if comparison.last.saturated else ''}"
+        reported = f"{comparison.last.frames} frames, {errors} with a wrong checksum"
+        meanwhile = f"{comparison.frames} and {comparison.damaged} since the first look"
         yield name.capitalize(), f"{reported}; {meanwhile}"
     if found.trouble:
         yield "Drive", found.trouble
@@ -157,8 +157,8 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
 def _minute_text(found: CountersNow) -> str:
     line, own = found.line_minute, found.total.minute
     texts = (
-        f"{name} {one.good} of {awaited} replies good"
-        for name, one, awaited in (
+        f"{name} {minute.good} of {awaited} replies good"
+        for name, minute, awaited in (
             ("line", line, line.replies),
             ("this drive", own, own.replies + own.silent),
         )
@@ -181,17 +181,18 @@ def counters_json(found: CountersNow) -> dict[str, Any]:
         "drive": [
             {
                 "name": name,
-                "frames": one.last.frames,
-                "checksum_errors": one.last.damaged,
-                "saturated": one.last.saturated,
-                "frames_since": one.frames,
-                "checksum_errors_since": one.damaged,
-                "counts_this_line": one.counts_this_line,
+                "frames": comparison.last.frames,
+                "checksum_errors": comparison.last.damaged,
+                "saturated": comparison.last.saturated,
+                "frames_since": comparison.frames,
+                "checksum_errors_since": comparison.damaged,
+                "counts_this_line": comparison.counts_this_line,
             }
-            for name, one in found.drive
+            for name, comparison in found.drive
         ],
         "differences": [
-            {"kind": one.kind, "count": one.count, "text": one.text} for one in found.differences
+            {"kind": difference.kind, "count": difference.count, "text": difference.text}
+            for difference in found.differences
         ],
         "agree": found.agree,
         "trouble": found.trouble or None,

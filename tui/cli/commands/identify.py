@@ -59,7 +59,7 @@ def identify(
     target = Target(line_text, device[0], None, others=device[1:])
     sessions: list[DriveSession] = []
 
-    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+    async def identify_drive(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
         identity = await ask(opened.line, drive.device)
         mind_the_drive(opened, drive.device, identity)
         session = await asyncio.to_thread(_session, opened, identity)
@@ -81,7 +81,9 @@ def identify(
         return {**reported, "model": _model(identity, words)}, DONE
 
     async def work(opened: OpenLine) -> int:
-        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        status = await each_drive(
+            target, lambda drive: identify_drive(opened, drive), as_json=as_json
+        )
         await hold_on(opened, sessions, hold)
         return status
 
@@ -132,7 +134,7 @@ async def _model_words(session: DriveSession | None) -> Mapping[str, int]:
         found = await Reader(session).read(codes)
     except (DriveError, LineError):
         return {}  # who it is was asked for and is known; its model is more than that
-    return {code: one.raw for code, one in found.items() if one.raw is not None}
+    return {code: reading.raw for code, reading in found.items() if reading.raw is not None}
 
 
 def _model(identity: DriveIdentity, words: Mapping[str, int]) -> dict[str, Any] | None:

@@ -100,16 +100,17 @@ def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
         lines = list(read_journal(kept.files))
     except OSError as error:
         raise Failure(f"{kept.path} cannot be read: {error.strerror or error}.", USAGE) from error
-    entries = completed(one for one in lines if isinstance(one, Entry))
+    entries = completed(line for line in lines if isinstance(line, Entry))
     shown = selected(entries, device=wanted.device, line=wanted.line, since=begin)
-    damaged = [one for one in lines if isinstance(one, DamagedLine)]
+    damaged = [line for line in lines if isinstance(line, DamagedLine)]
     if as_json:
         print_json(
             {
                 "journal": str(kept.path),
-                "entries": [asdict(one) for one in shown],
+                "entries": [asdict(entry) for entry in shown],
                 "damaged": [
-                    {"file": str(one.file), "line": one.number, "text": one.text} for one in damaged
+                    {"file": str(line.file), "line": line.number, "text": line.text}
+                    for line in damaged
                 ],
             }
         )
@@ -118,8 +119,8 @@ def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
 
 
 def _say(entries: list[Entry], damaged: list[DamagedLine], path: str, *, filtered: bool) -> None:
-    for one in entries:
-        say(entry_line(one))
+    for entry in entries:
+        say(entry_line(entry))
     if not entries:
         say("No entry of the journal fits." if filtered else f"The journal is empty: {path}")
     for line in damaged:

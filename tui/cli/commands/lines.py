@@ -38,7 +38,7 @@ def lines(as_json: bool) -> None:
     from ..shared.output import print_json
 
     settings, memory, left = line_settings(), load_memory(), left_on_lines()
-    held = [(one, line_look(one)) for one in owners()]
+    held = [(item, line_look(item)) for item in owners()]
     named = list(settings.lines.values())
     places = settings.places.items()
     found = (f"{at}: {fault}" for name, at in places for fault in _faults(settings.lines[name]))
@@ -48,19 +48,19 @@ def lines(as_json: bool) -> None:
             {
                 "settings": str(settings.path),
                 "faults": faults,
-                "lines": [_named_json(one) for one in named],
+                "lines": [_named_json(line) for line in named],
                 "known": [_known_json(key, mark) for key, mark in memory.lines.items()],
-                "open": [_open_json(*one) for one in held],
-                "left_behind": [_left_json(one) for one in left],
+                "open": [_open_json(*pair) for pair in held],
+                "left_behind": [_left_json(behind) for behind in left],
             }
         )
     else:
         if not named and not faults:
             say(f"No line has a name. Lines are named in {settings.path}.")
-        for one in named:
-            profile = f"  {one.profile}" if one.profile else ""
-            drive = "" if one.device is None else f"  device {one.device}"
-            say(f"{one.name:<12} {one.line}{drive}{profile}")
+        for line in named:
+            profile = f"  {line.profile}" if line.profile else ""
+            drive = "" if line.device is None else f"  device {line.device}"
+            say(f"{line.name:<12} {line.line}{drive}{profile}")
         for key, mark in memory.lines.items():
             say(f"Remembered: {key}{f' ({mark.adapter})' if mark.adapter else ''}")
             for device, drive_mark in mark.drives.items():
@@ -82,7 +82,7 @@ def lines(as_json: bool) -> None:
         raise click.exceptions.Exit(USAGE)
 
 
-def _faults(one: NamedLine) -> Iterator[str]:
+def _faults(line: NamedLine) -> Iterator[str]:
     """Yield the problems of a name, as far as they are known without opening its line."""
     from tui.bus.errors import LinkSyntaxError
     from tui.drive.errors import DriveError
@@ -91,21 +91,21 @@ def _faults(one: NamedLine) -> Iterator[str]:
 
     from ..main import COMMANDS
 
-    if one.name.casefold() in COMMANDS:
+    if line.name.casefold() in COMMANDS:
         yield "a command has this name: the panel cannot be opened by it."
     try:
-        check_line(one.line)
+        check_line(line.line)
     except LinkSyntaxError as error:
         yield str(error)
     try:
-        if one.profile is not None:
-            library.load(one.profile)
+        if line.profile is not None:
+            library.load(line.profile)
     except DriveError as error:
         yield str(error)
 
 
-def _named_json(one: NamedLine) -> dict[str, Any]:
-    return {"name": one.name, "line": one.line, "device": one.device, "profile": one.profile}
+def _named_json(line: NamedLine) -> dict[str, Any]:
+    return {"name": line.name, "line": line.line, "device": line.device, "profile": line.profile}
 
 
 def _open_json(owner: Owner, look: LineLook | None) -> dict[str, Any]:
@@ -116,17 +116,17 @@ def _open_json(owner: Owner, look: LineLook | None) -> dict[str, Any]:
         "line": owner.line,
         "program": owner.program.name,
         "pid": owner.program.pid,
-        "clients": None if look is None else [_client_json(one) for one in look.clients],
+        "clients": None if look is None else [_client_json(client) for client in look.clients],
         "last_minute": None if minute is None else minute_json(minute, minute.share),
     }
 
 
-def _client_json(one: LineClient) -> dict[str, Any]:
-    return {"program": one.program, "pid": one.pid, "share": one.share}
+def _client_json(client: LineClient) -> dict[str, Any]:
+    return {"program": client.program, "pid": client.pid, "share": client.share}
 
 
-def _left_json(one: LeftBehind) -> dict[str, Any]:
-    return {"line": one.record.line, "device": one.record.device, **one.as_json()}
+def _left_json(behind: LeftBehind) -> dict[str, Any]:
+    return {"line": behind.record.line, "device": behind.record.device, **behind.as_json()}
 
 
 def _known_json(key: str, mark: LineMark) -> dict[str, Any]:

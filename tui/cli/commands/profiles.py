@@ -166,7 +166,7 @@ def _list(as_json: bool) -> None:
             ]
         )
         return
-    rows = [(one.id, one.vendor, one.name) for one in found]
+    rows = [(item.id, item.vendor, item.name) for item in found]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for listing, row in zip(found, rows, strict=True):
         remark = _remark(listing)

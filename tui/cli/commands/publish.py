@@ -55,7 +55,7 @@ def publish(
     more, codes = further_lines(codes)
     wishes = lines_wished(target, more)
     broker = broker_of(url, password_file)
-    check_names(broker, [one.name for one in wishes])
+    check_names(broker, [wish.name for wish in wishes])
 
     async def work(opened: Sequence[OpenLine]) -> None:
         await _published(wishes, opened, codes, broker, every, as_json=as_json)
@@ -83,7 +83,7 @@ async def _published(
         PlantLine(
             wish.name,
             line,
-            tuple(PlantDrive(line, one, codes, every, changes) for one in wish.on(line)),
+            tuple(PlantDrive(line, target, codes, every, changes) for target in wish.on(line)),
         )
         for wish, line in zip(wishes, opened, strict=True)
     ]

@@ -56,7 +56,7 @@ def read(
 
     sessions: list[DriveSession] = []
 
-    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+    async def read_drive(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
         session = await connect_drive(opened, drive)
         sessions.append(session)
         wanted = [session.profile.find(code).code for code in codes]
@@ -70,7 +70,7 @@ def read(
         return reported, DRIVE_REFUSED if refused else DONE
 
     async def work(opened: OpenLine) -> int:
-        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        status = await each_drive(target, lambda drive: read_drive(opened, drive), as_json=as_json)
         await hold_on(opened, sessions, hold)
         return status
 

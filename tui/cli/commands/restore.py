@@ -100,7 +100,7 @@ def restore(
     values = set_in(file)
     telling = ResultTelling(Messages(as_json=as_json))
 
-    async def one(opened: OpenLine, target: Target) -> tuple[dict[str, Any], int]:
+    async def restore_drive(opened: OpenLine, target: Target) -> tuple[dict[str, Any], int]:
         nonlocal telling
         telling = ResultTelling(Messages(as_json=as_json))
         session = await connect_drive(opened, target)
@@ -116,7 +116,9 @@ def restore(
     try:
         status = on_line(
             where,
-            lambda opened: each_drive(where, lambda drive: one(opened, drive), as_json=as_json),
+            lambda opened: each_drive(
+                where, lambda drive: restore_drive(opened, drive), as_json=as_json
+            ),
             read_only=read_only or dry_run,
         )
     except KeyboardInterrupt:

@@ -67,11 +67,11 @@ def scan(
         from ..running.holding import hold_on
         from ..running.scanning import Scan
 
-        one = Scan(opened, line_text, devices, tell, yes=yes)
-        await _prepare(one, all_settings=all_settings)
-        scans.append(one)
-        await one.run()
-        await hold_on(opened, one.sessions, hold)
+        item = Scan(opened, line_text, devices, tell, yes=yes)
+        await _prepare(item, all_settings=all_settings)
+        scans.append(item)
+        await item.run()
+        await hold_on(opened, item.sessions, hold)
 
     try:
         on_line(line_text, work, read_only=read_only)
@@ -102,7 +102,7 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
     if not isinstance(line.link, SerialLink) or here is None:
         raise click.UsageError("--all-settings is for serial ports: this line has no baud.")
     if others := line.facts.others:
-        who = ", ".join(one.text for one in others)
+        who = ", ".join(other.text for other in others)
         raise Failure(
             f"--all-settings needs the line for itself, and {who} uses it. Nothing was sent.",
             REFUSED_HERE,
@@ -132,7 +132,7 @@ def _end(scans: list[Scan], addresses: str) -> str:
         "done": scan.done,
         "found": count,
         "addresses": addresses,
-        "settings": [{"baud": one.baud, "format": one.format} for one in scan.tried],
+        "settings": [{"baud": setting.baud, "format": setting.format} for setting in scan.tried],
         "not_tried": len(scan.settings) - len(scan.tried),
         "held_back": scan.held_back or None,
         "remarks": scan.remarks,

@@ -124,8 +124,8 @@ def serve(
     if plant is not None:
         check_drives(served)
         if plant.broker is not None:
-            check_names(plant.broker, [one.name for one in served])
-    service, texts = Service(), [one.text for one in served]
+            check_names(plant.broker, [line.name for line in served])
+    service, texts = Service(), [line.text for line in served]
 
     def ready(places: ServedAt) -> str:
         text = ", ".join(texts) + _reached(places, wish)
@@ -138,7 +138,7 @@ def serve(
 
     with ExitStack() as stack:
         stack.enter_context(never_suspended())
-        opened = [_opened(stack, one, plant) for one in served]
+        opened = [_opened(stack, line, plant) for line in served]
         ending = asyncio.run(served_until_signal(opened, wish, plant, service, ready))
     if ending == signal.SIGTERM:
         return

@@ -230,12 +230,12 @@ def _configured(
     for text in sets:
         address, assignment = _addressed(text)
         code, _, raw = assignment.partition("=")
-        for one in _addresses(values, address, text):
-            values[one][code] = _raw(raw, text)
+        for number in _addresses(values, address, text):
+            values[number][code] = _raw(raw, text)
     for text in protects:
         address, codes = _addressed(text)
-        for one in _addresses(hidden, address, text):
-            hidden[one].update(codes.split(","))
+        for number in _addresses(hidden, address, text):
+            hidden[number].update(codes.split(","))
     return [
         replace(spec, sets=values[spec.address], protects=frozenset(hidden[spec.address]))
         for spec in specs

@@ -63,7 +63,7 @@ def status(
         raise click.UsageError("--addresses requires --all.")
     wishes = lines_wished(target, more)
     if every:  # a profile of the settings file is that of one drive
-        wishes = [one.with_profile(target.profile_id) for one in wishes]
+        wishes = [wish.with_profile(target.profile_id) for wish in wishes]
     wanted = StatusWish(every=every, addresses=addresses, hold=hold, as_json=as_json)
     if len(wishes) > 1:
         worst = on_lines(
@@ -82,10 +82,10 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
     from ..running.holding import hold_on
 
     first, *others = wish.drives
-    target = first._replace(others=tuple(one.device for one in others))
+    target = first._replace(others=tuple(other.device for other in others))
     sessions: list[DriveSession] = []
 
-    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+    async def show_drive(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
         session = await connect_drive(opened, drive)
         sessions.append(session)
         found = await status_of_drive(session, opened)
@@ -101,7 +101,7 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
             drives = await every_drive(opened, target, wanted.where(wish))
         worst = await each_drive(
             drives,
-            lambda drive: one(opened, drive),
+            lambda drive: show_drive(opened, drive),
             as_json=wanted.as_json,
             titled=not wanted.every,
         )

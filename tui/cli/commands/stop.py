@@ -88,7 +88,7 @@ def stop(
     from tui.bus.api import LineStatus
 
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
-    devices = _devices(addresses) if every else [one.device for one in target.each()]
+    devices = _devices(addresses) if every else [item.device for item in target.each()]
     telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
@@ -127,7 +127,7 @@ def _devices(text: str | None) -> list[int]:
 def has_order(session: DriveSession, order: OrderId) -> bool:
     """Return True if the family has such an order at all."""
     charts = session.profile.data.charts
-    return any(one.id == order for chart in charts for one in chart.orders)
+    return any(item.id == order for chart in charts for item in chart.orders)
 
 
 async def ended(

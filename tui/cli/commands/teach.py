@@ -177,8 +177,8 @@ def _lesson_json(code: str, lesson: Lesson) -> dict[str, Any]:
 
 def _kept_json(teacher: Teacher, code: str) -> dict[str, Any]:
     looks = [
-        {"raw": one.word, "shown": float(one.shown), "unit": one.unit or None}
-        for one in teacher.looks(code)
+        {"raw": look.word, "shown": float(look.shown), "unit": look.unit or None}
+        for look in teacher.looks(code)
     ]
     return {"scale": _scale_json(teacher.scales.get(code)), "looks": looks}
 

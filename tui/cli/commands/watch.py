@@ -132,10 +132,10 @@ def watch(
     async def work(lines: Sequence[OpenLine]) -> None:
         pairs = list(zip(lines, wishes, strict=True))
         found, seen.missing = await find_drives(pairs, as_json=as_json)
-        watched = [_watched(session, one, codes) for one, session in found]
-        drives = sum(len(one.on(opened)) for opened, one in pairs)
-        for opened, one in pairs:
-            check_rate(opened.line.link, every, len(one.on(opened)))
+        watched = [_watched(session, item, codes) for item, session in found]
+        drives = sum(len(item.on(opened)) for opened, item in pairs)
+        for opened, item in pairs:
+            check_rate(opened.line.link, every, len(item.on(opened)))
         several = LabelsNeeded(lines=len(wishes) > 1, drives=drives > 1)
         with ExitStack() as stack:
             outputs: list[Output] = [
@@ -145,7 +145,9 @@ def watch(
             ]
             if (csv_output := wish.opened(watched, several)) is not None:
                 outputs.append(csv_output)
-            await asyncio.gather(*(_follow(one, every, count, outputs, seen) for one in watched))
+            await asyncio.gather(
+                *(_follow(drive, every, count, outputs, seen) for drive in watched)
+            )
 
     try:
         if len(wishes) > 1:
@@ -190,7 +192,7 @@ def _watched(session: DriveSession, line: LineWish, codes: Sequence[str]) -> Wat
 
 
 async def _follow(
-    one: WatchedDrive,
+    drive: WatchedDrive,
     every: float,
     count: int | None,
     outputs: Sequence[Output],
@@ -201,10 +203,10 @@ async def _follow(
 
     from ..shared.cycles import Cycles
 
-    cycles = Cycles(one.session, one.codes)
-    monitor = Monitor(one.session)
+    cycles = Cycles(drive.session, drive.codes)
+    monitor = Monitor(drive.session)
     leave = monitor.listen(cycles.take)
-    monitor.start(one.codes, every)
+    monitor.start(drive.codes, every)
     error = since = ""
     try:
         for _ in itertools.repeat(None) if count is None else range(count):
@@ -212,7 +214,7 @@ async def _follow(
             error = snapshot.error
             since = (since or error) if error else ""  # the first of a row of errors says most
             for output in outputs:
-                output.take(one, snapshot)
+                output.take(drive, snapshot)
             seen.cycles += 1
     finally:
         leave()

@@ -168,7 +168,7 @@ async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:
 
     profile, codes = session.profile, {edit.code for edit in edits}
     codes |= limit_sources(profile, codes)
-    codes |= {code for one in codes for code in depends_on(profile[one])}
+    codes |= {code for text in codes for code in depends_on(profile[text])}
     return edit_problems(profile, edits, await RetryingReader(session).ask_many(sorted(codes)))
 
 

@@ -60,7 +60,7 @@ class PlantLine:
     def sight(self, now: float) -> LineReport:
         """Return the state of the line; `now` is on the monotonic clock."""
         line = self.opened.line
-        drives = tuple(one.sight(now) for one in self.drives)
+        drives = tuple(drive.sight(now) for drive in self.drives)
         return LineReport(self.name, self.opened.text, line.state, line.counters, drives)
 
     async def run(self) -> None:
@@ -70,8 +70,8 @@ class PlantLine:
         """
         search = DriveSearch()
         async with asyncio.TaskGroup() as tasks:
-            for one in self.drives:
-                tasks.create_task(one.run(search), name=f"plant {one.device}")
+            for drive in self.drives:
+                tasks.create_task(drive.run(search), name=f"plant {drive.device}")
             with suppress(TimeoutError):
                 async with asyncio.timeout(FIRST_LOOK_WITHIN):
                     await self._first_looks()
@@ -85,17 +85,17 @@ class PlantLine:
         full = False
         while True:
             await asyncio.sleep(RATE_LOOK_INTERVAL)
-            cycles = [one.cycle for one in self.drives if one.cycle is not None]
-            slowest = max((one.period for one in cycles if not one.error), default=0.0)
-            if full != any(one.too_slow for one in cycles if not one.error):
+            cycles = [drive.cycle for drive in self.drives if drive.cycle is not None]
+            slowest = max((cycle.period for cycle in cycles if not cycle.error), default=0.0)
+            if full != any(cycle.too_slow for cycle in cycles if not cycle.error):
                 full = not full
                 text = f"a cycle takes up to {slowest:.1f} s: the line is full."
                 text = text if full else "the cycle time is kept again."
                 say(f"drivepanel: {self.name}: {text}", err=True)
 
     async def _first_looks(self) -> None:
-        for one in self.drives:
-            await one.looked_for.wait()
+        for drive in self.drives:
+            await drive.looked_for.wait()
 
 
 class DriveSearch:
@@ -238,7 +238,7 @@ class PlantDrive:
         try:
             while loop.time() - self._good < SILENT_FOR_LONG:
                 await asyncio.sleep(PLANT_LOOK_INTERVAL)
-                if any(one.name == GATEWAY for one in session.line.facts.others):
+                if any(other.name == GATEWAY for other in session.line.facts.others):
                     looks_on.orphan |= await asyncio.to_thread(_is_orphan, session)
                 if self.cycle is not None and not self.cycle.error:
                     self._good = loop.time()
@@ -282,8 +282,8 @@ def _is_orphan(session: DriveSession) -> bool:
 
     facts = session.line.facts
     commander = facts.commanders.get(session.device)
-    others = (one for one in facts.others if one.name == GATEWAY and one.id != commander)
-    gateways = {one.process for one in others}
+    others = (other for other in facts.others if other.name == GATEWAY and other.id != commander)
+    gateways = {other.process for other in others}
     absent = pids_absent(facts) | gateways
     record = Starts().found(session.line_text, session.device, absent)
     return record is not None and not record.left_running

@@ -57,7 +57,8 @@ class MetricsServer:
         now, host = asyncio.get_running_loop().time(), host_of(writer.get_extra_info("peername"))
         if len(self._tasks) >= MOST_SCRAPES:
             here = {
-                one: ServedConnection(its, now - since) for one, (its, since) in self._tasks.items()
+                item: ServedConnection(its, now - since)
+                for item, (its, since) in self._tasks.items()
             }
             oldest = makes_room(host, here)
             del self._tasks[oldest]
@@ -85,7 +86,7 @@ class MetricsServer:
         method, _, rest = first.partition(" ")
         path = rest.partition(" ")[0].partition("?")[0]
         # a web page may have this computer ask under a name of its own (DNS rebinding)
-        if any(one not in names for one in _hosts(headers)):
+        if any(host not in names for host in _hosts(headers)):
             return _http(HTTPStatus.MISDIRECTED_REQUEST, "Ask by the host's address.\n")
         if method not in ("GET", "HEAD"):
             return _http(HTTPStatus.METHOD_NOT_ALLOWED, "Nothing is taken here.\n")

@@ -132,7 +132,7 @@ class MqttPublisher:
         while not self._ended and not lost.done():
             self._news.clear()
             sights = self._sights()
-            seen: list[object] = [(one.state.status, one.state.reason) for one in sights]
+            seen: list[object] = [(sight.state.status, sight.state.reason) for sight in sights]
             if states != seen or loop.time() - reported > LINES_EVERY:
                 states, reported = seen, loop.time()
                 await self._status(client, ONLINE)

@@ -89,5 +89,5 @@ async def published_to(
         if not publisher.connected:
             task.cancel()
         _, late = await asyncio.wait({task}, timeout=2 * LAST_WORD_WITHIN)
-        for one in late:
-            one.cancel()
+        for item in late:
+            item.cancel()

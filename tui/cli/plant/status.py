@@ -55,7 +55,7 @@ def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
     long."""
     from tui.session.drive_state import drive_state
 
-    readings = {code: one.aged(now, -1.0) for code, one in cycle.readings.items()}
+    readings = {code: reading.aged(now, -1.0) for code, reading in cycle.readings.items()}
     return replace(
         cycle,
         readings=readings,

@@ -58,8 +58,8 @@ class HearingRun:
         self._hearing.end(now)
         self._sum_up(now)
 
-    def _tell(self, one: ToldExchange) -> None:
-        self._output.exchange(one, one.exchange.time + self._wall)
+    def _tell(self, exchange: ToldExchange) -> None:
+        self._output.exchange(exchange, exchange.exchange.time + self._wall)
 
     def _sum_up(self, now: float) -> None:
         self._output.summary(self._hearing.summary(now), now + self._wall)

@@ -87,7 +87,7 @@ class ScanTelling:
     def slow(self, settings: Sequence[LineSetting], seconds: float, text: str) -> None:
         """The likely settings are through; those that are left take long."""
         if self._as_json:
-            rows = [_setting_json(one) for one in settings]
+            rows = [_setting_json(setting) for setting in settings]
             self._print(
                 {"event": "slow", "settings": rows, "seconds": round(seconds, 1), "text": text}
             )
@@ -175,12 +175,12 @@ def hit_text(hit: Hit) -> str:
     from tui.drive.profile import library
 
     who = hit.identity
-    names = {one.id: (one.name, one.vendor) for one in library.listings()}
+    names = {listing.id: (listing.name, listing.vendor) for listing in library.listings()}
     if hit.sure == "identified":
         parts = (names[who.profile or ""][0], who.reference, who.version_text, who.name)
         return plain("  ".join(part for part in parts if part))
     if hit.sure == "likely":
-        fits = [names[one] for one in who.candidates]
+        fits = [names[candidate] for candidate in who.candidates]
         vendors = " or ".join(dict.fromkeys(vendor for _, vendor in fits))
         *first, last = (name for name, _ in fits)
         families = f"{', '.join(first)} or {last}" if first else last

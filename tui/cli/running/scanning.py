@@ -170,7 +170,11 @@ class Scan:
 
     async def _tell_slow(self, later: Sequence[LineSetting]) -> None:
         """Before the first of the slow settings: how long they take, and who can have them."""
-        if self.costs is None or not later[0].slow or any(one.slow for one in self.tried[1:]):
+        if (
+            self.costs is None
+            or not later[0].slow
+            or any(setting.slow for setting in self.tried[1:])
+        ):
             return
         text = await asyncio.to_thread(self.costs.before_slow, later, "Ctrl-C")
         self.tell.slow(later, self.costs.seconds(later), text)
@@ -180,7 +184,7 @@ class Scan:
         later, left, found = self.settings[len(self.tried) :], search.left, len(self.hits)
         if self.costs is not None:
             slow = self.setting is not None and self.setting.slow
-            later = [one for one in later if slow or not one.slow]
+            later = [setting for setting in later if slow or not setting.slow]
             left += self.costs.seconds(later)
         return Progress(self.setting, search.requested, search.of, found, left, len(later))
 
@@ -224,8 +228,8 @@ class Scan:
         """Why no other setting is tried; empty where one may be. What is found is held on."""
         if others := self.opened.line.facts.others:
             return f"{NONE_TRIED}: {others[0].text} uses the line now."
-        acting = [text for one in self.sessions if (text := await self._acts(one))]
-        acting += [f"Device {one}: its timeout reaction is not known." for one in
+        acting = [text for session in self.sessions if (text := await self._acts(session))]
+        acting += [f"Device {number}: its timeout reaction is not known." for number in
                    self.unknown]  # fmt: skip
         if not acting:
             return ""

@@ -74,9 +74,9 @@ async def served_until_signal(
 ) -> int:
     """Serve until a signal comes; its number."""
     ending, journal = Ending(), journal_document()
-    pulses = [LinePulse(one.opened.line) for one in lines]
+    pulses = [LinePulse(line.opened.line) for line in lines]
     with ending.by_signals():
-        watch = asyncio.create_task(service.watch(lambda: all(one.alive for one in pulses)))
+        watch = asyncio.create_task(service.watch(lambda: all(pulse.alive for pulse in pulses)))
         try:
             async with AsyncExitStack() as stack:
                 places = await _served(stack, lines, gateway, plant, journal)
@@ -99,8 +99,8 @@ async def _served(
     """Begin all that is wanted; it ends with the stack, the gateway with its motors first."""
     places = ServedAt()
     gates = _gates(lines, journal) if wish is not None else ()
-    for one in lines:
-        stack.push_async_callback(say_farewells, one.opened)
+    for line in lines:
+        stack.push_async_callback(say_farewells, line.opened)
     if plant is not None:
         places = await _published(stack, lines, plant, gates)
     if wish is not None:
@@ -121,15 +121,15 @@ async def _published(
 
     places, changes = ServedAt(), Changes()
     signs: list[Sign] = [gate.sign for gate in gates] or [no_sign for _ in lines]
-    for one in lines:
-        check_rate(one.opened.line.link, plant.every, len(one.drives))
+    for line in lines:
+        check_rate(line.opened.line.link, plant.every, len(line.drives))
     read = [
         PlantLine(
-            one.name,
-            one.opened,
-            tuple(PlantDrive(one.opened, t, (), plant.every, changes, sign) for t in one.drives),
+            line.name,
+            line.opened,
+            tuple(PlantDrive(line.opened, t, (), plant.every, changes, sign) for t in line.drives),
         )
-        for one, sign in zip(lines, signs, strict=True)
+        for line, sign in zip(lines, signs, strict=True)
     ]
     if plant.metrics is not None:
         at = await stack.enter_async_context(metrics_at(read, *plant.metrics))
@@ -145,7 +145,8 @@ def _gates(lines: Sequence[OpenedLine], journal: Journal) -> list[GatewayLine]:
     from tui.session.gateway.line import GatewayLine
 
     return [
-        GatewayLine(one.opened.line, journal, _noting(one.opened), one.profiles) for one in lines
+        GatewayLine(line.opened.line, journal, _noting(line.opened), line.profiles)
+        for line in lines
     ]
 
 

@@ -74,9 +74,9 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
     families = await asyncio.to_thread(stop_profile)
     if typed is not None:
         families = families_beside(families, typed)
-    known = {typed, *(one.id for one in families)}
+    known = {typed, *(family.id for family in families)}
     recorded = before.profile if before is not None else None
-    named = [one for one in (typed, recorded) if one is not None and one in known]
+    named = [item for item in (typed, recorded) if item is not None and item in known]
     # what other programs meant for it is void before the first word, not once it is known
     opened.line.facts.give_stop([device], "drivepanel stop")
     for _ in range(BLIND_TRIES if typed else 1):

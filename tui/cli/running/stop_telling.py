@@ -29,18 +29,18 @@ class StopTelling:
 
     def sent_first(self, device: int, sent: Sequence[SentFirst], says: str) -> None:
         """Report the word sent before a drive was identified, and its answer."""
-        for one in sent:
+        for sent_word in sent:
             if not self.as_json:
                 with suppress(OSError):
-                    say(f"Device {device}: sent first {one.text}; {says}.")
+                    say(f"Device {device}: sent first {sent_word.text}; {says}.")
         self._first[device] = [
             {
-                "address": one.what.address,
-                "word": one.what.word,
-                "families": [family.id for family in one.what.families],
-                "answer": one.answer,
+                "address": sent_word.what.address,
+                "word": sent_word.what.word,
+                "families": [family.id for family in sent_word.what.families],
+                "answer": sent_word.answer,
             }
-            for one in sent
+            for sent_word in sent
         ]
 
     def stopped(self, session: DriveSession, text: str) -> None:

@@ -42,7 +42,7 @@ async def plans_of(
     mapper, held = Mapper(session), dict[str, int]()
     plans: list[Assignment] = []
     for block in profile.data.blocks:
-        mine = [(place, code) for one, place, code in places if one is block]
+        mine = [(place, code) for item, place, code in places if item is block]
         if wanted.action == "set" and not mine:
             continue
         if wanted.action == "load" and block.id not in loaded:

@@ -83,7 +83,7 @@ def _ports() -> Iterator[CompletionItem[str]]:
 def _names() -> Iterator[CompletionItem[str]]:
     from tui.session.connect.named_lines import named_lines
 
-    yield from (CompletionItem(one.name, help=one.line) for one in named_lines().values())
+    yield from (CompletionItem(line.name, help=line.line) for line in named_lines().values())
 
 
 def _profiles(incomplete: str) -> Items:

@@ -24,16 +24,16 @@ async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool 
     targets = target.each()
     documents: list[dict[str, Any]] = []
     worst = DONE
-    for one in targets:
+    for item in targets:
         if len(targets) > 1 and titled and not as_json:
-            say(f"Device {one.device}:")
+            say(f"Device {item.device}:")
         try:
-            document, status = await work(one)
+            document, status = await work(item)
         except Exception as error:
             if len(targets) == 1:
                 raise
             failure = failure_of(error)
-            document, status = failed(one, failure.message, failure.status), failure.status
+            document, status = failed(item, failure.message, failure.status), failure.status
         documents.append(document)
         worst = max(worst, status)
     if as_json:

@@ -34,7 +34,7 @@ async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any
             raise click.exceptions.Exit(BY_SIGNAL + came[0]) from None
         finally:
             try:
-                await asyncio.gather(*(say_farewells(one) for one in lines))
+                await asyncio.gather(*(say_farewells(line) for line in lines))
             except asyncio.CancelledError:
                 # what the work came to, or why it failed, is told all the same
                 if not came:

@@ -133,7 +133,7 @@ def _writes_text() -> str:
     """A sentence with what this command has written so far; empty if it has written nothing."""
     context = click.get_current_context(silent=True)
     journals: list[Journal] = [] if context is None else context.meta.get(_JOURNALS, [])
-    written = [f"{one.code} = {one.new}" for journal in journals for one in journal.sent]
+    written = [f"{entry.code} = {entry.new}" for journal in journals for entry in journal.sent]
     names = list(dict.fromkeys(written))
     more = f" and {len(names) - WRITES_NAMED} more" if len(names) > WRITES_NAMED else ""
     return f"Sent by this command: {', '.join(names[:WRITES_NAMED])}{more}." if names else ""

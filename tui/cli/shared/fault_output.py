@@ -125,7 +125,8 @@ def _advice_json(found: FaultFinding | None) -> dict[str, Any]:
         "causes": list(left.probable) if left else [],
         "checks": list(left.check) if left else [],
         "ruled_out": [
-            {"text": one.text, "code": one.code, "reason": one.reason} for one in left.excluded
+            {"text": advice.text, "code": advice.code, "reason": advice.reason}
+            for advice in left.excluded
         ]
         if left
         else [],
@@ -169,7 +170,7 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
         if left.check:
             rows.append(("  check", f"{'; '.join(left.check)} ({TRUST['practice']})"))
-        rows += [("  ruled out", f"{one.text}: {one.reason}") for one in left.excluded]
+        rows += [("  ruled out", f"{advice.text}: {advice.reason}") for advice in left.excluded]
         for look in hint.look_at:
             reading = found.readings.get(look.code)
             value = f"{reading.text} {reading.unit}".rstrip() if reading else "-----"

@@ -32,7 +32,7 @@ async def find_drives(
     wanted = sum(len(wish.on(opened)) for opened, wish in lines)
     found = _Finding(alone=wanted == 1, several=len(lines) > 1, as_json=as_json)
     each = await asyncio.gather(*(found.on_line(opened, wish) for opened, wish in lines))
-    return [one for some in each for one in some], found.worst
+    return [pair for some in each for pair in some], found.worst
 
 
 class _Finding:

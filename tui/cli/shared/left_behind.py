@@ -87,11 +87,11 @@ def left_on_lines() -> list[LeftBehind]:
     from tui.session.starts.starts import Starts
 
     starts = Starts()
-    lines = {line_key(one.line): one.line for one in start_records(None).records()}
+    lines = {line_key(item.line): item.line for item in start_records(None).records()}
     found = [
         record
         for _, line in sorted(lines.items())
         if not line.casefold().startswith(SIMULATED_PREFIX)
         for record in starts.all_found(line)
     ]
-    return [LeftBehind(one, True, offer(one, None, None)) for one in found]
+    return [LeftBehind(item, True, offer(item, None, None)) for item in found]

@@ -58,7 +58,9 @@ class LineArgument(click.Argument):
 
     def _others(self, ctx: click.Context) -> list[click.Argument]:
         return [
-            one for one in ctx.command.params if isinstance(one, click.Argument) and one is not self
+            param
+            for param in ctx.command.params
+            if isinstance(param, click.Argument) and param is not self
         ]
 
     def _is_left_out(self, ctx: click.Context, opts: Mapping[str, Any]) -> bool:
@@ -69,10 +71,10 @@ class LineArgument(click.Argument):
         others = self._others(ctx)
         if not others or self.is_line(text):
             return False
-        if any(one.required and not _given(opts.get(one.name or "")) for one in others):
+        if any(other.required and not _given(opts.get(other.name or "")) for other in others):
             return True
         # one more word would fit: it is a line where it looks like one
-        return any(one.nargs < 0 or not one.required for one in others) and not (
+        return any(other.nargs < 0 or not other.required for other in others) and not (
             _FILE_OR_LINE.search(text)
         )
 
@@ -80,15 +82,15 @@ class LineArgument(click.Argument):
         """Give each word to the argument behind the one that has it."""
         words: list[str] = [opts.pop(self.name or "")]
         others = self._others(ctx)
-        for one in others:
-            held = opts.pop(one.name or "", None)
+        for other in others:
+            held = opts.pop(other.name or "", None)
             words += held if isinstance(held, tuple) else [held] if _given(held) else []
-        for one in others:
-            if one.nargs < 0:
-                opts[one.name or ""] = tuple(words)
+        for other in others:
+            if other.nargs < 0:
+                opts[other.name or ""] = tuple(words)
                 return
             if words:
-                opts[one.name or ""] = words.pop(0)
+                opts[other.name or ""] = words.pop(0)
         if words:
             ctx.fail(f"Got unexpected extra argument ({' '.join(words)})")
 
@@ -109,7 +111,7 @@ def _resolved(ctx: click.Context, text: str) -> str:
         usual["profile_id"] = lambda: _profile_here(ctx, named)
         device_prefix = "" if named.device is None else f"{named.device}="
         usual["profile_ids"] = (f"{device_prefix}{named.profile}",)
-    ctx.default_map = {key: one for key, one in usual.items() if key in _names(ctx)}
+    ctx.default_map = {key: item for key, item in usual.items() if key in _names(ctx)}
     return named.line
 
 
@@ -128,7 +130,7 @@ def named_line_of(text: str, *, stops: bool = False) -> NamedLine | None:
         raise click.UsageError(str(error)) from error
     settings = named_lines.line_settings()
     if found is None and settings.lines and not os.path.exists(text):
-        names = ", ".join(one.name for one in settings.lines.values())
+        names = ", ".join(line.name for line in settings.lines.values())
         raise click.UsageError(f"{text!r} is not a LINE or a name from {settings.path} ({names}).")
     if found is not None and text.casefold() not in settings.lines:
         for fault in settings.faults:
@@ -137,7 +139,7 @@ def named_line_of(text: str, *, stops: bool = False) -> NamedLine | None:
 
 
 def _names(ctx: click.Context) -> set[str | None]:
-    return {one.name for one in ctx.command.params}
+    return {param.name for param in ctx.command.params}
 
 
 def _profile_here(ctx: click.Context, named: NamedLine) -> str | None:
@@ -146,7 +148,7 @@ def _profile_here(ctx: click.Context, named: NamedLine) -> str | None:
         return None
     given = ctx.params.get("devices") or ctx.params.get("device") or ()
     devices = given if isinstance(given, tuple) else (given,)
-    if named.device is not None and any(one != named.device for one in devices):
+    if named.device is not None and any(device != named.device for device in devices):
         return None
     return _usable(named) if ctx.command.name == _STOP else named.profile
 

@@ -80,23 +80,23 @@ def exchange_json(
     from tui.session.listening.summary import exception_meaning
     from tui.session.listening.telling import exchange_text, function_name, requested_names
 
-    one, code = reported.exchange, reported.exchange.exception
+    exchange, code = reported.exchange, reported.exchange.exception
     return {
         "event": "exchange",
         "time": iso_time(wall),
         "line": line_text,
-        "device": one.device,
+        "device": exchange.device,
         **_family_json(reported.family),
-        "function": one.function,
-        "name": function_name(one.function),
-        "answer": one.answer,
+        "function": exchange.function,
+        "name": function_name(exchange.function),
+        "answer": exchange.answer,
         "exception": code,
         "meaning": None if code is None else exception_meaning(code, reported.profile),
-        "turnaround_ms": _milliseconds(one.turnaround),
+        "turnaround_ms": _milliseconds(exchange.turnaround),
         "asked": requested_names(reported),
         "values": {value.code: heard_value_json(value) for value in reported.values},
-        "request": one.request.hex(),
-        "reply": one.reply.hex(),
+        "request": exchange.request.hex(),
+        "reply": exchange.reply.hex(),
         "text": exchange_text(reported, families).strip(),
     }
 
@@ -139,7 +139,7 @@ def summary_json(line_text: str, summary: ListeningSummary, wall: float) -> dict
             "too_soon": tally.hasty,
             "together": tally.together,
         },
-        "drives": [_drive_json(one) for one in summary.drives],
+        "drives": [_drive_json(drive) for drive in summary.drives],
         "text": summary_lines(summary),
     }
 
@@ -159,8 +159,8 @@ def _drive_json(drive: DriveSummary) -> dict[str, Any]:
         "exceptions": {str(code): times for code, times in sorted(tally.exceptions.items())},
         "turnaround_ms": _milliseconds(tally.turnaround),
         "commanded": tally.commanded,
-        "writes": {code: _write_json(one) for code, one in tally.writes.items()},
-        "reads": [_read_json(one) for one in tally.reads.values()],
+        "writes": {code: _write_json(write_tally) for code, write_tally in tally.writes.items()},
+        "reads": [_read_json(read) for read in tally.reads.values()],
         "timeout": _feeding_json(drive),
         "shorter": _shorter_json(drive),
     }
@@ -174,15 +174,15 @@ def _family_json(family: AssumedProfile | None) -> dict[str, Any]:
     }
 
 
-def _write_json(one: WriteTally) -> dict[str, Any]:
-    every = None if one.every is None else round(one.every, 3)
-    kind = {"commands": one.commands, "times": one.times, "every": every}
-    return {**kind, "raw": one.raw, "text": one.text}
+def _write_json(tally: WriteTally) -> dict[str, Any]:
+    every = None if tally.every is None else round(tally.every, 3)
+    kind = {"commands": tally.commands, "times": tally.times, "every": every}
+    return {**kind, "raw": tally.raw, "text": tally.text}
 
 
-def _read_json(one: ReadTally) -> dict[str, Any]:
-    every = None if one.every is None else round(one.every, 3)
-    return {**_span_json(one.span), "times": one.times, "every": every}
+def _read_json(tally: ReadTally) -> dict[str, Any]:
+    every = None if tally.every is None else round(tally.every, 3)
+    return {**_span_json(tally.span), "times": tally.times, "every": every}
 
 
 def _span_json(span: WordSpan | ReadRequest) -> dict[str, int]:
@@ -190,30 +190,30 @@ def _span_json(span: WordSpan | ReadRequest) -> dict[str, int]:
 
 
 def _feeding_json(drive: DriveSummary) -> dict[str, Any] | None:
-    one = drive.feeding
-    if one is None:
+    feeding = drive.feeding
+    if feeding is None:
         return None
     return {
-        "code": one.code,
-        "seconds": one.seconds,
-        "known": one.known,
-        "begun": one.begun,
-        "longest_pause": round(one.longest_pause, 3),
-        "fed": one.fed,
-        "margin": None if one.margin is None else round(one.margin, 3),
+        "code": feeding.code,
+        "seconds": feeding.seconds,
+        "known": feeding.known,
+        "begun": feeding.begun,
+        "longest_pause": round(feeding.longest_pause, 3),
+        "fed": feeding.fed,
+        "margin": None if feeding.margin is None else round(feeding.margin, 3),
     }
 
 
 def _shorter_json(drive: DriveSummary) -> dict[str, Any] | None:
-    one = drive.shorter
-    if one is None:
+    plan = drive.shorter
+    if plan is None:
         return None
     return {
-        "codes": list(one.codes),
-        "requests_now": len(one.now),
-        "ms_now": _milliseconds(one.now_seconds),
-        "requests": [_span_json(request) for request in one.plan.requests],
-        "ms": _milliseconds(one.plan.seconds),
+        "codes": list(plan.codes),
+        "requests_now": len(plan.now),
+        "ms_now": _milliseconds(plan.now_seconds),
+        "requests": [_span_json(request) for request in plan.plan.requests],
+        "ms": _milliseconds(plan.plan.seconds),
     }
 
 

@@ -53,7 +53,7 @@ PIPE_WIDTH = 200
 
 def print_json(data: JsonObject | Sequence[JsonObject], *, compact: bool = False) -> None:
     """Print one document, or a list of them, on standard output, at once."""
-    reported = document(data) if isinstance(data, Mapping) else [document(one) for one in data]
+    reported = document(data) if isinstance(data, Mapping) else [document(row) for row in data]
     sys.stdout.write(json_text(reported, compact=compact) + "\n")
     sys.stdout.flush()
 

@@ -74,11 +74,11 @@ class LineWish:
         """Each drive that is meant, once the line is open."""
         if not self.all_drives:
             return self.drives
-        return tuple(self.drives[0]._replace(device=one) for one in opened.devices)
+        return tuple(self.drives[0]._replace(device=device) for device in opened.devices)
 
     def with_profile(self, profile_id: str | None) -> LineWish:
         """The same line, with this profile for each of its drives."""
-        drives = tuple(one._replace(profile_id=profile_id) for one in self.drives)
+        drives = tuple(drive._replace(profile_id=profile_id) for drive in self.drives)
         return replace(self, drives=drives)
 
 
@@ -97,7 +97,7 @@ def further_lines(words: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...
     """
     lines = tuple(takewhile(_is_line, words))
     rest = tuple(words[len(lines) :])
-    if late := [one for one in rest if is_written_out(one)]:
+    if late := [text for text in rest if is_written_out(text)]:
         raise click.UsageError(f"{late[0]}: put every LINE before the first CODE.")
     return lines, rest
 
@@ -134,7 +134,7 @@ def _wish_of(ctx: click.Context, word: str, target: Target, *, several: bool) ->
     named = named_line_of(name)
     text = named.line if named is not None else name
     typed = _was_typed(ctx, "device")
-    given = tuple(one.device for one in target.each()) if typed else ()
+    given = tuple(item.device for item in target.each()) if typed else ()
     own = (named.device,) if named is not None and named.device is not None else ()
     devices = tuple(parse_addresses(addresses)) if addresses else given or own
     profile = target.profile_id if _was_typed(ctx, "profile_id") else None
@@ -142,7 +142,7 @@ def _wish_of(ctx: click.Context, word: str, target: Target, *, several: bool) ->
         profile = named.profile  # it is that of the drive which the name means
     simulated = text.casefold().startswith(_SIMULATED)
     wanted = target._replace(line_text=text, profile_id=profile, others=())
-    drives = tuple(wanted._replace(device=one) for one in dict.fromkeys(devices or (1,)))
+    drives = tuple(wanted._replace(device=number) for number in dict.fromkeys(devices or (1,)))
     every = several and simulated and not devices
     return LineWish(name, drives, all_drives=every, addresses=addresses)
 
@@ -151,13 +151,13 @@ def _was_typed(ctx: click.Context, option: str) -> bool:
     return ctx.get_parameter_source(option) is ParameterSource.COMMANDLINE
 
 
-def _joined(one: LineWish, more: LineWish) -> LineWish:
+def _joined(wish: LineWish, more: LineWish) -> LineWish:
     """A line that was named twice, with the drives of both."""
-    drives = {drive.device: drive for drive in (*more.drives, *one.drives)}
-    in_order = dict.fromkeys(drive.device for drive in (*one.drives, *more.drives))
-    all_drives = one.all_drives or more.all_drives
-    where = ",".join(each.addresses for each in (one, more) if each.addresses)
-    return LineWish(one.name, tuple(drives[device] for device in in_order), all_drives, where)
+    drives = {drive.device: drive for drive in (*more.drives, *wish.drives)}
+    in_order = dict.fromkeys(drive.device for drive in (*wish.drives, *more.drives))
+    all_drives = wish.all_drives or more.all_drives
+    where = ",".join(each.addresses for each in (wish, more) if each.addresses)
+    return LineWish(wish.name, tuple(drives[device] for device in in_order), all_drives, where)
 
 
 def on_lines(
@@ -172,7 +172,7 @@ def on_lines(
     """
     with ExitStack() as stack:
         stack.enter_context(never_suspended())
-        opened = [stack.enter_context(_line_of(one, read_only=read_only)) for one in wishes]
+        opened = [stack.enter_context(_line_of(wish, read_only=read_only)) for wish in wishes]
         return asyncio.run(to_its_end(opened, lambda: work(opened)))
 
 

@@ -82,20 +82,20 @@ async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: St
 
     each = await asyncio.gather(*(_read_line(opened, wish, wanted) for opened, wish in lines))
     if wanted.as_json:
-        print_json([document for one in each for document in one.documents])
+        print_json([document for field in each for document in field.documents])
     else:
         names = [wish.name for _, wish in lines]
-        for name, one in zip(names, each, strict=True):
-            for status in one.found:
+        for name, field in zip(names, each, strict=True):
+            for status in field.found:
                 _say(status, name, max(map(len, names)), wanted)
     await hold_lines_on(
         [
-            (wish.name, opened, [status.session for status in one.found])
-            for (opened, wish), one in zip(lines, each, strict=True)
+            (wish.name, opened, [status.session for status in field.found])
+            for (opened, wish), field in zip(lines, each, strict=True)
         ],
         wanted.hold,
     )
-    return max(one.worst for one in each)
+    return max(field.worst for field in each)
 
 
 def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:

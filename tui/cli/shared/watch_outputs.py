@@ -40,9 +40,9 @@ class LabelsNeeded:
     lines: bool
     drives: bool
 
-    def who(self, one: WatchedDrive) -> str:
+    def who(self, drive: WatchedDrive) -> str:
         """Which drive on which line, as far as that is a question."""
-        return self.named(one.line_name, one.session.device)
+        return self.named(drive.line_name, drive.session.device)
 
     def named(self, line_name: str, device: int) -> str:
         """The same for a drive named by its line, as typed, and its address."""
@@ -50,10 +50,10 @@ class LabelsNeeded:
         drive = f"device {device}" if self.drives else ""
         return "  ".join(part for part in (line, drive) if part)
 
-    def cells(self, one: WatchedDrive) -> list[str]:
+    def cells(self, drive: WatchedDrive) -> list[str]:
         """The same for the columns of titles()."""
-        line = [one.line_name] if self.lines else []
-        return [*line, *([str(one.session.device)] if self.drives else [])]
+        line = [drive.line_name] if self.lines else []
+        return [*line, *([str(drive.session.device)] if self.drives else [])]
 
     def titles(self) -> list[str]:
         """The columns that identify it."""
@@ -63,7 +63,7 @@ class LabelsNeeded:
 class Output(Protocol):
     """Takes one cycle after the other."""
 
-    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
+    def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Put one cycle of a drive out, at once."""
 
 
@@ -74,13 +74,13 @@ class JsonOutput:
         self._several = several
         self._in_trouble: set[WatchedDrive] = set()
 
-    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
+    def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as an object."""
-        print_json(cycle_json(one.line_text, one.session, snapshot), compact=True)
-        if snapshot.error and one not in self._in_trouble:
-            where = f"{one.line_name}: " if self._several.lines else ""
+        print_json(cycle_json(drive.line_text, drive.session, snapshot), compact=True)
+        if snapshot.error and drive not in self._in_trouble:
+            where = f"{drive.line_name}: " if self._several.lines else ""
             say(f"drivepanel: {where}{snapshot.error}", err=True)
-        (self._in_trouble.add if snapshot.error else self._in_trouble.discard)(one)
+        (self._in_trouble.add if snapshot.error else self._in_trouble.discard)(drive)
 
 
 def cycle_json(line_text: str, session: DriveSession, snapshot: Snapshot) -> dict[str, Any]:
@@ -120,10 +120,10 @@ class LineOutput:
     def __init__(self, several: LabelsNeeded) -> None:
         self._several = several
 
-    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
+    def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as a line; a value that is not good is in brackets."""
         values = "  ".join(_shown(code, read) for code, read in snapshot.readings.items())
-        who = self._several.who(one)
+        who = self._several.who(drive)
         late, state = late_text(snapshot), snapshot.state.headline
         parts = (_clock(snapshot), who, state, values, snapshot.error, late)
         say("  ".join(part for part in parts if part))
@@ -137,11 +137,11 @@ class TableOutput:
         self._several = several
         self._latest: dict[WatchedDrive, Snapshot | None] = dict.fromkeys(watched)
 
-    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
+    def take(self, watched_drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Show one cycle in place of the one before."""
         from rich.console import Group
 
-        self._latest[one] = snapshot
+        self._latest[watched_drive] = snapshot
         tables = []
         for drive, latest in self._latest.items():
             if latest is None:
@@ -163,12 +163,12 @@ class CsvOutput:
         self._units = units
         self._several = several
 
-    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
+    def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Write one cycle as a row."""
         cells = [self._cell(code, snapshot.readings.get(code)) for code in self._units]
         state = snapshot.state
         reported = [snapshot.error, known_state(state) or "", state.direction or ""]
-        self._file.write([iso_time(snapshot.wall), *self._several.cells(one), *cells, *reported])
+        self._file.write([iso_time(snapshot.wall), *self._several.cells(drive), *cells, *reported])
 
     def _cell(self, code: str, reading: Reading | None) -> str:
         if reading is None or reading.quality != "good":
@@ -181,9 +181,9 @@ class CsvOutput:
 def csv_units(watched: Sequence[WatchedDrive]) -> dict[str, str]:
     """The unit of each column: that of the first drive which has the code."""
     units: dict[str, str] = {}
-    for one in watched:
-        for code in one.codes:
-            units.setdefault(code, one.session.profile[code].unit)
+    for drive in watched:
+        for code in drive.codes:
+            units.setdefault(code, drive.session.profile[code].unit)
     return units
 
 
@@ -191,7 +191,7 @@ def csv_titles(
     watched: Sequence[WatchedDrive], units: Mapping[str, str], several: LabelsNeeded
 ) -> list[str]:
     """The titles of the columns; a taught scale is marked."""
-    taught = {code for one in watched for code in one.session.profile.taught}
+    taught = {code for drive in watched for code in drive.session.profile.taught}
     marked = {c: f"{u}, taught" if c in taught and u else u for c, u in units.items()}
     titles = [f"{code} [{unit}]" if unit else code for code, unit in marked.items()]
     return ["time", *several.titles(), *titles, "error", "state", "direction"]

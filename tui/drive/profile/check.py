@@ -69,13 +69,13 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
     except msgspec.ValidationError as error:
         reported = reported or [((), f"the file: {error}.")]
     else:
-        reported += [one for one in _broken_rules(data) if not _invented(one[0], form.invented)]
+        reported += [rule for rule in _broken_rules(data) if not _invented(rule[0], form.invented)]
     return _in_order(_placed(sources, reported))
 
 
 def _invented(path: TomlPath, invented: list[TomlPath]) -> bool:
     """Return True if a place rests on a value that the file does not have."""
-    return any(path[: len(one)] == one or one[: len(path)] == path for one in invented)
+    return any(path[: len(pair)] == pair or pair[: len(path)] == path for pair in invented)
 
 
 def _broken_rules(data: ProfileData) -> list[tuple[TomlPath, str]]:

@@ -300,7 +300,7 @@ def field_text(table: str, field: str) -> str:
     schema = sys.modules["tui.drive.profile.schema"]
     struct = getattr(schema, table, None)
     kinds = struct.__mro__ if isinstance(struct, type) else ()
-    for kind in (one for one in kinds if one.__module__.startswith(schema.__name__)):
+    for kind in (cls for cls in kinds if cls.__module__.startswith(schema.__name__)):
         if text := _written_below(kind).get(field) or OWN.get(kind.__name__, {}).get(field):
             return text
     return COMMON.get(field, "")

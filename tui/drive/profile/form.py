@@ -55,7 +55,7 @@ def _mended(shape: shapes.Type, value: Any, path: TomlPath, faults: FormFaults) 
         return _list(shape, value, path, faults)
     if isinstance(shape, shapes.DictType) and isinstance(value, dict):
         kept = {k: _mended(shape.value_type, v, (*path, k), faults) for k, v in value.items()}
-        return {key: one for key, one in kept.items() if one is not _ABSENT}
+        return {key: item for key, item in kept.items() if item is not _ABSENT}
     if isinstance(shape, shapes.UnionType):
         inner = next(t for t in shape.types if not isinstance(t, shapes.NoneType))
         return _mended(inner, value, path, faults)
@@ -68,7 +68,7 @@ def _mended(shape: shapes.Type, value: Any, path: TomlPath, faults: FormFaults) 
 def _struct(
     shape: shapes.StructType, value: dict[str, Any], path: TomlPath, faults: FormFaults
 ) -> dict[str, Any]:
-    fields = {one.encode_name: one for one in shape.fields}
+    fields = {field.encode_name: field for field in shape.fields}
     kept: dict[str, Any] = {}
     for key, inner in value.items():
         if key not in fields:
@@ -76,9 +76,9 @@ def _struct(
                 ((*path, key), f"there is no field `{key}` here{_instead(key, list(fields))}")
             )
             continue
-        one = _mended(fields[key].type, inner, (*path, key), faults)
-        if one is not _ABSENT:
-            kept[key] = one
+        item = _mended(fields[key].type, inner, (*path, key), faults)
+        if item is not _ABSENT:
+            kept[key] = item
     for key, one_field in fields.items():
         if one_field.required and key not in kept:
             if key not in value:
@@ -91,12 +91,12 @@ def _struct(
 def _list(shape: shapes.ListType, value: list[Any], path: TomlPath, faults: FormFaults) -> Any:
     kept = []
     for index, inner in enumerate(value):
-        one = _mended(shape.item_type, inner, (*path, index), faults)
-        if one is _ABSENT:
+        item = _mended(shape.item_type, inner, (*path, index), faults)
+        if item is _ABSENT:
             # the place is kept, so that those behind it keep their lines
             faults.invented.append((*path, index))
-            one = _invented(shape.item_type)
-        kept.append(one)
+            item = _invented(shape.item_type)
+        kept.append(item)
     if shape.min_length and len(value) < shape.min_length:
         faults.found.append((path, f"must hold at least {shape.min_length}"))
         return _ABSENT
@@ -138,7 +138,7 @@ def _between(low: object, high: object) -> str:
 
 def _instead(wrong: object, choice: Any) -> str:
     """Return the allowed values: all of them, or the nearest of very many."""
-    texts = [str(one) for one in choice]
+    texts = [str(item) for item in choice]
     near = difflib.get_close_matches(str(wrong), texts, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(near)}?" if near else "."
     if len(texts) <= TOLD_SINGLY:
@@ -149,9 +149,7 @@ def _instead(wrong: object, choice: Any) -> str:
 def _kind(shape: shapes.Type) -> str:
     match shape:
         case shapes.StructType():
-            return (
-                f"a table with {', '.join(one.encode_name for one in shape.fields[:TOLD_SINGLY])}"
-            )
+            return f"a table with {', '.join(f.encode_name for f in shape.fields[:TOLD_SINGLY])}"
         case shapes.DictType():
             return "a table of names by raw value"
         case shapes.ListType():
@@ -167,15 +165,15 @@ def _kind(shape: shapes.Type) -> str:
     return "a text in quotes"
 
 
-def allowed(one: shapes.Field) -> str:
+def allowed(field: shapes.Field) -> str:
     """Return the allowed values of a field in words."""
-    return _kind(one.type)
+    return _kind(field.type)
 
 
 def _invented(shape: shapes.Type) -> Any:
     match shape:
         case shapes.StructType(fields=fields):
-            return {one.encode_name: _invented(one.type) for one in fields if one.required}
+            return {field.encode_name: _invented(field.type) for field in fields if field.required}
         case shapes.LiteralType(values=values):
             return values[0]
         case shapes.IntType(ge=low):

@@ -32,7 +32,7 @@ class FaultGuide:
         except ProfileError as error:
             self.trouble = str(error).partition("\n")[0]
             reported = self._rows
-        return {one.raw: one for one in reported.faults}, {
+        return {fault.raw: fault for fault in reported.faults}, {
             (a.word, a.bit): a for a in reported.alarms
         }
 

@@ -114,8 +114,8 @@ def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
     if "without" in head or (shared := shared_texts(head, packaged)) is None:
         return None
     texts = (text, *shared)
-    codes = [row[1] for one in texts for row in _CODE.findall(one)]
-    plain = len(codes) == sum(len(_PARAMETER.findall(one)) for one in texts)
+    codes = [row[1] for item in texts for row in _CODE.findall(item)]
+    plain = len(codes) == sum(len(_PARAMETER.findall(item)) for item in texts)
     return len(set(codes)) if plain else None
 
 
@@ -153,7 +153,7 @@ def _read_tables(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
     head = section(text, "profile")
     shared = shared_texts(head, packaged) if head is not None else None
     if shared is None or any(
-        header[1] != "parameters" for one in shared for header in _HEADER.finditer(one)
+        header[1] != "parameters" for item in shared for header in _HEADER.finditer(item)
     ):
         return _whole(path, packaged)
     found = {"identification": section(text, "identification") or {}}

@@ -37,13 +37,17 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
         lines = [f"{found}:{line_of(source, place)}: {fault}" for place, fault in findings]
         raise ProfileError("\n".join(lines))
     wrong = {place for place, _ in findings}
-    own = {one.raw for one in data.faults.help}
+    own = {fault_help.raw for fault_help in data.faults.help}
     faults = [
-        one
-        for index, one in enumerate(reported.faults)
-        if one.raw not in own and ("faults", index) not in wrong
+        fault_help
+        for index, fault_help in enumerate(reported.faults)
+        if fault_help.raw not in own and ("faults", index) not in wrong
     ]
-    alarms = [one for index, one in enumerate(reported.alarms) if ("alarms", index) not in wrong]
+    alarms = [
+        alarm_help
+        for index, alarm_help in enumerate(reported.alarms)
+        if ("alarms", index) not in wrong
+    ]
     return HelpData(faults=[*data.faults.help, *faults], alarms=alarms)
 
 

@@ -189,7 +189,7 @@ def mentions_function(listing: Listing, code: int) -> bool:
 @lru_cache(maxsize=64)
 def version_shown(profile_id: str | None, version: str) -> str:
     """The version that a drive of a family reports, as a person reads it: 0201 may be 2.1."""
-    listing = next((one for one in listings() if one.id == profile_id), None)
+    listing = next((item for item in listings() if item.id == profile_id), None)
     if listing is None or len(version) != 4 or not version.isdecimal():
         return version
     reported = request_prefixes(listing.path, listing.own, packaged_folder())

@@ -68,8 +68,8 @@ def _written(value: Any) -> str:
         case dict():
             return f"{{ {', '.join(f'{_key(key)} = {_written(value[key])}' for key in value)} }}"
         case list():
-            parts = [_written(one) for one in value]
-            long = any(isinstance(one, dict) for one in value)
+            parts = [_written(item) for item in value]
+            long = any(isinstance(item, dict) for item in value)
             if long:
                 return "[\n" + "".join(f"  {part},\n" for part in parts) + "]"
             return f"[{', '.join(parts)}]"

@@ -68,8 +68,8 @@ class Profile:
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
         self._by_address: dict[tuple[int, int], Parameter] = {}
-        for one in self.parameters:
-            self._by_address.setdefault((one.function, one.address), one)
+        for parameter in self.parameters:
+            self._by_address.setdefault((parameter.function, parameter.address), parameter)
         self._by_quantity: dict[Quantity, Parameter] = {
             p.quantity: p for p in self.parameters if p.quantity is not None
         }

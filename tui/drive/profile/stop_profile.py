@@ -50,7 +50,7 @@ class StopProfile:
 def stop_profile() -> tuple[StopProfile, ...]:
     """Those of every family whose file can be used, in the order of their ids."""
     found = (_facts(listing) for listing in library.listings() if not listing.fault)
-    return tuple(one for one in found if one is not None)
+    return tuple(profile for profile in found if profile is not None)
 
 
 def _facts(listing: library.Listing) -> StopProfile | None:
@@ -69,9 +69,9 @@ def _facts(listing: library.Listing) -> StopProfile | None:
 def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfile:
     """Those of a family that is loaded."""
     places = {
-        one.code: one.address
-        for one in profile.parameters
-        if one.function == 3 and one.type.endswith("16") and one.mask == 0xFFFF
+        parameter.code: parameter.address
+        for parameter in profile.parameters
+        if parameter.function == 3 and parameter.type.endswith("16") and parameter.mask == 0xFFFF
     }
     return StopProfile(profile.id, profile.name, tuple(profile.data.charts), places, names_itself)
 
@@ -86,15 +86,15 @@ def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:
     if not isinstance(head, dict) or not rows or "without" in head:
         return None
     shared = shared_texts(head, path.parent) if "rows_from" in head else []
-    if shared is None or any("[[charts]]" in one for one in shared):
+    if shared is None or any("[[charts]]" in item for item in shared):
         return None
     try:
         charts: tuple[Chart, ...] = converted(rows, tuple[Chart, ...])
     except msgspec.ValidationError:
         return None
     places: dict[str, int] = {}
-    for one in (*shared, text):
-        places |= _places(one)
+    for item in (*shared, text):
+        places |= _places(item)
     return charts, places
 
 

@@ -49,7 +49,7 @@ def factory_value(
 def factory_sources(parameter: Parameter) -> tuple[str, ...]:
     """Codes that must be read before its factory setting can be known."""
     by, of = parameter.factory_by, parameter.factory_of
-    return tuple(one.parameter for one in (by, of) if one is not None)
+    return tuple(factory_by.parameter for factory_by in (by, of) if factory_by is not None)
 
 
 def factory_is_sure(parameter: Parameter) -> bool:

@@ -31,7 +31,9 @@ def _comparable(profile: Profile, low: str, high: str) -> bool:
     """Return True if both are settings of one unit: what a line commands is checked with the
     command."""
     pair = profile[low], profile[high]
-    return pair[0].unit == pair[1].unit and not any(is_order(profile, one) for one in pair)
+    return pair[0].unit == pair[1].unit and not any(
+        is_order(profile, parameter) for parameter in pair
+    )
 
 
 @lru_cache(maxsize=32)

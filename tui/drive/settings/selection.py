@@ -109,7 +109,7 @@ def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
         for p in parameters
         if passes(facts, chosen, p) and (rank := match(profile, p, words)) is not None
     ]
-    return [code for *_, code in sorted(found, key=lambda one: one[:2])]
+    return [code for *_, code in sorted(found, key=lambda pair: pair[:2])]
 
 
 def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool:

@@ -95,9 +95,9 @@ class BlocksScreen(BlockKeys):
         each = (width - 1) // 2
         most = max(len(b.slots) for b in block_editor.proposals.blocks)
         double = width >= WIDE_SLOTS and self.size.height - LINES_BESIDE_SLOTS >= 2 * most
-        for place, one in zip(("first", "second"), block_editor.proposals.blocks, strict=False):
-            at = self._at if one is block else None
-            self.put(place, table_lines(block_editor, one, each, at, double=double))
+        for place, item in zip(("first", "second"), block_editor.proposals.blocks, strict=False):
+            at = self._at if item is block else None
+            self.put(place, table_lines(block_editor, item, each, at, double=double))
         detail = [
             rule("Slot", width, self._proposed()),
             *slot_lines(block_editor, block, self._at, width),

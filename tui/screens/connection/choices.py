@@ -38,7 +38,7 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
     if not shown:
         return ()
     count = COUNTED[len(shown)] if len(shown) < len(COUNTED) else str(len(shown))
-    first, fastest = next(iter(shown)), max(shown, key=lambda one: shown[one][1])
+    first, fastest = next(iter(shown)), max(shown, key=lambda text: shown[text][1])
     name = shown[fastest][0]
     return (
         (f"sim:{','.join(shown)}", f"{count} drives"),
@@ -97,8 +97,8 @@ def _named(settings: LineSettings | None) -> list[Group]:
         return []
     fault = f"wrong: {settings.path.name}" if settings.faults else ""
     lines = tuple(
-        LineChoice(one.line, _without_settings(one.line), name=one.name, device=one.device)
-        for one in settings.lines.values()
+        LineChoice(line.line, _without_settings(line.line), name=line.name, device=line.device)
+        for line in settings.lines.values()
     )
     return [Group("Named", lines, fault)]
 
@@ -111,7 +111,7 @@ def _without_settings(line: str) -> str:
 def _offered_simulated(text: str) -> bool:
     """Return True if it is one of the simulated lines, which are offered anyway."""
     # by its spelling: what simulates a line takes long to import, and this is the first picture
-    offered = [one for one, _ in simulated_lines()[:2]]
+    offered = [item for item, _ in simulated_lines()[:2]]
     return text.replace(" ", "").casefold() in (*offered, *map(_with_addresses, offered))
 
 
@@ -120,7 +120,7 @@ def _with_addresses(line: str) -> str:
     ids = line.removeprefix("sim:").split(",")
     if "@" in line:
         return line
-    return "sim:" + ",".join(f"{one}@{place}" for place, one in enumerate(ids, 1))
+    return "sim:" + ",".join(f"{text}@{place}" for place, text in enumerate(ids, 1))
 
 
 def fault_of_line(text: str) -> str:
@@ -133,19 +133,19 @@ def fault_of_line(text: str) -> str:
     return ""
 
 
-def same_line(one: str, other: str) -> bool:
+def same_line(item: str, other: str) -> bool:
     """Return True if two texts mean one line with the same settings, however they are spelled."""
-    if one == other:
+    if item == other:
         return True
     from tui.bus.link import SerialLink, parse_link
     from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
 
-    if len({text.casefold().startswith(SIMULATED_PREFIX) for text in (one, other)}) > 1:
+    if len({text.casefold().startswith(SIMULATED_PREFIX) for text in (item, other)}) > 1:
         return False  # to know more of a simulated line takes the simulator
-    if line_key(one) != line_key(other):
+    if line_key(item) != line_key(other):
         return False
     try:
-        links = [parse_link(one), parse_link(other)]
+        links = [parse_link(item), parse_link(other)]
     except LinkSyntaxError:
         return True  # simulated: it has no settings
     settings = [

@@ -31,7 +31,7 @@ class DiagnosisTarget(LineKeys):
             device,
             here.opened if here is not None else None,
             console.session.profile.id if console is not None else self.form.profile,
-            tuple(one for one in found if one != device),
+            tuple(number for number in found if number != device),
             self._trouble_of(text),
         )
 

@@ -62,12 +62,12 @@ def use_text(line: ModbusLine) -> str:
     from tui.bus.program_use import use_by_program
 
     found = use_by_program(facts.programs, line.counters.programs)
-    names = [one.name for one, _ in found]
+    names = [program.name for program, _ in found]
     parts = []
-    for one, share in found:
-        name = "this panel" if one.id == facts.me.id else readable(one.name, LONGEST_NAME)
-        several = names.count(one.name) > 1 and one.id != facts.me.id
-        parts.append(f"{name}{f' {one.pid}' if several else ''} {share:>3.0%}")
+    for program, share in found:
+        name = "this panel" if program.id == facts.me.id else readable(program.name, LONGEST_NAME)
+        several = names.count(program.name) > 1 and program.id != facts.me.id
+        parts.append(f"{name}{f' {program.pid}' if several else ''} {share:>3.0%}")
     total = min(1.0, sum(share for _, share in found))
     return " · ".join((f"In use {total:>4.0%}", *parts))
 

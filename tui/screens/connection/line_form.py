@@ -59,7 +59,7 @@ class LineForm(Vertical):
     def _drawn(self, width: int) -> list[Text]:
         """The fields as they will look."""
         return form_lines(
-            [(name, [self._drawn_field(one) for one in fields]) for name, fields in FIELD_ROWS],
+            [(name, [self._drawn_field(field) for field in fields]) for name, fields in FIELD_ROWS],
             width,
         )
 
@@ -73,7 +73,7 @@ class LineForm(Vertical):
         if picture is None:
             return
         rows = (
-            Horizontal(Plain(name), *(self._fields[one] for one in fields), classes="settings")
+            Horizontal(Plain(name), *(self._fields[field] for field in fields), classes="settings")
             for name, fields in FIELD_ROWS
         )
         with self.app.batch_update():

@@ -48,7 +48,7 @@ class LineList(OptionList):
         lately = recent_lines()
         named = [self._named] if self._named and self._named not in lately else []
         settings = line_settings()
-        known = {one.line for one in settings.lines.values()}
+        known = {line.line for line in settings.lines.values()}
         recent = [text for text in [*named, *lately] if text not in known]
         self._groups = groups(serial_ports(), recent, settings)
 

@@ -72,7 +72,7 @@ class OtherSettings(LineKeys):
         elif not isinstance(link, SerialLink) or opened.simulation is not None:
             self.say("This line has no baud or format of its own.", "s searches it.", ALARM_KIND)
         elif others := opened.line.facts.others:
-            who = ", ".join(one.text for one in others)
+            who = ", ".join(other.text for other in others)
             next_step = "Other settings need the line for the panel alone."
             self.say(f"{who} uses the line too.", next_step, ALARM_KIND)
         else:
@@ -87,7 +87,7 @@ class OtherSettings(LineKeys):
 
         here = LineSetting(link.baud, link.format)
         known = settings_worth_a_try(here, parity=not is_pseudo_terminal(link.path))
-        left = [one for one in known[1:] if one not in self._settings_tried]
+        left = [setting for setting in known[1:] if setting not in self._settings_tried]
         if not left:
             self._settings_tried = frozenset()
         self._settings_tried |= {here}
@@ -120,9 +120,9 @@ class OtherSettings(LineKeys):
             text = f"serial:{link.path},{setting.baud},{setting.format}"
             far = f"{setting}, {number} of {len(settings)} settings"
             later = settings[number:]
-            if setting.slow and not any(one.slow for one in settings[: number - 1]):
+            if setting.slow and not any(item.slow for item in settings[: number - 1]):
                 self._tell_slow((setting, *later), costs)
-            self.later = costs.seconds(one for one in later if setting.slow or not one.slow)
+            self.later = costs.seconds(item for item in later if setting.slow or not item.slow)
             self.advise(f"Scanning at {far}.", "Press Esc to end it.")
             try:
                 self.app.opening.begin(text, get_current_worker())

@@ -94,7 +94,7 @@ LAYOUTS = (
 
 def columns_for(width: int) -> WallColumns:
     """The columns that fit a width; what is left over widens the state, as faults have names."""
-    found = next((one for one in LAYOUTS if one.taken <= width), LAYOUTS[-1])
+    found = next((layout for layout in LAYOUTS if layout.taken <= width), LAYOUTS[-1])
     return found._replace(state=min(WIDEST_STATE, found.state + max(0, width - found.taken)))
 
 

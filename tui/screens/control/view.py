@@ -46,7 +46,7 @@ def now_lines(
         text.append(f"   set up: {today.name}", FAINT)
     text.truncate(width, overflow="ellipsis")
     reported = (
-        "; ".join(one.partition(":")[0] for one in switches)
+        "; ".join(switch.partition(":")[0] for switch in switches)
         if len(switches) > 1
         else "".join(switches)
     )

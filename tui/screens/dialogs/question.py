@@ -117,7 +117,7 @@ class Question(Framed, ModalScreen[T]):
             wide = box.styles.width
             most = int(wide.value) if wide is not None and wide.is_cells else self.size.width
             width = min(most, self.size.width) - BESIDE_TEXT
-            others = sum(self._rows(one, width) for one in box.children if one is not part)
+            others = sum(self._rows(child, width) for child in box.children if child is not part)
             rows = int(self.size.height * DIALOG_SHARE) - BORDER_ROWS - others
             part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)
 

@@ -164,9 +164,9 @@ def _excluded(left: FaultAdvice, texts: Sequence[str], width: int) -> list[Text]
     """Those of the texts that a value rules out, behind the reason."""
     room = max(10, width - LABEL - 1)
     return [
-        Text(cut_at_word(f"({one.reason}) {one.text}", room), FAINT)
-        for one in left.excluded
-        if one.text in texts
+        Text(cut_at_word(f"({advice.reason}) {advice.text}", room), FAINT)
+        for advice in left.excluded
+        if advice.text in texts
     ]
 
 

@@ -48,7 +48,7 @@ class DoctorView:
         """The alarm that is shown: the first that anything is known of."""
         if self.fault is not None or self.present or not self.alarms:
             return None
-        known = [one for one in self.alarms if self.profile.guide.alarm(one[0], one[1])]
+        known = [pair for pair in self.alarms if self.profile.guide.alarm(pair[0], pair[1])]
         return (known or list(self.alarms))[0]
 
     @property

@@ -126,14 +126,16 @@ class FaultsScreen(OrderKeys):
         if record is not None and (record.fault != fault or not (fault or present)):
             record = None
         active = self.app.fleet.alarms.active if self.app.fleet is not None else ()
-        ours = (one for one in active if one.device == self.session.device)
+        ours = (
+            present_fault for present_fault in active if present_fault.device == self.session.device
+        )
         return DoctorView(
             profile=self.session.profile,
             fault=fault,
             present=present,
             record=record,
             since=next(ours, None) if present else None,
-            readings={code: one.aged(now, OLD) for code, one in self._readings.items()},
+            readings={code: reading.aged(now, OLD) for code, reading in self._readings.items()},
             at=self._at,
             unread=self._unread,
             raws=self.session.image.raws,

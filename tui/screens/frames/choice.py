@@ -119,4 +119,4 @@ def _says(group: Sequence[Frame], wanted: FrameChoice, tell: TellFrames) -> bool
         f"{sentence} {frame.note} {frame.data.hex(' ')} {frame.data.hex()}".casefold()
         for sentence, frame in zip(tell(group), group, strict=True)
     ]
-    return all(any(word in one for one in message) for word in wanted.words)
+    return all(any(word in text for text in message) for word in wanted.words)

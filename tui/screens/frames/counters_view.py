@@ -83,25 +83,27 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
         none = Text("None reported or read yet.", FAINT)
         return [Text("The drive's own", FAINT), none, *codes]
     lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'of':>8}", FAINT)]
-    for name, one in found.drive:
-        lines += _pair(name, one)
+    for name, comparison in found.drive:
+        lines += _pair(name, comparison)
     return [*lines, *codes]
 
 
-def _pair(name: str, one: Comparison) -> list[Text]:
+def _pair(name: str, comparison: Comparison) -> list[Text]:
     """Frames as the drive reports them, those since the first reading, and how many we sent by
     then."""
     # counters of another port are no part of the comparison
-    other = one.counts_this_line is False
-    strong, sent = FAINT if other else STRONG, one.sent
-    ours = min(max(one.frames, sent.low), sent.high)
+    other = comparison.counts_this_line is False
+    strong, sent = FAINT if other else STRONG, comparison.sent
+    ours = min(max(comparison.frames, sent.low), sent.high)
     frames = Text(f"{short(name, 15):<16}", FAINT if other else PLAIN, no_wrap=True)
-    frames.append(f"{one.last.frames:>6}").append(f"{one.frames:>7}", strong)
-    frames.append("" if other else f"{ours:>8}", PLAIN if ours == one.frames else ALARM)
+    frames.append(f"{comparison.last.frames:>6}").append(f"{comparison.frames:>7}", strong)
+    frames.append("" if other else f"{ours:>8}", PLAIN if ours == comparison.frames else ALARM)
     errors = Text(f"{'  bad checksum':<16}", FAINT, no_wrap=True)
-    most = f">{one.last.damaged}" if one.last.saturated else str(one.last.damaged)
+    most = (
+        f">{comparison.last.damaged}" if comparison.last.saturated else str(comparison.last.damaged)
+    )
     errors.append(f"{most:>6}", PLAIN)
-    errors.append(f"{one.damaged:>7}", ALARM if one.damaged else strong)
+    errors.append(f"{comparison.damaged:>7}", ALARM if comparison.damaged else strong)
     return [frames, errors]
 
 
@@ -149,14 +151,14 @@ def message(found: CountersNow, width: int, room: int) -> list[Text]:
     if found.agree:
         text = Text(no_wrap=True).append(" ● ", RUNNING)
         return [text.append(short(found.agreeing, width - 4), PLAIN)]
-    worst = sorted(found.differences, key=lambda one: one.kind not in BAD)
-    parts = [wrapped(one.text, width - 5, MOST_LINES_OF_ONE) for one in worst]
+    worst = sorted(found.differences, key=lambda item: item.kind not in BAD)
+    parts = [wrapped(difference.text, width - 5, MOST_LINES_OF_ONE) for difference in worst]
     if sum(map(len, parts)) > room:
         # what differs of all goes before what to look at of the first
-        parts = [[cut_at_word(one.text, width - 5)] for one in worst]
+        parts = [[cut_at_word(difference.text, width - 5)] for difference in worst]
     lines: list[Text] = []
-    for one, reported in zip(worst, parts, strict=True):
-        sign = FAULT if one.kind in BAD else ALARM
+    for difference, reported in zip(worst, parts, strict=True):
+        sign = FAULT if difference.kind in BAD else ALARM
         for at, part in enumerate(reported):
             text = Text(no_wrap=True).append("   " if at else " ■ ", sign)
             lines.append(text.append(part, PLAIN))

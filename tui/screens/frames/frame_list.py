@@ -250,7 +250,7 @@ class FrameListScreen(PanelScreen):
         places = self._places(frames)
         shown = [frames[at] for at in places]
         fits = chosen(shown, choice_of(text), self._texts_of, tcp=self._is_tcp)
-        before = next((at for at, one in enumerate(shown) if one is self._found), len(shown))
+        before = next((at for at, frame in enumerate(shown) if frame is self._found), len(shown))
         older = [at for at in fits if at < before]
         if not older:
             self.app.tell("No older frame fits." if self._found else "No frame fits.")

@@ -41,8 +41,8 @@ def gaps(frames: Sequence[Frame]) -> list[float | None]:
     """Seconds from each frame's predecessor to it, however few of them are shown."""
     before = [None, *(frame.time for frame in frames)][: len(frames)]
     return [
-        None if one is None else max(0.0, frame.time - one)
-        for one, frame in zip(before, frames, strict=True)
+        None if value is None else max(0.0, frame.time - value)
+        for value, frame in zip(before, frames, strict=True)
     ]
 
 

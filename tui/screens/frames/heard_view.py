@@ -24,7 +24,7 @@ def heard_lines(
     room = max(1, height - 1)
     top = max(0, min(top, len(lines) - room))
     shown = lines[top : top + room]
-    drives = sum(bool(one.tally.device) for one in summary.drives)
+    drives = sum(bool(drive.tally.device) for drive in summary.drives)
     more = "" if len(lines) <= room else f"{top + 1} to {top + len(shown)} of {len(lines)}"
     heading = f"Heard of {drives} drive{'' if drives == 1 else 's'}"
     return [rule(heading, width, more), *shown], top
@@ -41,7 +41,7 @@ def _sentence(text: str, width: int) -> list[Text]:
     first = OF_A_DRIVE if about_drive else 1
     name = not about_drive and text.startswith(("Device", "All devices"))
     style = STRONG if name else FAINT if about_drive else PLAIN
-    if any(one in text for one in WARNINGS):
+    if any(warning in text for warning in WARNINGS):
         style = ALARM
     rows = wrapped(text.strip(), max(10, width - HANGING), MOST_ROWS)
     return [

@@ -66,11 +66,11 @@ def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[F
         marks = [_mark(action, screen, word, here=here) for word in words]
         if all(marks):
             ready = bool(marks) and min(marks) > 1 and _all_named(action, words)
-            one = FoundAction(
+            item = FoundAction(
                 action, screen if here else action.screens[0], here, sum(marks), ready
             )
-            found.setdefault((action.id, action.help), one)
-    return sorted(found.values(), key=lambda one: (-one.score, not one.here))
+            found.setdefault((action.id, action.help), item)
+    return sorted(found.values(), key=lambda item: (-item.score, not item.here))
 
 
 def _is_left_out(action: Action, words: Sequence[str], *, here: bool) -> bool:
@@ -98,11 +98,11 @@ def _mark(action: Action, screen: str, word: str, *, here: bool) -> int:
     every = {*message, *name, *places}
     if typed in every:
         mark = 4
-    elif any(one.startswith(typed) for one in every):
+    elif any(item.startswith(typed) for item in every):
         mark = 2
     else:
-        return int(any(typed in one for one in every))
-    return mark + any(one.startswith(typed) for one in name)
+        return int(any(typed in item for item in every))
+    return mark + any(text.startswith(typed) for text in name)
 
 
 def _words(text: str) -> list[str]:

@@ -29,7 +29,7 @@ def remember() -> None:
     tried = stored_json(_file())
     known = [*(tried if isinstance(tried, list) else []), terminal_name()]
     with suppress(OSError):
-        store_json(_file(), sorted({one for one in known if isinstance(one, str)}))
+        store_json(_file(), sorted({item for item in known if isinstance(item, str)}))
 
 
 def unknown_text(data: bytes) -> str:

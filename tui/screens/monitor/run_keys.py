@@ -22,7 +22,7 @@ from ..command.control import hindrance
 from ..keys.monitor_actions import COMMAND_ACTIONS
 from .run_line import STEPS, Purpose, RunLine, limits, proposed, run_lines
 
-OTHER_STOP_KEYS = frozenset(one.keys for one in COMMAND_ACTIONS if one.id.startswith("stop_as("))
+OTHER_STOP_KEYS = frozenset(item.keys for item in COMMAND_ACTIONS if item.id.startswith("stop_as("))
 """Keys that stop in a way of their own, at once."""
 
 ENTER_TOO_EARLY = "Enter ignored: it came before the line could be read. Press it again."

@@ -151,10 +151,10 @@ def proposed(
     if wanted.endswith(f" {unit}"):
         return wanted.removesuffix(unit).strip(), unit
     now = profile.quantity(BEFORE_RAMP.get(parameter.quantity or "", "frequency_reference"))
-    for one in (parameter, now):
-        if one is None or one.code not in raws or profile.unit(one, raws) != unit:
+    for item in (parameter, now):
+        if item is None or item.code not in raws or profile.unit(item, raws) != unit:
             continue
-        held = number_of(profile, one, raws[one.code], raws, absent)
+        held = number_of(profile, item, raws[item.code], raws, absent)
         if held is not None:
             return f"{abs(held):f}", unit
     return "0", unit
@@ -192,11 +192,11 @@ def run_lines(
     """
     reported = [Text(f" {part}", style) for part, style in _parts_of(line, hindrance, width - 2)]
     lines = [*(reported or [Text("")]), _first(line, profile, readings, output), _second(line, now)]
-    for one in lines:
-        one.no_wrap = True
-        one.truncate(width, overflow="ellipsis")
-        one.append(" " * (width - one.cell_len))
-        one.stylize_before(GROUND_OF_LINE)
+    for text in lines:
+        text.no_wrap = True
+        text.truncate(width, overflow="ellipsis")
+        text.append(" " * (width - text.cell_len))
+        text.stylize_before(GROUND_OF_LINE)
     return lines
 
 

@@ -90,7 +90,7 @@ class EditNumber(Question[str | None]):
             return False
         edit = edits.get(parameter.code)
         if edit is None:
-            same = next(one for one in edits.requested if one.code == parameter.code)
+            same = next(item for item in edits.requested if item.code == parameter.code)
             reported = Text("as it is held now", FAINT)
             if same.rounded:
                 reported.append(f": {same.text}   {ROUNDED}", ALARM)

@@ -93,13 +93,16 @@ class ParameterList:
         known = sum(facts.profile.get(code) is not None for code in facts.favourites)
         counts = {"favourites": known, "staged": len(facts.edits), "unsaved": len(facts.unsaved)}
         counts["not factory"] = len(rows(facts, "not factory"))
-        first = [GroupEntry(Choice(one), counts[one], pinned=True) for one in FIRST]
+        first = [
+            GroupEntry(Choice(literal_type), counts[literal_type], pinned=True)
+            for literal_type in FIRST
+        ]
         if facts.other:
             first.append(GroupEntry(Choice("differs"), len(rows(facts, "differs")), pinned=True))
         groups = [GroupEntry(Choice(group=group)) for group in self.groups]
         if facts.profile.data.start_up:
             groups.insert(0, GroupEntry(Choice("start-up")))
-        return [*first, *groups, *(GroupEntry(Choice(one)) for one in LAST)]
+        return [*first, *groups, *(GroupEntry(Choice(literal_type)) for literal_type in LAST)]
 
     def choose(self, choice: Choice) -> None:
         """Show something else; the next filling does it."""

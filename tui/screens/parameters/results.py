@@ -76,14 +76,14 @@ class RestQuestion(KeyQuestion[bool]):
     def dialog(self) -> ComposeResult:
         """Compose the failures, the edits held back with them, and those still possible."""
         count = len(self._applied.waits)
-        one = count == 1
+        item = count == 1
         with Vertical(id="dialog"):
-            rest = "parameter" if one else f"{count} parameters"
+            rest = "parameter" if item else f"{count} parameters"
             yield Plain(f"Write the other {rest} anyway?", id="question")
             yield from self.now_lines()
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
-            keys = (("y", "write it" if one else "write them"), ("Esc or q", "write no more"))
+            keys = (("y", "write it" if item else "write them"), ("Esc or q", "write no more"))
             yield Plain(hint(*keys), id="hint")
 
     def action_yes(self) -> None:

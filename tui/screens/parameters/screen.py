@@ -89,7 +89,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
                 self.session.profile, self.session.profile[code], editor.values.raws
             )
             extra = (limits.low_by, limits.high_by) if limits is not None else ()
-            editor.values.visible += tuple(one for one in extra if one)
+            editor.values.visible += tuple(text for text in extra if text)
         columns = self.query_one("#table").size.width
         table = [
             row_line(editor, item, columns, chosen=place == self.listed.at)

@@ -122,9 +122,9 @@ class SetKeys(ParameterKeys):
         others = [("factory", "the factory settings")]
         consoles = self.app.fleet.consoles if self.app.fleet else []
         others += [
-            (str(one.device), f"drive {one.device}, {one.session.profile.name}")
-            for one in consoles
-            if one is not self.console
+            (str(console.device), f"drive {console.device}, {console.session.profile.name}")
+            for console in consoles
+            if console is not self.console
         ]
         question = "Compare with; what it has otherwise can be staged"
         folders = [Path.cwd(), state_folder()]

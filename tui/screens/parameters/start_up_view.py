@@ -35,7 +35,14 @@ def start_up_items(profile: Profile) -> list[TableLine]:
 
 def step_help(profile: Profile, code: str) -> str:
     """Return the topic of a parameter's step; empty without a step."""
-    step = next((one for one in profile.data.start_up if code in one.parameters), None)
+    step = next(
+        (
+            start_up_step
+            for start_up_step in profile.data.start_up
+            if code in start_up_step.parameters
+        ),
+        None,
+    )
     return "" if step is None else _words_of_step(step)
 
 

@@ -44,9 +44,9 @@ def load_words(session: DriveSession) -> UserWords:
     """Return the stored words of this drive on this line; four unassigned words if none."""
     kept = _kept().get(_key(session), [])
     words: list[UserWord] = []
-    for one in kept[:COUNT] if isinstance(kept, list) else []:
+    for item in kept[:COUNT] if isinstance(kept, list) else []:
         try:
-            words.append(UserWord(int(one["address"]) & 0xFFFF, format_named(one["format"])))
+            words.append(UserWord(int(item["address"]) & 0xFFFF, format_named(item["format"])))
         except (KeyError, TypeError, ValueError, AttributeError, MappingError):
             words.append(UserWord())
     return (*words, *(UserWord(),) * (COUNT - len(words)))

@@ -43,17 +43,21 @@ class Bundle:
 
 def archive(results: Sequence[PartResult], redaction: Redaction, stem: str) -> Bundle:
     """The bundle of what was collected; `stem` is its folder in the zip."""
-    dynamic = [one.missing for one in results]
-    dynamic += [one.file.note for one in results if one.file is not None]
-    for content in (*dynamic, *(one for name, one in _files(results) if _reveals(name))):
+    dynamic = [result.missing for result in results]
+    dynamic += [result.file.note for result in results if result.file is not None]
+    for content in (*dynamic, *(item for name, item in _files(results) if _reveals(name))):
         redaction.learn(content)
-    fixed = {one.part.name for one in results}
+    fixed = {result.part.name for result in results}
     files = {
         name if name in fixed else redaction.clean(name): _bytes(redaction.clean(content))
         for name, content in _files(results)
     }
     omitted = {OMITTED_KINDS[by]: count for by, count in sorted(redaction.counts.items())}
-    missing = {one.part.name: redaction.clean(one.missing) for one in results if one.file is None}
+    missing = {
+        result.part.name: redaction.clean(result.missing)
+        for result in results
+        if result.file is None
+    }
     sizes = {name: len(data) for name, data in files.items()}
     head = _head(results, redaction, sizes)
     readme = "\n".join([*head, *_omitted_lines(omitted), ""])
@@ -67,11 +71,11 @@ def _reveals(name: str) -> bool:
 
 
 def _files(results: Sequence[PartResult]) -> Iterator[tuple[str, Content]]:
-    for one in results:
-        if one.file is not None:
-            yield one.part.name, one.file.content
-            folder = one.part.name.rpartition("/")[0]
-            for name, content in one.file.more.items():
+    for result in results:
+        if result.file is not None:
+            yield result.part.name, result.file.content
+            folder = result.part.name.rpartition("/")[0]
+            for name, content in result.file.more.items():
                 yield f"{folder}/{name}".lstrip("/"), content
 
 
@@ -95,23 +99,23 @@ def _head(
     yield "Files"
     yield "-----"
     described = set()
-    for one in results:
-        if one.file is None:
+    for result in results:
+        if result.file is None:
             continue
-        described.add(one.part.name)
-        yield f"{one.part.name} ({sizes[one.part.name]} bytes)"
-        yield from _indented(one.part.about)
-        yield from _indented(redaction.clean(one.file.note))
+        described.add(result.part.name)
+        yield f"{result.part.name} ({sizes[result.part.name]} bytes)"
+        yield from _indented(result.part.about)
+        yield from _indented(redaction.clean(result.file.note))
     for name in sizes:
         if name not in described:
             yield f"{name} ({sizes[name]} bytes)"
     yield ""
     yield "Could not get"
     yield "-------------"
-    lacking = [one for one in results if one.file is None]
-    for one in lacking:
-        yield f"{one.part.name}, because:"
-        yield from _indented(redaction.clean(one.missing))
+    lacking = [result for result in results if result.file is None]
+    for result in lacking:
+        yield f"{result.part.name}, because:"
+        yield from _indented(redaction.clean(result.missing))
     if not lacking:
         yield "Nothing: all files are here."
     yield ""

@@ -81,10 +81,10 @@ def _line_file(subject: BundleSubject) -> PartFile:
         "trouble": str(subject.trouble) if subject.trouble is not None else None,
         "port": _port(link) if isinstance(link, SerialLink) else None,
         "remembered": _remembered(link) if link is not None else None,
-        "ports": [one._asdict() for one in list_ports()],
+        "ports": [port._asdict() for port in list_ports()],
         "held": [
-            {"line": one.line, "program": one.program.name, "pid": one.program.pid}
-            for one in owners()
+            {"line": owner.line, "program": owner.program.name, "pid": owner.program.pid}
+            for owner in owners()
         ],
     }
     if subject.opened is not None:
@@ -103,7 +103,7 @@ def _open_line(subject: BundleSubject) -> dict[str, Any]:
         "state": line.state.status.value,
         "reason": line.state.reason or None,
         "changed": list(known.changed) if known is not None else [],
-        "programs": [{"program": one.name, "pid": one.pid} for one in facts.programs],
+        "programs": [{"program": program.name, "pid": program.pid} for program in facts.programs],
         "counters": msgspec.to_builtins(line.counters, str_keys=True),
         "devices": {str(device): asdict(line.device_state(device)) for device in subject.devices},
     }
@@ -124,7 +124,9 @@ def _remembered(link: Link) -> dict[str, Any] | None:
     mark = load_memory().lines.get(line_name(link).key)
     if mark is None:
         return None
-    drives = [{"device": device, **asdict(one)} for device, one in mark.drives.items()]
+    drives = [
+        {"device": device, **asdict(drive_mark)} for device, drive_mark in mark.drives.items()
+    ]
     return {"adapter": mark.adapter or None, "drives": drives}
 
 
@@ -164,23 +166,23 @@ def _versions_file() -> PartFile:
 def _journal_file(subject: BundleSubject) -> PartFile:
     kept = Journal()
     lines = list(read_journal(kept.files))
-    entries = completed(one for one in lines if isinstance(one, Entry))
+    entries = completed(line for line in lines if isinstance(line, Entry))
     texts = {subject.text} | ({label(subject.link)} if subject.link is not None else set())
     found = {
-        id(one): one
+        id(entry): entry
         for text in sorted(texts)
-        for one in selected(entries, line=text, since=subject.since)
+        for entry in selected(entries, line=text, since=subject.since)
     }
     return PartFile(
         {
             "schema": JSON_SCHEMA_OF_JOURNAL,
             "command": "journal",
             "journal": str(kept.path),
-            "entries": [asdict(one) for one in entries if id(one) in found],
+            "entries": [asdict(entry) for entry in entries if id(entry) in found],
             "damaged": [
-                {"file": str(one.file), "line": one.number, "text": one.text}
-                for one in lines
-                if isinstance(one, DamagedLine)
+                {"file": str(line.file), "line": line.number, "text": line.text}
+                for line in lines
+                if isinstance(line, DamagedLine)
             ],
         }
     )
@@ -190,7 +192,7 @@ def _profiles_file(subject: BundleSubject) -> PartFile:
     used = _profiles_used(subject)
     if not used:
         raise Missing("No drive was identified, so no profile is in use.")
-    listings = {one.id: one for one in library.listings()}
+    listings = {listing.id: listing for listing in library.listings()}
     checks, files = [], {}
     for profile_id in sorted(used):
         path = listings[profile_id].path
@@ -202,10 +204,10 @@ def _profiles_file(subject: BundleSubject) -> PartFile:
 
 def _profiles_used(subject: BundleSubject) -> set[str]:
     """Ids of the profiles of the drives, also of those that do not answer."""
-    used = {one.family.id for one in subject.sessions}
-    silent = set(subject.devices) - {one.device for one in subject.sessions}
+    used = {session.family.id for session in subject.sessions}
+    silent = set(subject.devices) - {session.device for session in subject.sessions}
     expected = (subject.expected_profile(device) for device in silent)
-    return {*used, *(one.id for one in expected if one is not None)}
+    return {*used, *(profile.id for profile in expected if profile is not None)}
 
 
 def _log_file() -> PartFile:

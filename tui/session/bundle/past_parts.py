@@ -103,7 +103,7 @@ class _Past:
         if opened is None:
             raise Missing(self._note or NO_PROCESS)
         frames = tuple(opened.line.trace)
-        older = (one for one in self._before if not frames or one.time < frames[0].time)
+        older = (frame for frame in self._before if not frames or frame.time < frames[0].time)
         return (*older, *frames), opened.line.facts.notes.all
 
     async def frames_file(self, *, raw: bool) -> PartFile:
@@ -123,10 +123,10 @@ class _Past:
         events, note = self._subject.events, ""
         if events is None:
             _, notes = await self._past()
-            events = sorted(_left_events(notes), key=lambda one: one.wall)
+            events = sorted(_left_events(notes), key=lambda item: item.wall)
             note = "Those of the last ten minutes: older ones are kept by the panel only."
         first = self._subject.since.timestamp()
-        lines = [_event_line(one) for one in events if one.wall >= first]
+        lines = [_event_line(event) for event in events if event.wall >= first]
         return PartFile("\n".join([*(lines or ["No message."]), ""]), note)
 
 

@@ -72,10 +72,10 @@ class Redaction:
     """Removes names and passwords from texts, and counts what it has removed."""
 
     def __init__(self, names: Names) -> None:
-        self._users = {one for one in names.users if _is_own(one)}
-        self._hosts = {one for one in names.hosts if _is_own(one)}
-        self._homes = {one.rstrip("/\\") for one in names.homes if len(one.rstrip("/\\")) > 1}
-        self._secrets = {one for one in names.secrets if len(one) >= SHORTEST_SECRET}
+        self._users = {user for user in names.users if _is_own(user)}
+        self._hosts = {host for host in names.hosts if _is_own(host)}
+        self._homes = {home.rstrip("/\\") for home in names.homes if len(home.rstrip("/\\")) > 1}
+        self._secrets = {secret for secret in names.secrets if len(secret) >= SHORTEST_SECRET}
         self._pattern: re.Pattern[str] | None = None
         self._instead: dict[str, str] = {}
         self.counts: Counter[str] = Counter()
@@ -89,25 +89,27 @@ class Redaction:
                 user, _, password = match[2].partition(":")
                 self._users |= {user} if _is_own(user) else set()
                 found_in_url = {password, unquote(password)}
-                self._secrets |= {one for one in found_in_url if len(one) >= SHORTEST_SECRET}
+                self._secrets |= {
+                    any_type for any_type in found_in_url if len(any_type) >= SHORTEST_SECRET
+                }
             for pattern in (_ASSIGNED, _OPTION, _HEADER):
                 found = (match[2].strip("\"'") for match in pattern.finditer(text))
-                self._secrets |= {one for one in found if _is_secret(one)}
+                self._secrets |= {any_type for any_type in found if _is_secret(any_type)}
             for kind, name in _NAMED.findall(text):
                 names = self._hosts if kind.casefold().startswith("host") else self._users
                 names |= {name} if _is_own(name) else set()
             for host in _LINE_HOST.findall(text):
-                self._hosts |= {one for one in (host, host.partition(".")[0]) if _is_own(one)}
-            self._users |= {one for one in _HOME_PATH.findall(text) if _is_own(one)}
+                self._hosts |= {item for item in (host, host.partition(".")[0]) if _is_own(item)}
+            self._users |= {item for item in _HOME_PATH.findall(text) if _is_own(item)}
 
     def clean(self, content: Any) -> Any:
         """A text, or a JSON document, without them; the keys of a document stay."""
         if isinstance(content, str):
             return self._clean_text(content)
         if isinstance(content, Mapping):
-            return {key: self.clean(one) for key, one in content.items()}
+            return {key: self.clean(item) for key, item in content.items()}
         if isinstance(content, (list, tuple)):
-            return [self.clean(one) for one in content]
+            return [self.clean(item) for item in content]
         return content
 
     def _clean_text(self, text: str) -> str:
@@ -144,12 +146,12 @@ class Redaction:
         """One pattern of all that is known, the longest first: a host may contain a user."""
         self._instead = {}
         for by, names in ((USER, self._users), (HOST, self._hosts), (HOME, self._homes)):
-            self._instead |= {one.casefold(): by for one in names}
-        secrets = {form for one in self._secrets for form in _forms(one)}
+            self._instead |= {name.casefold(): by for name in names}
+        secrets = {form for secret in self._secrets for form in _forms(secret)}
         known = self._users | self._hosts | self._homes | secrets
         parts = [
-            rf"(?-i:{re.escape(one)})" if one in secrets else _part(one)
-            for one in sorted(known, key=len, reverse=True)
+            rf"(?-i:{re.escape(text)})" if text in secrets else _part(text)
+            for text in sorted(known, key=len, reverse=True)
         ]
         return re.compile("|".join(parts) or r"(?!)", re.IGNORECASE)
 
@@ -197,11 +199,11 @@ def _texts(content: object) -> Iterator[str]:
     if isinstance(content, str):
         yield content
     elif isinstance(content, Mapping):
-        for one in content.values():
-            yield from _texts(one)
+        for item in content.values():
+            yield from _texts(item)
     elif isinstance(content, (list, tuple)):
-        for one in content:
-            yield from _texts(one)
+        for item in content:
+            yield from _texts(item)
 
 
 def local_names(more_users: Iterable[str] = ()) -> Names:

@@ -89,7 +89,7 @@ class BundleSubject:
     def sessions(self) -> list[DriveSession]:
         """The sessions with the drives that were identified."""
         found = (self.known_session(device) for device in self.devices)
-        return [one for one in found if one is not None]
+        return [session for session in found if session is not None]
 
 
 def bundle_name(link: Link | None, when: datetime) -> str:

@@ -28,7 +28,7 @@ async def make_bundle(
     results = [*results[len(drives) :], *results[: len(drives)]]
 
     def pack() -> Bundle:
-        redaction = Redaction(local_names(one.user for one in _programs(subject)))
+        redaction = Redaction(local_names(program.user for program in _programs(subject)))
         redaction.learn(subject.text)
         return archive(results, redaction, stem)
 

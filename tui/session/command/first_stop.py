@@ -72,7 +72,7 @@ class FirstStop:
     @property
     def taken(self) -> FirstWord | None:
         """The word that the drive took; None where it took none."""
-        return next((one.what for one in self.sent if one.taken), None)
+        return next((sent_word.what for sent_word in self.sent if sent_word.taken), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +85,10 @@ class _Look:
 def unlike_families(session: DriveSession) -> tuple[StopProfile, ...]:
     """Families of which a guessed drive may be, if the word that stops one may start another."""
     ids = session.known_identity.candidates if session.guessed else ()
-    profiles = [library.load(one) for one in ids]
+    profiles = [library.load(id_) for id_ in ids]
     if not profiles or stop_alike(profiles):
         return ()
-    return tuple(stop_profile_of(one, names_itself=False) for one in profiles)
+    return tuple(stop_profile_of(profile, names_itself=False) for profile in profiles)
 
 
 async def stop_first(
@@ -110,11 +110,11 @@ async def stop_first(
     follow: tuple[str, ...] = ()
     answered = False
     for place in stop_places(families, named):
-        known = any(one.id in named for one in place.families)
+        known = any(family.id in named for family in place.families)
         look = await _look(line, device, place, again=known)
         answered = answered or look.there is not None
         if look.there is False:
-            ruled_out |= {one.id for one in place.families}
+            ruled_out |= {family.id for family in place.families}
             continue
         if look.there is None and not known:
             continue
@@ -125,7 +125,7 @@ async def stop_first(
         follow = followers(what, look.raws, wanted)
         if sent[-1].taken or look.there:
             break
-    answered = answered or any(one.taken for one in sent)
+    answered = answered or any(sent_word.taken for sent_word in sent)
     return FirstStop(tuple(sent), frozenset(ruled_out), follow, answered)
 
 
@@ -191,7 +191,7 @@ def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry
         time=now_text(),
         line=label(line.link),
         device=device,
-        profile=",".join(one.id for one in what.families),
+        profile=",".join(family.id for family in what.families),
         code=what.code,
         address=what.address,
         old_raw=None,

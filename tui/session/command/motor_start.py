@@ -45,7 +45,7 @@ async def check_scale(access: CommandAccess) -> None:
     if not (codes := scale_codes(profile)):
         return
     readings = await access.read(codes)
-    raws = {code: one.raw for code, one in readings.items() if one.raw is not None}
+    raws = {code: reading.raw for code, reading in readings.items() if reading.raw is not None}
     if refusal := other_scale(profile, raws):
         raise OrderRefused(refusal)
 

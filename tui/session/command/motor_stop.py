@@ -104,7 +104,7 @@ class MotorStop:
 
     async def _stop_any(self, families: Sequence[StopProfile]) -> str | None:
         """Send the word that stops every family; none of them can follow the motor."""
-        session, ids = self.session, [one.id for one in families]
+        session, ids = self.session, [family.id for family in families]
         try:
             first = await stop_first(
                 session.line, session.device, self.writer.journal, families, ids, self.order
@@ -198,7 +198,7 @@ class MotorStop:
         parameter = order_target(session.profile, chart, order)
         if (held := session.image.get(parameter.code)) is not None:
             self.held[parameter.code] = held
-        kept = {code: one.raw for code, one in self.held.items() if one.raw is not None}
+        kept = {code: reading.raw for code, reading in self.held.items() if reading.raw is not None}
         self._mark_commanded()
         for word in with_options(chart, order, kept):
             raw = from_words(parameter, [word])

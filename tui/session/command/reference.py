@@ -110,7 +110,7 @@ def taught_limit(profile: Profile, code: str) -> Parameter | None:
 def no_place(profile: Profile, unit: str) -> str:
     """Why a drive takes no reference in a unit from here, with the way out of that."""
     text = f"Where {profile.name} takes a reference in {unit} is in no manual at hand"
-    ways = [one.parameter for one in profile.data.teachable_references]
+    ways = [reference.parameter for reference in profile.data.teachable_references]
     if not ways:
         return f"{text}; give it at the drive."
     code = ways[0]
@@ -231,13 +231,13 @@ def _placed(
     places = reference_parameters(known.profile)
     if not unit:
         return places[0], typed
-    for one in places:
-        if (factor := factor_between(unit, known.unit(one))) is not None:
-            return one, typed * factor
-    for one in places:
-        number = known.converted(typed, unit, known.unit(one), known.whole(one))
+    for place in places:
+        if (factor := factor_between(unit, known.unit(place))) is not None:
+            return place, typed * factor
+    for place in places:
+        number = known.converted(typed, unit, known.unit(place), known.whole(place))
         if number is not None:
-            return one, number
+            return place, number
     own = known.unit(places[0])
     raise UnitRefused(
         f"{text!r} cannot be converted: {places[0].code} takes its reference in"
@@ -248,12 +248,12 @@ def _placed(
 def _accepted(known: ReferenceUnits) -> list[str]:
     """The units in which a reference can be given now, the drive's own first."""
     places = reference_parameters(known.profile)
-    own = [known.unit(one) or "counts" for one in places]
+    own = [known.unit(place) or "counts" for place in places]
     more = [
         unit
         for unit in ("Hz", "rpm", "%")
-        for one in places
-        if known.converted(Decimal(1), unit, known.unit(one), known.whole(one)) is not None
+        for place in places
+        if known.converted(Decimal(1), unit, known.unit(place), known.whole(place)) is not None
     ]
     return list(dict.fromkeys((*own, *more)))
 

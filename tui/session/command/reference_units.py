@@ -28,12 +28,14 @@ class ReferenceUnits:
     @property
     def raws(self) -> dict[str, int]:
         """Raw values by code."""
-        return {code: one.raw for code, one in self.readings.items() if one.raw is not None}
+        return {
+            code: reading.raw for code, reading in self.readings.items() if reading.raw is not None
+        }
 
     @property
     def absent(self) -> set[str]:
         """Codes of words that the drive lacks."""
-        return {code for code, one in self.readings.items() if one.absent}
+        return {code for code, reading in self.readings.items() if reading.absent}
 
     def unit(self, parameter: Parameter) -> str:
         """The unit of a word; `raw` if it follows another word that was not read."""
@@ -69,14 +71,14 @@ class ReferenceUnits:
         pairs = self._pole_pairs()
         if pairs is None:
             return None
-        for one, two, times, by in (("Hz", "rpm", 60, pairs), ("rpm", "Hz", pairs, 60)):
-            before, after = factor_between(unit, one), factor_between(two, other)
+        for text, two, times, by in (("Hz", "rpm", 60, pairs), ("rpm", "Hz", pairs, 60)):
+            before, after = factor_between(unit, text), factor_between(two, other)
             if before is not None and after is not None:
                 return number * before * times / by * after
         return None
 
     def _pole_pairs(self) -> Decimal | None:
-        frequency, speed = (self.quantity(one) for one in MOTOR_DATA)
+        frequency, speed = (self.quantity(literal_type) for literal_type in MOTOR_DATA)
         if not frequency or not speed or frequency[0] <= 0 or speed[0] <= 0:
             return None
         hertz, rpm = factor_between(frequency[1], "Hz"), factor_between(speed[1], "rpm")

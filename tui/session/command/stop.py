@@ -116,13 +116,13 @@ class Stopper:
         ordered = _now(wanted[0]) if wanted else 0.0
         # first: what other programs meant for them before is void from here on
         if not given:
-            carried_on(lambda: self._line.facts.give_stop([one.device for one in wanted], by))
+            carried_on(lambda: self._line.facts.give_stop([item.device for item in wanted], by))
         for session in wanted:
             carried_on(partial(end_work, session, by))
         wave = None
         if len(wanted) > 1:
             wanted.sort(key=_urgency)
-            wave = FirstWave(one.device for one in wanted if _urgency(one) < NO_ANSWER_NOW)
+            wave = FirstWave(item.device for item in wanted if _urgency(item) < NO_ANSWER_NOW)
         closed: LineClosed | None = None
         begun: list[UnderWay] = []
         for session in wanted:
@@ -138,8 +138,8 @@ class Stopper:
             raise closed
         carried_on(partial(watch_first_frames, begun, self._line.timing, self._last.send))
         if wave is not None:
-            with_wave = [one.stop.session for one in begun]
-            rest = {one.device for one in wanted} - {one.device for one in with_wave}
+            with_wave = [work.stop.session for work in begun]
+            rest = {item.device for item in wanted} - {entry.device for entry in with_wave}
             behind = partial(self._behind_wave, wave, rest, with_wave, order)
             carried_on(lambda: self._line.spawn(behind, "stop all"))
 
@@ -183,9 +183,9 @@ class Stopper:
             before.worker.cancel()
         self._say(session, Phase.SENDING, "stop waits for the line", ordered)
         writer = Writer(session, self._journal, None)
-        one = MotorStop(session, writer, order, ordered, self._say, wave=wave)
-        worker = self._line.spawn(partial(self._stop, one), f"stop {device}")
-        begun = self._under_way[device] = UnderWay(one, worker, session.arming.times)
+        stop = MotorStop(session, writer, order, ordered, self._say, wave=wave)
+        worker = self._line.spawn(partial(self._stop, stop), f"stop {device}")
+        begun = self._under_way[device] = UnderWay(stop, worker, session.arming.times)
         return [begun]
 
     def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
@@ -194,7 +194,7 @@ class Stopper:
         # the thread that waits does so by the real clock, whichever the drives have
         end = time.monotonic() + seconds
         while True:
-            reports = [one for device, one in self._reports.items() if device in devices]
+            reports = [report for device, report in self._reports.items() if device in devices]
             summary = StopSummary(reports)
             if (len(reports) == len(devices) and summary.ended) or time.monotonic() > end:
                 return summary
@@ -248,19 +248,19 @@ class Stopper:
                         address, [word & 0xFFFF], limits=limits, priority=Priority.STOP
                     )
 
-    async def _stop(self, one: MotorStop) -> None:
+    async def _stop(self, stop: MotorStop) -> None:
         try:
-            await self._carry_out(one)
+            await self._carry_out(stop)
         except Exception as error:
-            self._last.send(one.session, one.ordered, error, taken=one.taken)
+            self._last.send(stop.session, stop.ordered, error, taken=stop.taken)
         finally:
-            one.over = True
+            stop.over = True
 
-    async def _carry_out(self, one: MotorStop) -> None:
+    async def _carry_out(self, stop: MotorStop) -> None:
         error = "it did not answer"
         for _ in range(STOP_TRIES):
             try:
-                text = await one.carry_out()
+                text = await stop.carry_out()
             except LineLost:
                 raise
             except RequestRefused as refused:
@@ -278,4 +278,4 @@ class Stopper:
                 if text is None:
                     return
                 error = text
-        self._say(one.session, Phase.FAILED, not_stopped(error), one.ordered)
+        self._say(stop.session, Phase.FAILED, not_stopped(error), stop.ordered)

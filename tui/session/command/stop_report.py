@@ -63,12 +63,12 @@ class StopSummary(NamedTuple):
     @property
     def ended(self) -> bool:
         """True if nothing more is awaited."""
-        return all(one.phase in OVER for one in self.reports)
+        return all(report.phase in OVER for report in self.reports)
 
     @property
     def failed(self) -> bool:
         """True if some drive could not be stopped from here."""
-        return any(one.phase in NOT_STOPPING for one in self.reports)
+        return any(report.phase in NOT_STOPPING for report in self.reports)
 
     @property
     def head(self) -> str:
@@ -81,5 +81,7 @@ class StopSummary(NamedTuple):
     @property
     def text(self) -> str:
         """Each drive's part."""
-        ordered = sorted(self.reports, key=lambda one: (one.phase not in NOT_STOPPING, one.device))
-        return " · ".join(f"{one.device}: {one.text}" for one in ordered)
+        ordered = sorted(
+            self.reports, key=lambda report: (report.phase not in NOT_STOPPING, report.device)
+        )
+        return " · ".join(f"{item.device}: {item.text}" for item in ordered)

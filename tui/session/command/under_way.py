@@ -76,13 +76,13 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
             now = time.monotonic()
             if now > direct_at:
                 direct_at = now + AGAIN_AFTER
-                hanging = [one for one in left if not one.stop.begun or now > begin_by]
+                hanging = [work for work in left if not work.stop.begun or now > begin_by]
                 carried_on(partial(_stop_directly, [o for o in hanging if o not in given], given))
-            for one in [each for each in left if each.is_lost(now > begin_by, now > send_by)]:
+            for work in [each for each in left if each.is_lost(now > begin_by, now > send_by)]:
                 error = TimeoutError("its frame was not sent in time")
-                send_last(one.stop.session, one.stop.ordered, error)
-                left.remove(one)
-            left = [one for one in left if not (one.stop.sent or one.stop.over)]
+                send_last(work.stop.session, work.stop.ordered, error)
+                left.remove(work)
+            left = [work for work in left if not (work.stop.sent or work.stop.over)]
 
     threading.Thread(target=watch, name="stops sent", daemon=True).start()
 
@@ -92,5 +92,5 @@ def _stop_directly(hanging: Sequence[UnderWay], given: list[UnderWay]) -> None:
     if hanging:
         line = hanging[0].stop.session.line
         if (voice := line.facts.voice) is not None:
-            voice.stop_directly(tuple(one.stop.session.device for one in hanging))
+            voice.stop_directly(tuple(work.stop.session.device for work in hanging))
             given += hanging

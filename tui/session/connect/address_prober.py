@@ -71,11 +71,11 @@ def settings_worth_a_try(first: LineSetting, *, parity: bool = True) -> list[Lin
     Without `parity`, as on a pseudo-terminal, those that differ in nothing else are one.
     """
     profiles = known_profiles()
-    links = [one.data.link for one in profiles]
+    links = [profile.data.link for profile in profiles]
     found = [first, *likely_settings(links, longest_turnaround(profiles))]
     if parity:
         return list(dict.fromkeys(found))
     alike: dict[tuple[int, int], LineSetting] = {}
-    for one in found:
-        alike.setdefault((one.baud, one.stop_bits), one)
+    for setting in found:
+        alike.setdefault((setting.baud, setting.stop_bits), setting)
     return list(alike.values())

@@ -74,7 +74,7 @@ def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
         return ""
     if not identity.candidates and _may_be(identity.reference, profile):
         return ""
-    names = {one.id: one.name for one in library.listings()}
+    names = {listing.id: listing.name for listing in library.listings()}
     family = names.get(identity.candidates[0], "") if identity.candidates else ""
     says = f"{identity.reference}, {family}" if family else identity.reference
     return f"Device {identity.device} says it is {says}: it is not {_with_article(profile.name)}."
@@ -82,12 +82,12 @@ def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
 
 def _may_be(reference: str, profile: Profile) -> bool:
     """Return True if a reference that no profile claims may still be of a family."""
-    prefixes = [one.upper() for one in profile.data.identification.reference_prefixes]
+    prefixes = [prefix.upper() for prefix in profile.data.identification.reference_prefixes]
     if not prefixes:
         return True
     # what all kinds of a family begin with; a reference may be cut short
     stem, reported = min(prefixes), reference.upper()
-    while not all(one.startswith(stem) for one in prefixes):
+    while not all(prefix.startswith(stem) for prefix in prefixes):
         stem = stem[:-1]
     return reported.startswith(stem) or stem.startswith(reported)
 

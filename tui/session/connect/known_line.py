@@ -136,7 +136,10 @@ class KnownLine:
             adapter=name.port.adapter or before.adapter,
             drives=dict(sorted({**before.drives, **drives}.items())),
         )
-        lines = {name.key: mark, **{k: one for k, one in memory.lines.items() if k != name.key}}
+        lines = {
+            name.key: mark,
+            **{k: line_mark for k, line_mark in memory.lines.items() if k != name.key},
+        }
         names = dict(memory.names)
         if name.typed:
             names = {name.typed: name.key, **{k: v for k, v in names.items() if k != name.typed}}

@@ -134,7 +134,7 @@ def load_memory() -> LinesMemory:
         return LinesMemory()
     lines = {key: _line_mark(name_text) for key, name_text in _table(stored, "lines").items()}
     names = {typed: key for typed, key in _table(stored, "names").items() if isinstance(key, str)}
-    return LinesMemory({key: one for key, one in lines.items() if one is not None}, names)
+    return LinesMemory({key: mark for key, mark in lines.items() if mark is not None}, names)
 
 
 def keep_memory(memory: LinesMemory) -> None:
@@ -166,7 +166,7 @@ def _line_mark(name_text: object) -> LineMark | None:
     drives = {}
     for device, mark in _table(name_text, "drives").items():
         if device.isdecimal() and isinstance(mark, dict):
-            texts = {one.name: mark.get(one.name, "") for one in fields(DriveMark)}
+            texts = {field.name: mark.get(field.name, "") for field in fields(DriveMark)}
             if all(isinstance(text, str) for text in texts.values()):
                 drives[int(device)] = DriveMark(**texts)
     return LineMark(adapter if isinstance(adapter, str) else "", drives)

@@ -126,9 +126,9 @@ def profile_named(line_key_of: str, device: int) -> str | None:
     """The profile that the settings give the drive at an address of a line, by the line's key."""
     from .line_key import line_key
 
-    for one in named_lines().values():
-        if one.profile and one.device in (None, device) and line_key(one.line) == line_key_of:
-            return one.profile
+    for line in named_lines().values():
+        if line.profile and line.device in (None, device) and line_key(line.line) == line_key_of:
+            return line.profile
     return None
 
 
@@ -137,9 +137,9 @@ def profiles_of_line(line_key_of: str) -> dict[int, str]:
     from .line_key import line_key
 
     return {
-        one.device: one.profile
-        for one in named_lines().values()
-        if one.profile and one.device is not None and line_key(one.line) == line_key_of
+        line.device: line.profile
+        for line in named_lines().values()
+        if line.profile and line.device is not None and line_key(line.line) == line_key_of
     }
 
 

@@ -43,7 +43,7 @@ class Overheard:
     def text(self) -> str:
         """The other master in a sentence: its requests by address; empty if there is none."""
         if self.requests:
-            requested = dict.fromkeys(one.device for one in self.requests)
+            requested = dict.fromkeys(request.device for request in self.requests)
             reported = "; ".join(f"address {device}: {self._of(device)}" for device in requested)
             return f"Another master polls drives on this line. {reported[0].upper()}{reported[1:]}."
         if self.answered:
@@ -59,7 +59,9 @@ class Overheard:
 
     def _of(self, device: int) -> str:
         """Return the requests to one address."""
-        texts = list(dict.fromkeys(one.text for one in self.requests if one.device == device))
+        texts = list(
+            dict.fromkeys(request.text for request in self.requests if request.device == device)
+        )
         more = len(texts) - TOLD_OF_EACH
         return ", ".join(texts[:TOLD_OF_EACH]) + (f" and {more} more" if more > 0 else "")
 

@@ -24,10 +24,10 @@ def prepared_stop(
     Empty if there is no such word; an error of its own must not keep a drive from being opened.
     """
     try:
-        words = blind_stops([stop_profile_of(one) for one in families])
+        words = blind_stops([stop_profile_of(family) for family in families])
         limits = limits_of(families[0])
         return tuple(
-            prepared_write(line.link, limits, device, one.address, [one.word]) for one in words
+            prepared_write(line.link, limits, device, word.address, [word.word]) for word in words
         )
     except Exception:
         log.exception("no stop is prepared for device %s", device)

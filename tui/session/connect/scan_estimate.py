@@ -21,12 +21,12 @@ class ScanEstimate:
 
     def seconds(self, settings: Iterable[LineSetting]) -> float:
         """A search at these settings."""
-        return sum(self.each.get(one, 0.0) for one in settings) * self.addresses
+        return sum(self.each.get(setting, 0.0) for setting in settings) * self.addresses
 
     def before_slow(self, settings: Sequence[LineSetting], ends: str) -> str:
         """Return the message before the slow settings are tried; `ends` is the key that ends
         them."""
-        bauds = [f"{baud}" for baud in dict.fromkeys(one.baud for one in settings)]
+        bauds = [f"{baud}" for baud in dict.fromkeys(setting.baud for setting in settings)]
         can = families_at(known_profiles(), settings)
         return (
             f"Left are {names_text(sorted(bauds, key=int))} baud: {self.seconds(settings):.0f} s"
@@ -45,7 +45,7 @@ def scan_estimate(
     """Return the times at settings of a line; reads files. `wait` is that of a network, in
     seconds."""
     each = {}
-    for one in settings:
-        there = replace(link, baud=one.baud, format=one.format)
-        each[one] = probers_of(there, wait, patient=patient).cost
+    for setting in settings:
+        there = replace(link, baud=setting.baud, format=setting.format)
+        each[setting] = probers_of(there, wait, patient=patient).cost
     return ScanEstimate(each, addresses)

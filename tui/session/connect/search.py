@@ -128,7 +128,7 @@ class Search:
                 longest = line.timing.patient_timeout
                 slow = replace(how, patience=longest)
                 await self._round(line, slow, found, late, Priority.PATIENT, longest)
-            if not self._once and (rest := [one for one in silent if one not in late]):
+            if not self._once and (rest := [number for number in silent if number not in late]):
                 within = None if how.within is None else max(SECOND_WAIT, how.within)
                 await first(rest, Priority.PATIENT, within)
             self.ended = "done"

@@ -197,9 +197,9 @@ def device_since(now: DeviceCounters, before: DeviceCounters) -> DeviceCounters:
     if now.requests < before.requests or now.replies < before.replies:
         return now
     plain = {
-        one.name: getattr(now, one.name) - getattr(before, one.name)
-        for one in fields(DeviceCounters)
-        if one.name not in ("exceptions", "turnarounds", "minute")
+        field.name: getattr(now, field.name) - getattr(before, field.name)
+        for field in fields(DeviceCounters)
+        if field.name not in ("exceptions", "turnarounds", "minute")
     }
     bars = tuple(a - b for a, b in zip(now.turnarounds, before.turnarounds, strict=True))
     refused = _grown(now.exceptions, before.exceptions)

@@ -22,7 +22,7 @@ def stray_difference(
     """
     if count <= 0:
         return []
-    frames = [one for one in frames if one.time > since]
+    frames = [frame for frame in frames if frame.time > since]
     found = measure_of(frames, device, tcp=tcp)
     kinds = (
         (found.duplicated, "copies of replies"),

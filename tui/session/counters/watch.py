@@ -74,17 +74,19 @@ class CountersNow:
     def compared(self) -> Comparison | None:
         """The counters of the drive that count the frames of this line; None where none does."""
         return dict(self.drive).get(THIS_PORT) or next(
-            (one for _, one in self.drive if one.counts_this_line), None
+            (comparison for _, comparison in self.drive if comparison.counts_this_line), None
         )
 
     @property
     def agreeing(self) -> str:
         """That nothing differs, in a sentence."""
-        one = self.compared
-        if one is None:
+        comparison = self.compared
+        if comparison is None:
             rest = "" if self.drive else " The drive reports no counters of its own."
             return f"Frames sent: {self.since.requests}; none was lost.{rest}"
-        return f"Frames the drive counted: {one.frames}, all sent by this program and answered."
+        return (
+            f"Frames the drive counted: {comparison.frames}, all sent by this program and answered."
+        )
 
 
 @dataclass(slots=True, eq=False)
@@ -134,7 +136,10 @@ class CounterWatch:
         self._line = self.session.line.counters
         self._since = last_time(self.session.line.trace)
         self._begun = self.session.clock.monotonic()
-        self._drive = {name: Comparison(one.last, one.last) for name, one in self._drive.items()}
+        self._drive = {
+            name: Comparison(comparison.last, comparison.last)
+            for name, comparison in self._drive.items()
+        }
 
     async def reset_drive(self, journal: Journal) -> None:
         """Set the drive's counters to 0 (sub-function 0A). Raises the line's errors.
@@ -225,7 +230,9 @@ class CounterWatch:
             await line.diagnose(device, ECHO, ECHOED)
             return
         profile = self.session.profile
-        codes = watched_codes(profile) or [one.parameter for one in profile.data.monitoring.values]
+        codes = watched_codes(profile) or [
+            value.parameter for value in profile.data.monitoring.values
+        ]
         word = profile[codes[0]]
         await line.read(
             device, word.address, function=word.function, priority=Priority.OPERATOR_READ
@@ -271,9 +278,9 @@ def _reset_entry(session: DriveSession, answer: str) -> Entry:
 def _differences_since(mine: Comparison | None, since: DeviceCounters) -> tuple[Difference, ...]:
     """By the counters of this port; by ours alone where there are none."""
     reported = differences(mine) if mine is not None else []
-    if any(one.kind == "not-answered" for one in reported):
+    if any(difference.kind == "not-answered" for difference in reported):
         return tuple(reported)
     more = own_differences(since)
     if mine is not None:
-        more = [one for one in more if one.kind == "damaged-here"]
+        more = [difference for difference in more if difference.kind == "damaged-here"]
     return (*reported, *more)

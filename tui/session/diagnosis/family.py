@@ -117,9 +117,9 @@ def _polarity(profile: Profile) -> str:
         if rule.subject.casefold().startswith(NAMED):
             return rule.rule
     named = [
-        f"{one.signal} is {', '.join(one.names.values())}"
-        for one in data.wiring.signals
-        if one.signal.casefold() in USED_PINS[:2]
+        f"{signal.signal} is {', '.join(signal.names.values())}"
+        for signal in data.wiring.signals
+        if signal.signal.casefold() in USED_PINS[:2]
     ]
     if named:
         return f"{'; '.join(named)}. {BOTH_WAYS}"

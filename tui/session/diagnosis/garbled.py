@@ -38,7 +38,7 @@ def other_formats(sight: DiagnosticEvidence) -> tuple[str, ...]:
     if not isinstance(sight.link, SerialLink):
         return ()
     known = sight.profile.data.link.formats if sight.profile is not None else ()
-    return tuple(one for one in known or USUAL_FORMATS if one != sight.link.format)
+    return tuple(format_ for format_ in known or USUAL_FORMATS if format_ != sight.link.format)
 
 
 def likely_baud(sight: DiagnosticEvidence) -> int | None:

@@ -57,7 +57,9 @@ def _answers_tcp(data: bytes, unit: int) -> bool:
 
 def gateway_codes(profile: Profile | None) -> frozenset[int]:
     """Exceptions of a gateway that did not reach the drive, unless the family has them too."""
-    own = {one.code for one in profile.data.exceptions} if profile is not None else set()
+    own = (
+        {exception.code for exception in profile.data.exceptions} if profile is not None else set()
+    )
     return GATEWAY_REFUSALS - own
 
 
@@ -70,7 +72,9 @@ async def probed(line: ModbusLine, device: int, *, beside: bool = True) -> Works
     """
     link = line.link
     assert isinstance(link, TcpLink | RtuTcpLink)
-    others = {unit for unit, one in line.counters.devices.items() if one.replies}
+    others = {
+        unit for unit, device_counters in line.counters.devices.items() if device_counters.replies
+    }
     if others - {device, ANY_UNIT}:
         return None  # the gateway passes units on
     if isinstance(link, TcpLink) and link.unit is None and await _reads(line, ANY_UNIT):

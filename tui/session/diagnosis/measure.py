@@ -113,7 +113,7 @@ def measure_of(
     `unreached` are the exceptions by which a gateway says that it did not reach the drive.
     """
     frames = list(frames)
-    polled = {_body(one, tcp)[:1] for one in frames if one.direction == "out"}
+    polled = {_body(item, tcp)[:1] for item in frames if item.direction == "out"}
     found, exchanges, ours = Measure(seconds=seconds), list[_Exchange](), False
     for frame in frames:
         body = _body(frame, tcp)
@@ -133,9 +133,9 @@ def measure_of(
         elif body[:1] not in polled:
             found.foreign += 1
             exchanges[-1].sick = True
-    for one in exchanges:
-        _end(found, one)
-    delays = [one.delay for one in exchanges if one.replies]
+    for exchange in exchanges:
+        _end(found, exchange)
+    delays = [exchange.delay for exchange in exchanges if exchange.replies]
     if delays and median(delays) >= SLOW_REPLIES:
         # a surplus reply answers an earlier request there
         found.late += found.lost + found.duplicated + found.second
@@ -143,14 +143,14 @@ def measure_of(
     return found
 
 
-def _end(found: Measure, one: _Exchange) -> None:
+def _end(found: Measure, exchange: _Exchange) -> None:
     """Count an exchange that is over."""
     found.requested += 1
-    found.answered += bool(one.replies)
-    found.lost += not one.replies and not one.sick
-    if one.older and (one.replies or one.damaged or one.older == "second"):
-        setattr(found, one.older, found.count(one.older) + 1)
-    elif one.older:
+    found.answered += bool(exchange.replies)
+    found.lost += not exchange.replies and not exchange.sick
+    if exchange.older and (exchange.replies or exchange.damaged or exchange.older == "second"):
+        setattr(found, exchange.older, found.count(exchange.older) + 1)
+    elif exchange.older:
         found.behind += 1
 
 
@@ -187,13 +187,17 @@ def _whole(found: Measure, recent: Sequence[_Exchange], body: bytes, frame: Fram
         before.sick = True
         return
     if now.transaction:
-        recent = [one for one in recent if one.transaction == frame.data[:TRANSACTION_BYTES]]
-    fits = [one for one in reversed(recent) if may_answer(body, one.request)]
-    missing = [one for one in fits if not one.replies and not one.sick]
+        recent = [
+            exchange
+            for exchange in recent
+            if exchange.transaction == frame.data[:TRANSACTION_BYTES]
+        ]
+    fits = [exchange for exchange in reversed(recent) if may_answer(body, exchange.request)]
+    missing = [fit for fit in fits if not fit.replies and not fit.sick]
     if missing:
         found.late += 1
         missing[0].sick = True
-    elif any(body in one.replies for one in fits):
+    elif any(body in fit.replies for fit in fits):
         found.duplicated += 1
     elif fits:
         found.second += 1

@@ -88,8 +88,8 @@ class ShortReads:
                 break
             if number == clean and _sick(self.line) == sick and not self.swapped[0]:
                 break
-            free = [one for one in shapes if now - one.missed >= held]
-            shape = min(free, key=lambda one: one.times) if free else _longest_ago(shapes)
+            free = [item for item in shapes if now - item.missed >= held]
+            shape = min(free, key=lambda entry: entry.times) if free else _longest_ago(shapes)
             ask = shape.asks[shape.times % len(shape.asks)]
             shape.times += 1
             try:
@@ -122,22 +122,22 @@ class ShortReads:
 
     def take_frames(self) -> None:
         """Take the frames since the last look."""
-        new = [one for one in self.line.trace if one.time > self.last]
+        new = [frame for frame in self.line.trace if frame.time > self.last]
         if new:
             self.frames += new
             self.last = new[-1].time
 
     def note(self, parameters: Sequence[Parameter], words: Sequence[int]) -> None:
         """Keep values that were read."""
-        for one, raw in zip(parameters, words, strict=True):
-            self.values.setdefault(one.code, (one, []))[1].append(raw)
+        for parameter, raw in zip(parameters, words, strict=True):
+            self.values.setdefault(parameter.code, (parameter, []))[1].append(raw)
 
     @property
     def swapped(self) -> tuple[int, int]:
         """Settings that make sense with swapped bytes alone, and as they are alone."""
         swapped = straight = 0
-        for one, raws in self.values.values():
-            low, high = raw_range(one)
+        for parameter, raws in self.values.values():
+            low, high = raw_range(parameter)
             raw = raws[-1]
             fits = low <= raw <= high
             fits_turned = low <= ((raw & 0xFF) << 8 | raw >> 8) <= high
@@ -172,7 +172,7 @@ def _delays(frames: Sequence[Frame], device: int) -> Iterator[float]:
 
 
 def _longest_ago(shapes: Sequence[_Shape]) -> _Shape:
-    return min(shapes, key=lambda one: one.missed)
+    return min(shapes, key=lambda shape: shape.missed)
 
 
 def _shapes(reads: ShortReads) -> list[_Shape]:
@@ -202,7 +202,7 @@ def _shapes(reads: ShortReads) -> list[_Shape]:
     if profile is None:
         return [_Shape([identify]), _Shape([status])]
     runs = _runs(profile)
-    shapes = [_Shape([read(one) for one in found]) for found in runs if found]
+    shapes = [_Shape([read(pair) for pair in found]) for found in runs if found]
     diagnose = profile.function(DIAGNOSE)
     if diagnose is not None and ECHO in diagnose.subfunctions:
         shapes.append(_Shape([echo]))
@@ -214,10 +214,12 @@ def _shapes(reads: ShortReads) -> list[_Shape]:
 def _runs(profile: Profile) -> list[list[tuple[Parameter, ...]]]:
     """Small settings at adjacent addresses, by the length of the runs, from 1 on."""
     small = {
-        one.address: one
-        for one in profile.parameters
-        if "w" in one.access and word_count(one) == 1 and one.function == REGISTERS
-        and raw_range(one)[0] >= 0 and raw_range(one)[1] <= SMALL
+        parameter.address: parameter
+        for parameter in profile.parameters
+        if "w" in parameter.access
+        and word_count(parameter) == 1
+        and parameter.function == REGISTERS
+        and raw_range(parameter)[0] >= 0 and raw_range(parameter)[1] <= SMALL
     }  # fmt: skip
     reading = profile.function(REGISTERS)
     most = (reading.max_read if reading is not None else None) or 1
@@ -225,6 +227,6 @@ def _runs(profile: Profile) -> list[list[tuple[Parameter, ...]]]:
     found = []
     for length in range(1, longest + 1):
         runs = (tuple(small.get(at + step) for step in range(length)) for at in small)
-        whole = [tuple(one for one in run if one is not None) for run in runs]
+        whole = [tuple(parameter for parameter in run if parameter is not None) for run in runs]
         found.append([run for run in whole if len(run) == length][:CHECKED])
     return found

@@ -71,9 +71,9 @@ def says_sick(kind: SickFrames, sight: DiagnosticEvidence) -> str:
     measure = _measure(sight)
     count = measure.count(kind.kind)
     beside = [
-        f"{measure.count(one.kind)} {one.kind}"
-        for one in SICK_FRAMES
-        if one is not kind and measure.count(one.kind)
+        f"{measure.count(frame.kind)} {frame.kind}"
+        for frame in SICK_FRAMES
+        if frame is not kind and measure.count(frame.kind)
     ]
     more = f"; also {', '.join(beside)}" if beside else ""
     return f"In {measure.seconds:.1f} s, {count} of {measure.requested} {kind.text}{more}."

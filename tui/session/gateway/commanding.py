@@ -120,7 +120,7 @@ class GatewayCommanding:
             left = [device for device, by in self._by.items() if by == client]
             for clients in self._commanded.values():
                 clients.discard(client)
-            for barred in [one for one in self._barred if one[1] == client]:
+            for barred in [pair for pair in self._barred if pair[1] == client]:
                 del self._barred[barred]
         for device in left:
             self._release(device)

@@ -109,9 +109,9 @@ class GatewayDrives:
         """A nameless drive by one of its families, for words that only stop each of them."""
         profiles = [library.load(id) for id in self._candidates.get(device, ())]
         stops = all(
-            one.kind is WordKind.STOP
+            word.kind is WordKind.STOP
             for profile in profiles
-            for one in classify_words(profile, words, {})
+            for word in classify_words(profile, words, {})
         )
         return DriveSession(self.line, device, profiles[0]) if profiles and stops else None
 
@@ -146,12 +146,12 @@ class GatewayDrives:
         self, session: DriveSession, code: str, priority: Priority, max_age: float
     ) -> int:
         """One word, also from a read by any program up to `max_age` seconds ago. Raises errors."""
-        one = session.profile.find(code)
+        parameter = session.profile.find(code)
         reply = await self.line.read(
-            session.device, one.address, word_count(one),
-            priority=priority, function=one.function, max_age=max_age,
+            session.device, parameter.address, word_count(parameter),
+            priority=priority, function=parameter.function, max_age=max_age,
         )  # fmt: skip
-        return from_words(one, reply.words)
+        return from_words(parameter, reply.words)
 
     def keep_chart_known(self, device: int) -> None:
         """Read what distinguishes a stop from a run command now and then, while a client asks.

@@ -42,9 +42,9 @@ class PendingWrites:
     def stops_by(self, write: PendingWrite) -> None:
         """It has just stopped its drive: what its own client sent behind it means that stop."""
         at = self._pending.index(write)
-        for one in self._pending[at:]:
-            if one.client is write.client and one.device == write.device:
-                one.stops = next_count(one.stops)
+        for pending_write in self._pending[at:]:
+            if pending_write.client is write.client and pending_write.device == write.device:
+                pending_write.stops = next_count(pending_write.stops)
 
     def void(self, write: PendingWrite) -> bool:
         """Return True if its drive was stopped since it came."""
@@ -55,7 +55,7 @@ class PendingWrites:
         drive."""
         before = self._pending[: self._pending.index(write)]
         return any(
-            one.client is write.client and one.device == write.device
-            and not one.words.keys().isdisjoint(registers)
-            for one in before
+            pending_write.client is write.client and pending_write.device == write.device
+            and not pending_write.words.keys().isdisjoint(registers)
+            for pending_write in before
         )  # fmt: skip

@@ -59,13 +59,13 @@ class GatewayLine:
         """Sort the words of a client by kind, by a read if necessary."""
         found = classify_words(session.profile, words, {})
         codes = tuple(stop_deciding_codes(session.profile, words))
-        if not codes or not any(one.kind is WordKind.COMMAND for one in found):
+        if not codes or not any(word.kind is WordKind.COMMAND for word in found):
             return found
         hurry = self.turns.may_hurry(host)
         read = partial(self.drives.read_deciding, session, codes, hurry=hurry)
         raws = await self.turns.deciding(host, (session.device, codes), read)
         found = classify_words(session.profile, words, raws)
-        if not any(one.kind is WordKind.STOP for one in found):
+        if not any(word.kind is WordKind.STOP for word in found):
             self.turns.note_in_vain(host)
         return found
 

@@ -50,8 +50,8 @@ def as_written(codes: frozenset[str]) -> frozenset[str]:
     known = defaultdict[str, set[str]](set)
     for listing in library.listings():
         with suppress(DriveError):  # a profile that cannot be read serves no drive either
-            for one in library.load(listing.id).parameters:
-                known[one.code.casefold()].add(one.code)
+            for parameter in library.load(listing.id).parameters:
+                known[parameter.code.casefold()].add(parameter.code)
     if strange := sorted(code for code in codes - {ALL} if code.casefold() not in known):
         raise RulesError(
             f"No family has a parameter {', '.join(strange)}. Name codes such as ACC,DEC, or all."

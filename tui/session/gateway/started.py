@@ -110,7 +110,7 @@ class StartedMotors:
     async def end(self) -> StopSummary | None:
         """Stop what still runs: nobody commands it any more. None where nothing does."""
         self._leave()
-        left = [one for device, one in self._sessions.items() if self._keeper.holds(device)]
+        left = [session for device, session in self._sessions.items() if self._keeper.holds(device)]
         summary = None
         if left:
             stopper = Stopper(self._line, self._journal)

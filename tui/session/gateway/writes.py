@@ -84,12 +84,12 @@ class GatewayWrite:
         if not self._may_go_first():
             await self._request.turn()
         words = await self._line.identify_apart(self._host, self._session, self._requested.words)
-        stops = [one for one in words if one.kind is WordKind.STOP]
+        stops = [word for word in words if word.kind is WordKind.STOP]
         if len(stops) == len(words):
             return await self._send(Priority.STOP)
-        for one in stops:
+        for stop in stops:
             # first of all: whatever becomes of the rest
-            await self._send_alone(one)
+            await self._send_alone(stop)
         await self._request.turn()
         await self._check(words)
         order = starts_by(self._session.profile, words)
@@ -99,14 +99,16 @@ class GatewayWrite:
         """Return True if a stop may be in it, which no write before it turns into something
         else."""
         profile = self._session.profile
-        kinds = {one.kind for one in classify_words(profile, self._requested.words, {})}
+        kinds = {word.kind for word in classify_words(profile, self._requested.words, {})}
         if WordKind.COMMAND not in kinds:
             return WordKind.STOP in kinds
         # the command before it tells the state, not what the word means
         own = {chart.command for chart in profile.data.charts}
         codes = stop_deciding_codes(profile, self._requested.words)
-        deciding = [profile.find(one) for one in codes if one not in own]
-        registers = {one.address + i for one in deciding for i in range(word_count(one))}
+        deciding = [profile.find(code) for code in codes if code not in own]
+        registers = {
+            parameter.address + i for parameter in deciding for i in range(word_count(parameter))
+        }
         return not self._line.pending.changes_before(self._write, registers)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
@@ -120,20 +122,20 @@ class GatewayWrite:
 
     async def _check(self, words: list[ExternalWord]) -> None:
         """Raise Unanswerable where the request is not allowed as a whole."""
-        self._commands = any(one.kind is WordKind.COMMAND for one in words)
+        self._commands = any(word.kind is WordKind.COMMAND for word in words)
         if why := self._voided() or self._session.byte_order.text:
             self._refuse(BUSY, why)
         drive = await self._line.drives.found(self._session.device)
         if drive is None or drive.profile.id != self._session.profile.id:
             self._refuse(BUSY, "another drive answers now")
-        if any(one.kind is WordKind.UNKNOWN for one in words):
-            lacking = [one.address for one in words if one.kind is WordKind.UNKNOWN]
+        if any(word.kind is WordKind.UNKNOWN for word in words):
+            lacking = [word.address for word in words if word.kind is WordKind.UNKNOWN]
             self._refuse(ILLEGAL_FUNCTION, f"nothing is known to be written at {lacking}")
         if self._commands and not self._rules.commands:
             self._refuse(ILLEGAL_FUNCTION, "commands are not allowed: --allow-commands")
-        settings = [one for one in words if one.kind is WordKind.SETTING]
-        for one in settings:
-            why = setting_refusal(self._session.profile, one, self._rules.writes)
+        settings = [word for word in words if word.kind is WordKind.SETTING]
+        for setting in settings:
+            why = setting_refusal(self._session.profile, setting, self._rules.writes)
             if why:
                 self._refuse(ILLEGAL_FUNCTION, why)
         await self._check_values(settings)
@@ -145,12 +147,14 @@ class GatewayWrite:
     async def _check_values(self, settings: list[ExternalWord]) -> None:
         profile = self._session.profile
         parameters = parameters_at(settings)
-        for one in parameters:
-            if why := value_refusal(profile, one, self._requested.words):
+        for parameter in parameters:
+            if why := value_refusal(profile, parameter, self._requested.words):
                 self._refuse(ILLEGAL_VALUE, why)
         # what the journal tells besides: the value before, and its unit
-        codes = [code for one in parameters for code in (one.code, *depends_on(one))]
-        still = any(needs_standstill(profile, one) for one in parameters)
+        codes = [
+            code for parameter in parameters for code in (parameter.code, *depends_on(parameter))
+        ]
+        still = any(needs_standstill(profile, parameter) for parameter in parameters)
         if still:
             codes += [chart.status for chart in profile.data.charts]
             codes += chart_codes(profile)
@@ -185,19 +189,19 @@ class GatewayWrite:
         self._line.commanding.stop(self._session.device, self._client)
         self._line.pending.stops_by(self._write)
 
-    async def _send_alone(self, one: ExternalWord) -> None:
+    async def _send_alone(self, item: ExternalWord) -> None:
         """Send one word that stops."""
         device = self._session.device
-        word, send = (device, one.address, one.word), partial(self._send_alone_now, one)
+        word, send = (device, item.address, item.word), partial(self._send_alone_now, item)
         await self._line.turns.stopping(self._host, word, send)
         self._line.commanding.stopped_too(device, self._client)
 
-    async def _send_alone_now(self, one: ExternalWord) -> None:
+    async def _send_alone_now(self, word: ExternalWord) -> None:
         self._stop()
         answer = ENDED_BEFORE_ANSWER
         try:
             await self._session.line.write(
-                self._session.device, one.address, [one.word], priority=Priority.STOP
+                self._session.device, word.address, [word.word], priority=Priority.STOP
             )
             answer = "ok"
             self._line.keep_resting(self._session)
@@ -205,7 +209,7 @@ class GatewayWrite:
             answer = str(error)
             raise
         finally:
-            self._keep(list(one.parameters), {}, answer, "stop")
+            self._keep(list(word.parameters), {}, answer, "stop")
 
     async def _send(self, priority: Priority) -> bytes:
         """The request as it came; its answer. A stop like it that waits may do for it."""
@@ -223,7 +227,9 @@ class GatewayWrite:
         if stops:
             self._stop()
         parameters = parameters_at(classify_words(self._session.profile, self._requested.words, {}))
-        before = {one.code: self._session.image.get(one.code) for one in parameters}
+        before = {
+            parameter.code: self._session.image.get(parameter.code) for parameter in parameters
+        }
         answer = ENDED_BEFORE_ANSWER
         try:
             pdu = await self._exchange(priority, parameters)
@@ -244,8 +250,8 @@ class GatewayWrite:
         forbidden = None if priority is Priority.STOP else self._voided
         if forbidden is not None:
             session.line.facts.leases.arm(session.device, ARMED_FOR_ONE, session.care())
-        for one in parameters:
-            session.image.doubt(one.code)
+        for parameter in parameters:
+            session.image.doubt(parameter.code)
         if requested.function == 23:
             reply = await session.line.read_write(
                 session.device, requested.read_address, requested.count, requested.address,
@@ -288,12 +294,12 @@ class GatewayWrite:
         """Put each parameter whose words were all written into the journal."""
         session, words = self._session, self._requested.words
         why = f"{what} of Modbus TCP client {self._client}"
-        for one in parameters:
-            own = [one.address + offset for offset in range(word_count(one))]
+        for parameter in parameters:
+            own = [parameter.address + offset for offset in range(word_count(parameter))]
             if any(address not in words for address in own):
                 continue
-            held = before.get(one.code)
-            old, new = held.raw if held else None, from_words(one, [words[at] for at in own])
+            held = before.get(parameter.code)
+            old, new = held.raw if held else None, from_words(parameter, [words[at] for at in own])
             self._line.journal.add(
-                parameter_entry(session, one, old=old, new=new, answer=answer, why=why)
+                parameter_entry(session, parameter, old=old, new=new, answer=answer, why=why)
             )

@@ -139,10 +139,10 @@ def _likeliest(evidence: _Evidence, known: Sequence[Profile]) -> AssumedProfile 
 
 def _score(evidence: _Evidence, profile: Profile) -> float:
     """Return how well a family fits the answers of a drive; 0 and less if it does not."""
-    functions = {one.code for one in profile.data.functions}
+    functions = {function.code for function in profile.data.functions}
     if evidence.functions - functions:
         return 0.0
-    longest = max((one.max_read or 1 for one in profile.data.functions), default=1)
+    longest = max((function.max_read or 1 for function in profile.data.functions), default=1)
     if evidence.longest > longest:
         return 0.0
     reported = _words(profile)
@@ -156,7 +156,9 @@ def _score(evidence: _Evidence, profile: Profile) -> float:
 
 def _words(profile: Profile) -> set[tuple[int, int]]:
     """Function and address of every word that a family knows, blocks included."""
-    found: set[tuple[int, int]] = {(one.function, one.address) for one in profile.parameters}
+    found: set[tuple[int, int]] = {
+        (parameter.function, parameter.address) for parameter in profile.parameters
+    }
     found |= {(p.function, p.address + 1) for p in profile.parameters if p.type.endswith("32")}
     for block in profile.data.blocks:
         found |= {(3, block.address + n) for n in range(block.max_words)}

@@ -46,13 +46,13 @@ class Hearing:
     def take(self, data: bytes, now: float) -> None:
         """Report the conclusions from the bytes read, or from a pause without bytes."""
         found = self.listener.take(data, now) if data else self.listener.idle(now)
-        for one in found:
-            self._report(one)
+        for exchange in found:
+            self._report(exchange)
 
     def end(self, now: float) -> None:
         """Report open requests."""
-        for one in self.listener.end(now):
-            self._report(one)
+        for exchange in self.listener.end(now):
+            self._report(exchange)
 
     def summary(self, now: float) -> ListeningSummary:
         """Return the present result."""

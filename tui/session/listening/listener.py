@@ -70,12 +70,14 @@ class LineListener:
     def idle(self, now: float) -> list[ToldExchange]:
         """No byte came for a pause: what ends with it, and what is not answered any more."""
         found = self._report(self._splitter.pause())
-        return found + [self._tell(one) for one in self._pairing.wait(now)]
+        return found + [self._tell(exchange) for exchange in self._pairing.wait(now)]
 
     def end(self, now: float) -> list[ToldExchange]:
         """Nothing more is heard: a request that waits for its answer since long has none."""
         found = self._report(self._splitter.pause())
-        return found + [self._tell(one) for one in self._pairing.wait(now, LONG_FOR_AN_ANSWER)]
+        return found + [
+            self._tell(exchange) for exchange in self._pairing.wait(now, LONG_FOR_AN_ANSWER)
+        ]
 
     def _report(self, frames: Iterable[HeardFrame]) -> list[ToldExchange]:
         found = []
@@ -83,7 +85,7 @@ class LineListener:
             self.tally.take_frame(frame, self.silence if self.character else 0.0)
             exchanges, request = self._pairing.take(frame)
             self._heard(frame, request)
-            found += [self._tell(one) for one in exchanges]
+            found += [self._tell(exchange) for exchange in exchanges]
         return found
 
     def _tell(self, exchange: HeardExchange) -> ToldExchange:

@@ -60,9 +60,9 @@ def summary_of(listener: LineListener, now: float, timing: WireTiming) -> Listen
     seconds = max(0.0, now - tally.begun)
     busy = tally.bytes * listener.character
     drives = tuple(
-        _drive(one, listener.families, now, timing)
-        for _, one in sorted(tally.drives.items())
-        if one.requests or one.answers
+        _drive(drive_tally, listener.families, now, timing)
+        for _, drive_tally in sorted(tally.drives.items())
+        if drive_tally.requests or drive_tally.answers
     )
     load = min(1.0, busy / seconds) if listener.character and seconds else None
     return ListeningSummary(seconds, tally, load, drives, bool(listener.character))
@@ -148,8 +148,8 @@ def _pace_text(pace: float) -> str:
 
 def _commanded_text(drive: DriveSummary) -> str:
     writes = drive.tally.writes
-    commands = {code: one for code, one in writes.items() if one.commands}
-    others = {code: one for code, one in writes.items() if not one.commands}
+    commands = {code: tally for code, tally in writes.items() if tally.commands}
+    others = {code: tally for code, tally in writes.items() if not tally.commands}
     parts = []
     if commands:
         parts.append(f"commanded by the master: {_writes_text(commands)}")
@@ -160,8 +160,8 @@ def _commanded_text(drive: DriveSummary) -> str:
 
 def _writes_text(writes: dict[str, WriteTally]) -> str:
     shown = [
-        f"{code} {one.text} {'once' if one.every is None else f'every {one.every:.2f} s'}"
-        for code, one in list(writes.items())[:CODES_SHOWN]
+        f"{code} {tally.text} {'once' if tally.every is None else f'every {tally.every:.2f} s'}"
+        for code, tally in list(writes.items())[:CODES_SHOWN]
     ]
     return _listed(shown, len(writes))
 
@@ -201,16 +201,16 @@ def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str
 
 def exception_meaning(code: int, profile: Profile | None) -> str:
     """Return the meaning of a code in this family, else by the standard."""
-    for one in profile.data.exceptions if profile is not None else ():
-        if one.code == code:
-            return one.meaning
+    for exception in profile.data.exceptions if profile is not None else ():
+        if exception.code == code:
+            return exception.meaning
     return STANDARD_EXCEPTIONS.get(code, "its meaning is not known")
 
 
 def shorter_text(shorter: ShorterPlan) -> str:
     """Return a shorter read for a master."""
     requests = shorter.plan.requests
-    reads = "; ".join(_request_text(one) for one in requests[:CODES_SHOWN])
+    reads = "; ".join(_request_text(request) for request in requests[:CODES_SHOWN])
     more = len(requests) - CODES_SHOWN
     return (
         f"its cycle reads {_listed(shorter.codes[:CODES_SHOWN], len(shorter.codes))} in"

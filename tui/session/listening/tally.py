@@ -93,7 +93,7 @@ class DriveTally:
     @property
     def commanded(self) -> bool:
         """True if commands or references were written to it."""
-        return any(one.commands for one in self.writes.values())
+        return any(write.commands for write in self.writes.values())
 
     @property
     def answered(self) -> int:

@@ -28,17 +28,17 @@ def requested_names(reported: ToldExchange) -> list[str]:
 
 def exchange_text(reported: ToldExchange, families: Families) -> str:
     """Device, function, and the values or the result; control characters as signs."""
-    one = reported.exchange
-    head = f"{one.device or 'all':>3} {function_name(one.function):<{FUNCTION_WIDTH}}"
+    exchange = reported.exchange
+    head = f"{exchange.device or 'all':>3} {function_name(exchange.function):<{FUNCTION_WIDTH}}"
     return plain(f"{head} {_what(reported, families)}".rstrip())
 
 
 def _what(reported: ToldExchange, families: Families) -> str:
-    one = reported.exchange
-    match one.answer:
+    exchange = reported.exchange
+    match exchange.answer:
         case "ok" | "broadcast":
-            if one.function == WHO:
-                return _identity_text(one.device, families)
+            if exchange.function == WHO:
+                return _identity_text(exchange.device, families)
             return " · ".join(map(_value_text, reported.values))
         case "again":
             return "a second answer to the same request: two devices at one address?"
@@ -48,10 +48,11 @@ def _what(reported: ToldExchange, families: Families) -> str:
 
 
 def _trouble(reported: ToldExchange) -> str:
-    one = reported.exchange
-    if one.exception is not None:
-        return f"exception {one.exception}, {exception_meaning(one.exception, reported.profile)}"
-    return "damaged answer" if one.answer == "damaged" else "no answer"
+    exchange = reported.exchange
+    if exchange.exception is not None:
+        meaning = exception_meaning(exchange.exception, reported.profile)
+        return f"exception {exchange.exception}, {meaning}"
+    return "damaged answer" if exchange.answer == "damaged" else "no answer"
 
 
 def _value_text(value: HeardValue) -> str:

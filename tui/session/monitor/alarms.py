@@ -35,7 +35,9 @@ class FaultOnsets:
         onset = self.by_device.get(device)
         if state.kind != "fault":
             self._free |= {device}
-            self.by_device = {d: one for d, one in self.by_device.items() if d != device}
+            self.by_device = {
+                d: fault_onset for d, fault_onset in self.by_device.items() if d != device
+            }
             return
         code = state.fault.code if state.fault else ""
         if onset is not None and (onset.code == code or not code):

@@ -39,15 +39,18 @@ class LineHealth:
 
     def look(self, counted: LineCounters) -> list[tuple[str, str]]:
         """Judge by these counts; returns new messages, each after the kind of its event."""
-        line, drives = counted.minute, {d: one.minute for d, one in counted.devices.items()}
-        before = {one.kind for one in self.troubles}
+        line, drives = (
+            counted.minute,
+            {d: counters.minute for d, counters in counted.devices.items()},
+        )
+        before = {trouble.kind for trouble in self.troubles}
         judged: list[tuple[int | None, LastMinute]] = [(None, line), *drives.items()]
         poor = (of for of, minute in judged if _is_poor(minute, of in self._poor))
         self._poor = frozenset(poor)
         self.troubles = tuple(self._found(line, drives, before))
         if before and not self.troubles and line.share is not None:
             return [("told", HEALTHY_AGAIN.format(percent(line.share).strip()))]
-        return [("alarm", one.text) for one in self.troubles if one.kind not in before]
+        return [("alarm", trouble.text) for trouble in self.troubles if trouble.kind not in before]
 
     def forget(self) -> None:
         """Judge again: the line is lost."""
@@ -82,12 +85,12 @@ def _few_good(
     line: LastMinute, drives: dict[int, LastMinute], poor: frozenset[int | None]
 ) -> LineTrouble:
     """The line has few good replies, or the worst of its drives alone."""
-    shares = {device: one.share for device, one in drives.items() if one.share is not None}
+    shares = {device: minute.share for device, minute in drives.items() if minute.share is not None}
     if None in poor:
         # by what it missed: of a few replies, one lost is much
-        worst = max(shares, key=lambda one: drives[one].replies - drives[one].good, default=0)
+        worst = max(shares, key=lambda item: drives[item].replies - drives[item].good, default=0)
     else:
-        worst = min((one for one in poor if one), key=lambda one: shares[one])
+        worst = min((number for number in poor if number), key=lambda item: shares[item])
     choose = f"Choose drive {worst} on Line and press N for the cause."
     if None not in poor:
         share = percent(shares[worst]).strip()

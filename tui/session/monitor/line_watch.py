@@ -242,7 +242,9 @@ class LineWatch:
             codes += [code for code in reported if profile[code].access == "r"]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
             # settings are read with the timeout: another channel is set up at rest only
-            settings = {c: one for c in reported if (one := kept.session.image.get(c)) is not None}
+            settings = {
+                c: reading for c in reported if (reading := kept.session.image.get(c)) is not None
+            }
             state = drive_state(profile, settings | readings)
             self.onsets.note(device, state, kept.session.clock.wall())
         except LineError as fault:

@@ -100,7 +100,9 @@ class Monitor:
         self._listeners = (*self._listeners, listener)
 
         def leave() -> None:
-            self._listeners = tuple(one for one in self._listeners if one is not listener)
+            self._listeners = tuple(
+                function for function in self._listeners if function is not listener
+            )
 
         return leave
 
@@ -277,7 +279,7 @@ class Monitor:
             code: reading.aged(now, stale_after(span, often=code in rates.fast))
             for code, reading in readings.items()
         }
-        bad = [one.quality is Quality.BAD for one in aged.values()]
+        bad = [item.quality is Quality.BAD for item in aged.values()]
         snapshot = Snapshot(
             cycle=cycle,
             time=now,

@@ -84,7 +84,7 @@ class SteadyCycles:
         """When the present cycle ended: with its last reply, if that was read there (monotonic)."""
         if self.came is None:
             return self._clock.monotonic()
-        times = (one.time for one in readings)
+        times = (reading.time for reading in readings)
         return max((self._clock.line_time(self.came.ended), *times))
 
     async def next(self, plan: SteadyPlan, due: Rotation, at: float) -> bool:
@@ -116,7 +116,7 @@ class SteadyCycles:
         if same and subscription is not None and not subscription.ended:
             return
         self.end()
-        fits = plan.period <= LONGEST_STEADY and all(0 < len(one) <= MOST_READS for one in reads)
+        fits = plan.period <= LONGEST_STEADY and all(0 < len(read) <= MOST_READS for read in reads)
         self._unfit = not fits
         if not fits:
             return

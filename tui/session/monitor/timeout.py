@@ -54,7 +54,8 @@ def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
 def names_of(sessions: Sequence[DriveSession]) -> str:
     """Drives of one family as a person calls them: by device, and the family."""
     word = "Device" if len(sessions) == 1 else "Devices"
-    return f"{word} {', '.join(str(one.device) for one in sessions)}, {sessions[0].profile.name}"
+    devices = ", ".join(str(session.device) for session in sessions)
+    return f"{word} {devices}, {sessions[0].profile.name}"
 
 
 async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str] = ()) -> Timeout:
@@ -68,14 +69,16 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
         return Timeout(known=True)
     readings = await timeouts_of_ports(reader, rules, priority)
     found = await reader.read([*_related_words(session, rules), *besides], priority=priority)
-    reported = [one for one in readings if one.raw is not None]
-    running = [(timeout_seconds(one, rules.off), one.parameter.code) for one in reported]
+    reported = [reading for reading in readings if reading.raw is not None]
+    running = [
+        (timeout_seconds(reading, rules.off), reading.parameter.code) for reading in reported
+    ]
     shortest = min(((s, code) for s, code in running if s is not None), default=None)
     if shortest is None:
         return Timeout(known=bool(reported))
     raw = found[rules.reaction].raw if rules.reaction else None
-    reaction = next((one for one in rules.reactions if one.raw == raw), None)
-    faults = {one.raw: one.code for one in session.profile.data.faults.codes}
+    reaction = next((item for item in rules.reactions if item.raw == raw), None)
+    faults = {fault_code.raw: fault_code.code for fault_code in session.profile.data.faults.codes}
     trips = reaction is None or reaction.trips
     fault = faults.get(rules.fault, "") if trips and rules.fault is not None else ""
     sure = rules.starts_confidence != "unverified"

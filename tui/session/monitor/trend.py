@@ -50,16 +50,16 @@ class Trend:
         """Kind of its values: trends of the same kind belong together."""
         parts = [f"trend {self._profile.id}"]
         for code in self._codes:
-            one = self._profile[code] if code else None
-            parts.append(f"{one.code} {one.unit}" if one is not None else "-")
+            parameter = self._profile[code] if code else None
+            parts.append(f"{parameter.code} {parameter.unit}" if parameter is not None else "-")
         return ", ".join(parts)
 
     def join(self, earlier: Iterable[TrendPoint]) -> None:
         """Add points of another program, at their times."""
-        points = {one.time: one for one in (*earlier, *self._points)}
+        points = {point.time: point for point in (*earlier, *self._points)}
         last = max(points, default=0.0)
-        times = sorted(one for one in points if one >= last - TREND_SECONDS)
-        self._points = deque(points[one] for one in times)
+        times = sorted(point for point in points if point >= last - TREND_SECONDS)
+        self._points = deque(points[time] for time in times)
 
     def add(self, snapshot: Snapshot) -> TrendPoint:
         """Add a cycle; one that failed leaves a gap in the trend, never a repeated value."""

@@ -63,10 +63,10 @@ class TrendNotes:
         if (note.device, note.kind) != (self._device, self._kind):
             return
         points = msgspec.msgpack.decode(note.data, type=list[TrendPoint])
-        self._others += [one for one in points if _is_whole(one)]
+        self._others += [point for point in points if _is_whole(point)]
 
 
 def _is_whole(point: TrendPoint) -> bool:
     """True if a trend can be drawn of it."""
-    numbers = [point.time, *(one for one in point.values if one is not None)]
+    numbers = [point.time, *(value for value in point.values if value is not None)]
     return len(point.values) == len(TREND_QUANTITIES) and all(map(math.isfinite, numbers))

@@ -49,9 +49,9 @@ class UnknownDrivePoller:
     async def _begin(self, device: int) -> None:
         probe = presence_probes(await asyncio.to_thread(known_profiles))[0]
         if probe.register is None:
-            one = KeepAlive(device, UNKNOWN_TIMEOUT, function=43)
+            alive = KeepAlive(device, UNKNOWN_TIMEOUT, function=43)
         else:
-            one = KeepAlive(device, UNKNOWN_TIMEOUT, probe.register)
+            alive = KeepAlive(device, UNKNOWN_TIMEOUT, probe.register)
         with self._changing:
             if device in self._workers:
-                self._line.facts.keep_alives.keep(one)
+                self._line.facts.keep_alives.keep(alive)

@@ -58,7 +58,7 @@ def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) ->
     missing = f"{silent} cannot be read: perhaps this drive has no such word"
     if not reported:
         return f"{missing}. Whether it notices a dead line is not known; nothing was proved."
-    off = " and ".join(f"{code} is {one.text}" for code, one in reported.items())
+    off = " and ".join(f"{code} is {reading.text}" for code, reading in reported.items())
     goes_on = "the drive does not notice a dead line, and a motor that runs goes on."
     return f"{off}: {goes_on}" + (f" {missing}." if silent else "")
 
@@ -111,13 +111,15 @@ class Prover:
     async def _settings(self, rules: CommunicationFault) -> dict[str, Reading]:
         """The timeout of each port that the drive has."""
         reported = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)
-        return {one.parameter.code: one for one in reported if one.raw is not None}
+        return {reading.parameter.code: reading for reading in reported if reading.raw is not None}
 
     @staticmethod
     def _timeout(rules: CommunicationFault, reported: dict[str, Reading]) -> float:
         """The shortest that is not off; raises NothingToProve where all are."""
         running = [
-            s for one in reported.values() if (s := timeout_seconds(one, rules.off)) is not None
+            s
+            for reading in reported.values()
+            if (s := timeout_seconds(reading, rules.off)) is not None
         ]
         if not running:
             raise NothingToProve(_nothing_runs(rules, reported))
@@ -144,7 +146,7 @@ class Prover:
     @staticmethod
     def _reaction(rules: CommunicationFault, readings: dict[str, Reading]) -> Reaction | None:
         raw = readings[rules.reaction].raw if rules.reaction else None
-        return next((one for one in rules.reactions if one.raw == raw), None)
+        return next((reaction for reaction in rules.reactions if reaction.raw == raw), None)
 
     def _check_fit(self, state: DriveState, reaction: Reaction | None) -> None:
         """Raise OrderRefused where nothing could be proved, or more than was asked for."""
@@ -291,7 +293,7 @@ class Prover:
         if seen:
             await self.session.clock.sleep(REACTION_SHOWS_AFTER)
             state = drive_state(profile, await self._read(self._state_codes()))
-        codes = {one.raw: f"{one.code}, {one.name}" for one in profile.data.faults.codes}
+        codes = {code.raw: f"{code.code}, {code.name}" for code in profile.data.faults.codes}
         trips = reaction is None or reaction.trips
         expected = codes.get(rules.fault, "") if trips and rules.fault is not None else ""
         fault = ""

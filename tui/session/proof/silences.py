@@ -28,7 +28,7 @@ def silences(timeout: float) -> Iterator[float]:
         shares.append(round(share, 3))
         share += SILENCE_STEP
     longest = max(LONGEST_SILENCE, LONGEST_SHARE * timeout)
-    yield from dict.fromkeys(min(one * timeout, longest) for one in (*shares, *PAST_TIMEOUT))
+    yield from dict.fromkeys(min(value * timeout, longest) for value in (*shares, *PAST_TIMEOUT))
 
 
 @dataclass(frozen=True, slots=True)

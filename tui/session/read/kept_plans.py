@@ -68,4 +68,4 @@ def planned_reads(*plans: ReadPlan) -> tuple[PlannedRead, ...]:
     found: list[ReadRequest] = []
     for plan in plans:
         found += [*plan.requests, *(check.request for check in plan.checks)]
-    return tuple(dict.fromkeys(planned_read(one) for one in found))
+    return tuple(dict.fromkeys(planned_read(request) for request in found))

@@ -79,10 +79,14 @@ def _neighbors(profile: Profile) -> Parameter | None:
     """The first of two words of the monitoring set, side by side, that documents confirm."""
     codes = [value.parameter for value in profile.data.monitoring.values]
     words = {
-        one.address: one
-        for one in (profile[code] for code in codes)
-        if word_count(one) == 1 and is_verified(one)
+        parameter.address: parameter
+        for parameter in (profile[code] for code in codes)
+        if word_count(parameter) == 1 and is_verified(parameter)
     }
-    pairs = ((one, words.get(one.address + 1)) for one in words.values())
-    found = (one for one, next_to in pairs if next_to and next_to.function == one.function)
+    pairs = ((word, words.get(word.address + 1)) for word in words.values())
+    found = (
+        parameter
+        for parameter, next_to in pairs
+        if next_to and next_to.function == parameter.function
+    )
     return next(found, None)

@@ -97,7 +97,7 @@ class RetryingReader:
     async def ask_raws(self, codes: Iterable[str]) -> dict[str, int]:
         """The raw values of those that the drive reports."""
         readings = await self.ask(codes)
-        return {code: one.raw for code, one in readings.items() if one.raw is not None}
+        return {code: reading.raw for code, reading in readings.items() if reading.raw is not None}
 
     async def ask_state(self) -> StateKind:
         """The kind of the drive's present state, for callers that need a motor at rest."""

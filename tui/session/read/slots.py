@@ -119,8 +119,8 @@ class Slots:
 
     def compare_soon(self) -> None:
         """Compare again: parameters that looked alike may differ now."""
-        for one in self._comparisons.values():
-            one.next_time = 0.0
+        for comparison in self._comparisons.values():
+            comparison.next_time = 0.0
 
     async def learn(self, ask: ReadCodes) -> None:
         """Read the slots of every read block."""
@@ -139,28 +139,28 @@ class Slots:
 
     async def compare(self, ask: ReadCodes) -> None:
         """Compare a few parameters with what the block brings, where that is not sure yet."""
-        for one in list(self._comparisons.values()):
-            codes = one.take() if one.length else []
+        for comparison in list(self._comparisons.values()):
+            codes = comparison.take() if comparison.length else []
             if not codes:
                 continue
             before = await ask(codes)
             try:
                 reply = await self.line.read(
-                    self.device, one.block.address, one.length, priority=Priority.POLL
+                    self.device, comparison.block.address, comparison.length, priority=Priority.POLL
                 )
             except DeviceException:
-                one.todo.clear()
+                comparison.todo.clear()
                 continue
             self.heard()
             after = await ask(codes)
-            one.proof.note(reply.words, before, after)
-            one.proof.conclude(one.chosen)
+            comparison.proof.note(reply.words, before, after)
+            comparison.proof.conclude(comparison.chosen)
         self._conclude()
 
     def _conclude(self) -> None:
         found: dict[str, int] = {}
-        for one in self._comparisons.values():
-            found |= one.in_force()
+        for comparison in self._comparisons.values():
+            found |= comparison.in_force()
         self._in_force = found
 
     def _drop_proofs(self) -> None:

@@ -48,7 +48,7 @@ def load_marks(profile_id: str) -> Marks:
 
 
 def _texts(found: object) -> tuple[str, ...]:
-    return tuple(one for one in found if isinstance(one, str)) if isinstance(found, list) else ()
+    return tuple(item for item in found if isinstance(item, str)) if isinstance(found, list) else ()
 
 
 def save_marks(profile_id: str, marks: Marks) -> None:

@@ -57,7 +57,7 @@ class WatchedValues:
     @property
     def absent(self) -> dict[str, str]:
         """Codes without a value, and what the drive or the line said instead."""
-        return {code: one.error for code, one in self.session.image.refused.items()}
+        return {code: reading.error for code, reading in self.session.image.refused.items()}
 
     @property
     def lacking(self) -> frozenset[str]:

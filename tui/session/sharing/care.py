@@ -116,7 +116,7 @@ class DrivesInCare:
             old_raw=None,
             old="",
             new_raw=words[0],
-            new=" ".join(f"16#{one:04X}" for one in words),
+            new=" ".join(f"16#{word:04X}" for word in words),
             answer="",
             read_back=None,
             why=f"sent for {program.text}, which has ended",

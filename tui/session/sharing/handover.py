@@ -179,7 +179,7 @@ class Handover:
                       " program's to stop. a arms it.")  # fmt: skip
 
     def _forget(self, device: int) -> None:
-        rest = {d: one for d, one in self.requests.items() if d != device}
+        rest = {d: request for d, request in self.requests.items() if d != device}
         self.requests = MappingProxyType(rest)
 
     # What others do
@@ -195,7 +195,7 @@ class Handover:
     def _changed(self) -> None:
         """Report arrivals, departures, and commanders on the line."""
         facts = self._line.facts
-        names = {one.id: one.text for one in facts.others}
+        names = {other.id: other.text for other in facts.others}
         for id, text in names.items():
             if id not in self._names:
                 self._say(None, f"The line is shared with {text}.")

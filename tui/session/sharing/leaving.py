@@ -21,9 +21,9 @@ def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
     others, starts = session.line.facts.others, session.starts
     if not others:
         return ""
-    one = others[0].text if len(others) == 1 else ""
+    text = others[0].text if len(others) == 1 else ""
     if not on_purpose and starts is not None and starts.stopped_by_others(session.device):
-        who = f"{one[0].upper()}{one[1:]} is" if one else "Other programs are"
+        who = f"{text[0].upper()}{text[1:]} is" if text else "Other programs are"
         taken = "it is taken over there, or " if any(o.name == "panel" for o in others) else ""
         return (
             f"{who} on the line, too: the motor is stopped on its ramp within {LONGEST_GRACE:g} s,"
@@ -31,5 +31,5 @@ def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
         )
     if session.device not in session.line.pace.others:
         return ""
-    who, do = (f"{one[0].upper()}{one[1:]} asks", "it does") if one else (OTHERS_ASK, "they do")
+    who, do = (f"{text[0].upper()}{text[1:]} asks", "it does") if text else (OTHERS_ASK, "they do")
     return f"{who} it on: while {do}, the motor runs on."

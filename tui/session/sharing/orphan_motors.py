@@ -87,7 +87,7 @@ class OrphanMotorGuard:
     def busy(self) -> bool:
         """True until the motors of each program that is gone are stopped, or were taken over."""
         with self._changing:
-            self._workers = [one for one in self._workers if not one.done()]
+            self._workers = [worker for worker in self._workers if not worker.done()]
             return bool(self._workers)
 
     def close(self) -> None:
@@ -115,9 +115,12 @@ class OrphanMotorGuard:
         records = await self._left_by(program)
         if not records:
             return
-        takers = any(one.name == "panel" for one in self._line.facts.programs)
+        takers = any(item.name == "panel" for item in self._line.facts.programs)
         await asyncio.gather(
-            *(self._stop_unless_taken(one, program, takers=takers, left=left) for one in records)
+            *(
+                self._stop_unless_taken(record, program, takers=takers, left=left)
+                for record in records
+            )
         )
 
     async def _stop_unless_taken(
@@ -156,14 +159,14 @@ class OrphanMotorGuard:
         Of drives that no program has armed here: a word by a start on record might start a drive
         of another family that has its address now.
         """
-        if unknown := [one for one in devices if self._known(one) is None]:
+        if unknown := [device for device in devices if self._known(device) is None]:
             log.warning("drives %s are not stopped for %s: no program has armed them", unknown, by)
         sessions = list(filter(None, map(self._known, devices)))
         if sessions:
             self._stopper.stop(sessions, by=by, given=True)
-        new = [one for one in sessions if one.device not in self._followed]
-        self._followed |= {one.device for one in new}
-        await asyncio.gather(*(self._follow(one, by) for one in new))
+        new = [session for session in sessions if session.device not in self._followed]
+        self._followed |= {session.device for session in new}
+        await asyncio.gather(*(self._follow(session, by) for session in new))
 
     async def _follow(self, session: DriveSession, by: str) -> None:
         """See a stop to its end, also beyond a loss of the line."""
@@ -204,12 +207,12 @@ class OrphanMotorGuard:
         self._tell(device, f"{program.text} {what}: its motor is stopped{unless}.")
 
     def _is_back(self, program: Program) -> bool:
-        return any(one.process == program.process for one in self._line.facts.programs)
+        return any(item.process == program.process for item in self._line.facts.programs)
 
     async def _is_left(self, device: int, program: Program) -> bool:
         """Return True if no living program but that one has the motor's start on record."""
         found = await asyncio.to_thread(self._found, program)
-        return any(one.device == device for one in found)
+        return any(record.device == device for record in found)
 
     async def _left_by(self, program: Program) -> list[StartRecord]:
         """The motors that it has started and not meant to leave running.
@@ -219,11 +222,15 @@ class OrphanMotorGuard:
         end = self._clock.monotonic() + ENDS_WITHIN
         while True:
             found = await asyncio.to_thread(self._found, program)
-            mine = [one for one in found if self._is_of(one, program) and not one.left_running]
+            mine = [
+                record
+                for record in found
+                if self._is_of(record, program) and not record.left_running
+            ]
             late = self._clock.monotonic() > end
             if late and self._is_back(program):
                 return []
-            if not any(self._starts.is_alive(one) for one in mine) or late:
+            if not any(self._starts.is_alive(record) for record in mine) or late:
                 return mine
             await self._clock.sleep(LOOK_INTERVAL)
 

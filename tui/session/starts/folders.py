@@ -56,7 +56,7 @@ class StartFolders:
 
     def records(self) -> list[StartRecord]:
         """All records, each once."""
-        every = [one for files in (self._own, *self._shared()) for one in files.records()]
+        every = [record for files in (self._own, *self._shared()) for record in files.records()]
         return list(dict.fromkeys(every))
 
     @staticmethod

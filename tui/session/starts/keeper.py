@@ -122,9 +122,9 @@ class StartKeeper:
         """The motor was seen at rest at a time on the monotonic clock."""
         device = session.device
         if device in self._begun or device in self._left:
-            self._left = {d: one for d, one in self._left.items() if d != device}
+            self._left = {d: record for d, record in self._left.items() if d != device}
             if self._sent.get(device, math.inf) < seen:
-                self._begun = {d: one for d, one in self._begun.items() if d != device}
+                self._begun = {d: record for d, record in self._begun.items() if d != device}
             self._starts.end(session.line_text, device, seen)
 
     def withdraw(self, session: Startable) -> None:
@@ -132,7 +132,7 @@ class StartKeeper:
 
         The record of a start goes with the standstill, not with the stop: that may be lost.
         """
-        self._left = {d: one for d, one in self._left.items() if d != session.device}
+        self._left = {d: record for d, record in self._left.items() if d != session.device}
 
     def never_sent(self, session: Startable) -> None:
         """The start was refused before its run frame went out.
@@ -142,7 +142,7 @@ class StartKeeper:
         if session.device in self._runs_on:
             self.sent(session)
         elif session.device in self._begun:
-            self._begun = {d: one for d, one in self._begun.items() if d != session.device}
+            self._begun = {d: record for d, record in self._begun.items() if d != session.device}
             self._starts.note_stop(session.line_text, session.device)
 
     def holds(self, device: int) -> bool:
@@ -161,7 +161,7 @@ class StartKeeper:
     def give_away(self, session: Startable) -> None:
         """Another program looks after the motor from now on."""
         if session.device in self._begun:
-            self._begun = {d: one for d, one in self._begun.items() if d != session.device}
+            self._begun = {d: record for d, record in self._begun.items() if d != session.device}
             self._starts.note_stop(session.line_text, session.device)
 
     # What an earlier program left
@@ -199,7 +199,7 @@ class StartKeeper:
         record = self._left.get(session.device)
         if record is None or session.device not in self._silent:
             return record
-        back = any(one.process == record.process for one in session.line.facts.programs)
+        back = any(program.process == record.process for program in session.line.facts.programs)
         return None if back else record
 
     def take_over(self, session: Startable) -> None:
@@ -212,7 +212,7 @@ class StartKeeper:
         )
         self._put(session, mine)
         self.sent(session)
-        self._left = {d: one for d, one in self._left.items() if d != session.device}
+        self._left = {d: item for d, item in self._left.items() if d != session.device}
 
     def leave(self, session: Startable) -> None:
         """Note that a motor is left running on purpose. Raises StartNotRecorded."""
@@ -228,8 +228,8 @@ class StartKeeper:
 
 def pids_absent(facts: SharedState) -> frozenset[ProcessKey]:
     """The processes of programs that have left the line, frozen ones among them."""
-    here = {one.process for one in facts.programs}
-    return frozenset({one.process for one in facts.departed} - here)
+    here = {program.process for program in facts.programs}
+    return frozenset({program.process for program in facts.departed} - here)
 
 
 class NothingToTakeOver(DriveError):

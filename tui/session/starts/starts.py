@@ -177,7 +177,9 @@ class Starts:
 
         None where a living program, this one too, has a start of this drive on record.
         """
-        return next((one for one in self.all_found(line, absent) if one.device == device), None)
+        return next(
+            (record for record in self.all_found(line, absent) if record.device == device), None
+        )
 
     def all_found(self, line: str, absent: Collection[ProcessKey] = ()) -> list[StartRecord]:
         """The drives of a line that programs which ended have started, by device. Reads files.
@@ -187,23 +189,27 @@ class Starts:
         key = line_key(line)
         going = self._going(key)
         here = self._of(line)
-        here = [one for one in here if one.device not in going]
-        living = [one for one in here if one.process not in absent and self.is_alive(one)]
-        alive = {one.device for one in living if not one.is_foreign}
-        newest = {one.device: one for one in here if one.device not in alive}
+        here = [record for record in here if record.device not in going]
+        living = [
+            record for record in here if record.process not in absent and self.is_alive(record)
+        ]
+        alive = {record.device for record in living if not record.is_foreign}
+        newest = {record.device: record for record in here if record.device not in alive}
         # of another container it is not known whether its program lives: a later start counts
         return [newest[device] for device in sorted(newest) if newest[device] not in living]
 
     def is_on_record(self, line: str, device: int, process: ProcessKey) -> bool:
         """Return True if a program has a start of a drive on record. Reads files."""
-        return any(one.device == device and one.process == process for one in self._of(line))
+        return any(
+            record.device == device and record.process == process for record in self._of(line)
+        )
 
     def own(self, line: str, device: int) -> StartRecord | None:
         """The start of a drive that this very program has on record. Reads files."""
         if device in self._going(line_key(line)):
             return None
-        here = (one for one in self._of(line) if one.device == device)
-        return next((one for one in here if self._own(one)), None)
+        here = (record for record in self._of(line) if record.device == device)
+        return next((record for record in here if self._own(record)), None)
 
     def _going(self, key: str) -> set[int]:
         """The drives of a line whose records are being taken away."""
@@ -218,12 +224,12 @@ class Starts:
     def _of(self, line: str) -> list[StartRecord]:
         """The starts of a line, the newest last."""
         key = line_key(line)
-        here = [one for one in self._files.records() if line_key(one.line) == key]
-        return sorted(here, key=lambda one: one.begun.timestamp() if one.begun else 0.0)
+        here = [record for record in self._files.records() if line_key(record.line) == key]
+        return sorted(here, key=lambda item: item.begun.timestamp() if item.begun else 0.0)
 
     def newest(self, line: str) -> dict[int, StartRecord]:
         """By device, the last start on record, whose program lives or not; reads files."""
-        return {one.device: one for one in self._of(line)}
+        return {record.device: record for record in self._of(line)}
 
     def close(self, timeout: float = 1.0) -> bool:
         """Wait for what is still to be written or removed, so many seconds; False if it was not."""
@@ -292,10 +298,10 @@ class Starts:
         """
         key = line_key(line)
         self._files.remove(
-            lambda one: (
-                one.device == device
-                and line_key(one.line) == key
-                and (self._own(one) or not self.is_alive(one))
+            lambda record: (
+                record.device == device
+                and line_key(record.line) == key
+                and (self._own(record) or not self.is_alive(record))
             )
         )
 

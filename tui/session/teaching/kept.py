@@ -145,7 +145,9 @@ def _as_json(drive: TaughtDrive, kept: TaughtLooks) -> dict[str, object]:
         "drive": drive.stated,
         "reference": kept.reference,
         "looks": {
-            code: [{"raw": one.word, "shown": f"{one.shown:f} {one.unit}".strip()} for one in looks]
+            code: [
+                {"raw": look.word, "shown": f"{look.shown:f} {look.unit}".strip()} for look in looks
+            ]
             for code, looks in kept.looks.items()
             if looks
         },
@@ -171,7 +173,7 @@ def _code(code: object) -> str:
 def _looks_of(code: str, listed: object) -> tuple[DisplayLook, ...]:
     if not isinstance(listed, list) or len(listed) > LOOKS_KEPT:
         raise ValueRefused(f"the readings of {code} are not a list, or too many")
-    return tuple(_look(code, one) for one in listed)
+    return tuple(_look(code, item) for item in listed)
 
 
 def _look(code: str, reported: object) -> DisplayLook:

@@ -95,7 +95,7 @@ class OwnChart:
         if order is not None:
             self._obey(order)
         elif target:
-            self._go(next(one for one in chart.states if one.id == target))
+            self._go(next(item for item in chart.states if item.id == target))
         if target and not self._runs:
             self._rest_in(chart, target)
 
@@ -121,7 +121,7 @@ class OwnChart:
             self._end(Stop.RAMP)
 
     def _rest_in(self, chart: Chart, id: str) -> None:
-        state = next(one for one in chart.states if one.id == id)
+        state = next(item for item in chart.states if item.id == id)
         self._idle = state if state.kind in REST_KINDS else self._idle
 
     def _end(self, way: Stop) -> None:
@@ -193,7 +193,7 @@ class OwnChart:
     @property
     def _chart(self) -> Chart | None:
         registers, profile = self._body.registers, self._body.profile
-        deciding = [profile[one.when.parameter] for one in profile.data.charts if one.when]
+        deciding = [profile[chart.when.parameter] for chart in profile.data.charts if chart.when]
         return profile.chart({word.code: registers.in_force(word) for word in deciding})
 
     def _state(self, chart: Chart) -> State:

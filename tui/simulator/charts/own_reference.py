@@ -87,8 +87,8 @@ class OwnReference:
         self._body.earlier_hz = hz
         words = [word for word in self._words() if not self._is_speed(word)]
         if words:
-            one = self._body.scale(words[0]) * self._hertz_of_one(words[0])
-            self._body.registers.put(words[0], round(hz / one))
+            value = self._body.scale(words[0]) * self._hertz_of_one(words[0])
+            self._body.registers.put(words[0], round(hz / value))
 
     def wire(self, hz: float) -> None:
         """Put the analog input to the value for this reference in Hz."""

@@ -40,4 +40,4 @@ def _model(models: list[Model], reference: str) -> Model | None:
 
 def _has_power(model: Model, power: float) -> bool:
     """Return True if it is one of a model's powers: 0.37/0.4 by 50 Hz and 60 Hz motors."""
-    return any(math.isclose(float(one), power) for one in model.power_kw.split("/"))
+    return any(math.isclose(float(part), power) for part in model.power_kw.split("/"))

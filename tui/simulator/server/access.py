@@ -44,7 +44,7 @@ class DriveWords:
         self._blocked = blocked
         self._written = written
         self._reading = profile.data.reading
-        self._taught = {one.parameter for one in profile.data.teachable_references}
+        self._taught = {reference.parameter for reference in profile.data.teachable_references}
         """Words that take a reference though no document says that they can be written."""
         self._scanner: dict[int, tuple[Block, int]] = {}
         """Words that stand for another parameter: their block and place in it."""

@@ -91,7 +91,7 @@ def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Commands and status are whole words of 16 bits: no others can be written or stopped by."""
-    parameters = {one.code: one for one in data.parameters}
+    parameters = {parameter.code: parameter for parameter in data.parameters}
     for index, chart in enumerate(data.charts):
         at: TomlPath = ("charts", index)
         codes = [(chart.status, (*at, "status")), (chart.command, (*at, "command"))]
@@ -118,7 +118,7 @@ def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def chart_words_in_reach(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Status words can be read, command words written, and those that stop also at speed."""
-    access = {one.code: one.access for one in data.parameters}
+    access = {parameter.code: parameter.access for parameter in data.parameters}
     for index, chart in enumerate(data.charts):
         at: TomlPath = ("charts", index)
         if access.get(chart.status) == "w":

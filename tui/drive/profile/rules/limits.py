@@ -54,7 +54,7 @@ def _circle(ways: dict[str, set[str]], start: str) -> list[str]:
 def proposed_values(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Each value that is proposed or compared can be held by its parameter."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
-    names = {one.id: one.values for one in data.enumerations}
+    names = {enumeration.id: enumeration.values for enumeration in data.enumerations}
     for place, code, raw in _proposed(data):
         parameter = parameters.get(code)
         if parameter is None:
@@ -66,8 +66,8 @@ def proposed_values(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def _proposed(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
     for index, source in enumerate(data.control_sources):
-        for place, one in enumerate(source.settings):
-            yield ("control_sources", index, "settings", place), one.parameter, one.value
+        for place, setting in enumerate(source.settings):
+            yield ("control_sources", index, "settings", place), setting.parameter, setting.value
     yield from _line_numbers(data)
     for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
         if order is not None and not order.bit:

@@ -89,9 +89,9 @@ def _reference_places(data: ProfileData) -> Iterator[NamedPlace]:
         yield ("references", index, "feedback"), reference.feedback
         if reference.scale_when is not None:
             yield ("references", index, "scale_when"), reference.scale_when.parameter
-    for index, one in enumerate(data.teachable_references):
-        yield ("teachable_references", index, "parameter"), one.parameter
-        yield ("teachable_references", index, "most"), one.most
+    for index, teachable_reference in enumerate(data.teachable_references):
+        yield ("teachable_references", index, "parameter"), teachable_reference.parameter
+        yield ("teachable_references", index, "most"), teachable_reference.most
 
 
 def _channel_names(data: ProfileData) -> Iterator[NamedPlace]:
@@ -154,8 +154,8 @@ def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
         for place, code in enumerate(step.parameters):
             yield ("start_up", index, "parameters", place), code
     for index, source in enumerate(data.control_sources):
-        for place, one in enumerate(source.settings):
-            yield ("control_sources", index, "settings", place), one.parameter
+        for place, item in enumerate(source.settings):
+            yield ("control_sources", index, "settings", place), item.parameter
     yield ("identification", "model_parameter"), data.identification.model_parameter
     yield ("identification", "class_parameter"), data.identification.class_parameter
     for place, server in enumerate(data.addresses.servers):

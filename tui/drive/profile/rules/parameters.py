@@ -60,7 +60,7 @@ def _twice(rows: Iterable[tuple[TomlPath, object]], text: str) -> Iterator[tuple
 def fields(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield errors in the fields of each parameter."""
     sources = [source.id for source in data.sources]
-    enumerations = {one.id: one.values for one in data.enumerations}
+    enumerations = {enumeration.id: enumeration.values for enumeration in data.enumerations}
     for index, parameter in enumerate(data.parameters):
         for key, fault in _faults_of(parameter, sources, enumerations):
             place: TomlPath = ("parameters", index, key) if key else ("parameters", index)
@@ -153,9 +153,9 @@ def _number_keys(key: str, names: dict[str, object] | dict[str, str]) -> Iterato
 
 def enumeration_keys(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Keys of shared names are raw values."""
-    for index, one in enumerate(data.enumerations):
-        for key, fault in _number_keys("values", one.values):
-            yield ("enumerations", index, key), f"enumeration {one.id}: {fault}"
+    for index, enumeration in enumerate(data.enumerations):
+        for key, fault in _number_keys("values", enumeration.values):
+            yield ("enumerations", index, key), f"enumeration {enumeration.id}: {fault}"
     for index, chart in enumerate(data.charts):
         if chart.channel:
             for _, fault in _number_keys("names", chart.channel.names):
