@@ -112,7 +112,7 @@ CHECKS: dict[int, Check] = {
     ),
     22: Check("L", _no_imperative, 1, "What a drive does"),
     23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), 0, "What it does."),
-    24: Check("D", _long, 43, "It is: one; and then two: three."),
+    24: Check("D", _long, 0, "It is: one; and then two: three."),
     25: Check(
         "G",
         lambda text: int(bool(re.match(r"(A|An|The|What|Who|Where|No|One)\b", text))
