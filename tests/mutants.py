@@ -1,9 +1,12 @@
 """Plants defects one at a time in a copy of the panel, and tells which of them no test notices.
 
     python -m tests.mutants [NAME...] [--list] [--jobs N] [--table]
+    python -m tests.mutants --random N [--seed S] [--stop-path] [--package NAME] | --again
+    python -m tests.mutants --coverage
 
-The defects stand in `tests/defects/`. The checkout is never touched: each worker has a copy of
-its own in a temporary folder. Exit status 1 where a defect survives or no longer fits the code.
+The defects stand in `tests/defects/`; random ones are made by `tests/mutator.py`. The checkout is
+never touched: each worker has a copy of its own in a temporary folder. Exit status 1 if a defect
+survives or no longer fits the code.
 """
 
 from __future__ import annotations
@@ -17,13 +20,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
+from typing import TypeVar
 
 from tests.defects import (
     bus,
@@ -74,6 +78,8 @@ LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60", "-m", "")
 LONGEST = 300.0
 """Seconds for the tests of one defect; what hangs for longer is noticed, too."""
+T = TypeVar("T")
+R = TypeVar("R")
 SURVIVED, STALE = "SURVIVED", "STALE"
 _FAILED = re.compile(r"^(?:FAILED|ERROR) ([^\s\[:]+::[^\s\[]+)", re.MULTILINE)
 
@@ -118,13 +124,18 @@ def _forget_compiled(path: Path) -> None:
         compiled.unlink()
 
 
-@contextmanager
-def planted(defect: Defect, copy: Path) -> Iterator[None]:
+def planted(defect: Defect, copy: Path) -> AbstractContextManager[None]:
     """The copy with a defect in it; whole again afterwards. Raises Stale."""
     path = place_of(defect, copy)
+    return replaced(path, path.read_text("utf-8").replace(defect.old, defect.new))
+
+
+@contextmanager
+def replaced(path: Path, text: str) -> Iterator[None]:
+    """A file with another text; whole again afterwards."""
     whole = path.read_text("utf-8")
     try:
-        path.write_text(whole.replace(defect.old, defect.new), "utf-8")
+        path.write_text(text, "utf-8")
         _forget_compiled(path)
         yield
     finally:
@@ -207,24 +218,38 @@ def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
     with copies(jobs) as made:
         if why := fit_to_judge(defects, made[0]):
             raise SystemExit(f"The tests cannot judge: {why}")
-        free: SimpleQueue[Path] = SimpleQueue()
-        keeping = Lock()
-        for copy in made:
-            free.put(copy)
 
-        def plant_one(defect: Defect) -> Planted:
-            copy = free.get()
-            try:
-                result = plant(defect, copy)
-            finally:
-                free.put(copy)
-            with keeping:
-                remember(result)
+        def show(result: Planted) -> None:
+            remember(result)
             print(f"{result.seconds:6.1f} s  {result.name}: {result.noticed_by}", flush=True)
-            return result
 
-        with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(plant_one, defects))
+        return dealt(plant, defects, made, show)
+
+
+def dealt(
+    work: Callable[[T, Path], R],
+    items: Sequence[T],
+    made: Sequence[Path],
+    show: Callable[[R], None],
+) -> list[R]:
+    """Do the work for each item in the next free copy; show each result as it comes."""
+    free: SimpleQueue[Path] = SimpleQueue()
+    showing = Lock()
+    for copy in made:
+        free.put(copy)
+
+    def once(item: T) -> R:
+        copy = free.get()
+        try:
+            result = work(item, copy)
+        finally:
+            free.put(copy)
+        with showing:
+            show(result)
+        return result
+
+    with ThreadPoolExecutor(len(made)) as pool:
+        return list(pool.map(once, items))
 
 
 def last_run() -> dict[str, Planted]:
@@ -287,7 +312,18 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="name the defects, plant nothing")
     parser.add_argument("--table", action="store_true", help="the last results as Markdown")
     parser.add_argument("--jobs", type=int, default=2, choices=(1, 2), help="copies at work")
+    options = parser.add_argument_group("random defects")
+    options.add_argument("--random", type=int, metavar="N", help="plant N random defects")
+    options.add_argument("--seed", type=int, default=1, help="which ones (default: 1)")
+    options.add_argument("--package", metavar="NAME", help="only in this package of tui")
+    options.add_argument("--stop-path", action="store_true", help="only where a stop passes")
+    options.add_argument("--again", action="store_true", help="those not noticed the last time")
+    options.add_argument("--coverage", action="store_true", help="record what each test reaches")
     requested = parser.parse_args()
+    if requested.random or requested.again or requested.coverage:
+        from tests import random_defects
+
+        return random_defects.main(requested)
     if requested.table:
         print(table(last_run()))
         return 0

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
 
 from tests.defects.defect import Defect
+from tests.defects.equivalent import EQUIVALENT
 from tests.mutants import DEFECTS, ROOT, STALE, SURVIVED, Stale, judge, place_of, planted
+from tests.mutator import KINDS, Defaults, Mutant, Mutator
+from tests.random_defects import EQUAL, UNREACHED, Judged, Uses, all_sites, rate, report, sample
+from tests.reached import same_lines
+from tests.sources import PACKAGE, modules
 
 WHOLE = "def half(x):\n    return x / 2\n"
 
@@ -84,3 +90,127 @@ def test_every_defect_has_a_name_a_sentence_and_tests_that_are_there() -> None:
         for test in defect.tests:
             file, _, function = test.partition("::")
             assert f"def {function}" in (ROOT / file).read_text("utf-8"), test
+
+
+# -- defects at random -----------------------------------------------------------------------------
+
+MODULE = '''
+"""A module."""
+from threading import Lock
+LONGEST = 0.5
+
+class Pump:
+    """A class."""
+    speed: "float" = 10
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+
+    async def work(self, by: int = 2, *, gently: bool = False) -> bool:
+        """A function."""
+        with self._lock:
+            self.start(by, 7)
+        await self.rest()
+        if by < 3 and gently:
+            raise ValueError(f"by {by}")
+        plan = make("a", key="b")
+        if not plan:
+            return
+        return await self.done(plan)
+'''
+
+
+def mutants_of(source: str) -> list[Mutant]:
+    found = Mutator("tui/pump.py", source, Defaults([ast.parse(source)])).sites()
+    return [mutant for site in found for mutant in site.mutants]
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new"),
+    [
+        ("condition", "by < 3 and gently", "((by < 3) or (gently))"),
+        ("condition", "gently", "(not (gently))"),
+        ("condition", "not plan", "bool(plan)"),
+        ("boundary", "by < 3", "(by <= 3)"),
+        ("constant", "0.5", "5.0"),
+        ("constant", "0.5", "0.05"),
+        ("constant", "0.5", "1.5"),
+        ("constant", "10", "1"),
+        ("constant", "False", "True"),
+        ("text", '"a"', '""'),
+        ("text", 'f"by {by}"', '""'),
+        ("argument", "self.start(by, 7)", "self.start(7, by)"),
+        ("argument", 'make("a", key="b")', 'make("a")'),
+        ("call", "self.start(by, 7)", "pass"),
+        ("call", 'make("a", key="b")', "None"),
+        ("await", "await self.rest()", "pass"),
+        ("lock", "with self._lock", "if True"),
+        ("raise", 'raise ValueError(f"by {by}")', "pass"),
+        ("return", "return", "pass"),
+        ("return", "return await self.done(plan)", "return not (await self.done(plan))"),
+    ],
+)
+def test_each_kind_of_defect_is_made(kind: str, old: str, new: str) -> None:
+    found = [(mutant.change.kind, mutant.old, mutant.change.new) for mutant in mutants_of(MODULE)]
+    assert found.count((kind, old, new)) == 1
+
+
+def test_every_kind_has_an_example() -> None:
+    assert {mutant.change.kind for mutant in mutants_of(MODULE)} == set(KINDS)
+
+
+def test_docstrings_annotations_and_required_arguments_stay() -> None:
+    changed = {mutant.old for mutant in mutants_of(MODULE)}
+    assert not changed & {'"""A module."""', '"""A class."""', '"""A function."""', '"float"'}
+    required = "def f(a, *, b): ...\nf(1, b=2)\n"
+    assert {mutant.change.kind for mutant in mutants_of(required)} == {"constant", "call"}
+
+
+@pytest.mark.filterwarnings("ignore::SyntaxWarning")
+@pytest.mark.parametrize("path", modules(PACKAGE / "bus" / "share"), ids=lambda path: path.stem)
+def test_each_random_defect_compiles_and_changes_its_module(path: Path) -> None:
+    source = path.read_text("utf-8")
+    whole = ast.dump(ast.parse(source))
+    found = mutants_of(source)
+    assert len({mutant.identity for mutant in found}) == len(found)
+    for mutant in found[::10]:
+        assert ast.dump(ast.parse(mutant.apply(source))) != whole, mutant.identity
+
+
+def test_identity_of_a_random_defect_stays_where_lines_move() -> None:
+    moved = [mutant.identity for mutant in mutants_of(MODULE.replace("LONGEST", "\n\nLONGEST"))]
+    assert moved == [mutant.identity for mutant in mutants_of(MODULE)]
+
+
+def test_random_defects_are_the_same_for_a_seed_and_spread_over_packages() -> None:
+    defaults = Defaults([])
+    sites = {package: list(all_sites(package, defaults)) for package in ("keeper", "bus")}
+    assert sample(sites, 40, 1) == sample(sites, 40, 1) != sample(sites, 40, 2)
+    drawn = sample(sites, 40, 1)
+    assert sum(mutant.path.startswith("tui/keeper/") for mutant in drawn) == 20
+    assert len({(mutant.path, mutant.change.start, mutant.change.end) for mutant in drawn}) > 35
+
+
+def test_lines_of_a_record_follow_the_source() -> None:
+    before, after = ["a", "b", "c"], ["new", "a", "B", "c"]
+    assert same_lines(before, after) == [(2, 1), (3, 2), (4, 3)]
+    assert same_lines(["a", "b"], ["b"]) == [(1, 2)]
+
+
+def test_constant_is_tried_by_the_functions_that_use_it() -> None:
+    path = "tui/session/proof/silences.py"
+    lines = (ROOT / path).read_text("utf-8").splitlines()
+    used = next(n for n, line in enumerate(lines, 1) if "max(LONGEST_SILENCE" in line)
+    assert Uses().lines(path, ["LONGEST_SILENCE"]) == {(path, used)}
+
+
+def test_report_counts_defects_that_no_test_reaches_as_missed() -> None:
+    outcomes = ["tests/a.py::test_b", SURVIVED, UNREACHED, EQUAL]
+    judged = [Judged(f"d{n}", "bus", 1, by, 1.0, 1) for n, by in enumerate(outcomes)]
+    assert rate(judged) == pytest.approx(1 / 3)
+    assert "| bus | 4 | 1 | 1 | 1 | 1 | 33.3% |" in report(judged)
+    assert rate([]) == 1.0
+
+
+def test_every_equivalent_defect_has_its_reason() -> None:
+    assert all(why.endswith(".") for why in EQUIVALENT.values())

@@ -1,0 +1,368 @@
+"""Plants defects at random, and runs the tests that reach the changed lines.
+
+`python -m tests.mutants --random N --seed S` is its command; tests/README.md describes it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import random
+import re
+import tempfile
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache, cached_property
+from itertools import islice, zip_longest
+from pathlib import Path
+
+import pytest
+
+from tests import reached
+from tests.defects.equivalent import EQUIVALENT
+from tests.mutants import SURVIVED, copies, dealt, replaced, run_tests
+from tests.mutator import Defaults, Mutant, Mutator, Site
+from tests.sources import PACKAGE, ROOT, modules, tree_of
+
+PACKAGES = ("bus", "keeper", "session", "drive", "cli", "screens")
+LEAST = 0.92
+"""The share of defects that must be noticed; on the way of a stop, all."""
+MOST_TESTS = 40
+MOST_ALIKE = 3
+"""Tests of one function with other parameters that are run for one defect, if there are others."""
+MOST_SECONDS = 100.0
+"""The tests of one defect, when they were recorded."""
+LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
+IN_PROCESSES = {"tui/keeper/": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py")}
+"""By the beginning of a path: tests of code that runs in processes that are not recorded."""
+UNREACHED, EQUAL = "NOT REACHED", "EQUIVALENT"
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """The result of one random defect."""
+
+    identity: str
+    package: str
+    line: int
+    noticed_by: str
+    """The test that failed, or SURVIVED, NOT REACHED, EQUIVALENT."""
+    seconds: float
+    tests: int
+
+    @property
+    def noticed(self) -> bool:
+        """True if a test failed because of it, and only because of it."""
+        return self.noticed_by not in (SURVIVED, UNREACHED, EQUAL)
+
+
+# -- which defects ---------------------------------------------------------------------------------
+
+
+def all_sites(package: str, defaults: Defaults) -> Iterator[Site]:
+    """All that can be changed in a package of the product."""
+    for path in modules(PACKAGE / package):
+        name = path.relative_to(ROOT).as_posix()
+        yield from Mutator(name, path.read_text("utf-8"), defaults).sites()
+
+
+def sample(sites: dict[str, list[Site]], number: int, seed: int) -> list[Mutant]:
+    """So many defects, as many of each package, each site with the same chance."""
+    chance = random.Random(seed)
+    orders = [chance.sample(sites[package], len(sites[package])) for package in sorted(sites)]
+    in_turn = (site for turn in zip_longest(*orders) for site in turn if site is not None)
+    return [chance.choice(site.mutants) for site in islice(in_turn, number)]
+
+
+def stop_path() -> set[tuple[str, str]]:
+    """Module path and qualified name of each function that a stop passes through, traced now."""
+    from tests.session.test_stop_faults import Wire, passed
+
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        for name in ("CONFIG", "STATE", "SHARE_FOLDER"):
+            patch.setenv(f"DRIVEPANEL_{name}", str(Path(folder, name.lower())))
+        patch.setattr("tui.bus.share.keeping.can_start", lambda: False)
+        wire = Wire()
+        places = set()
+        for attached in (False, True):
+            own = Path(folder, f"attached-{attached}")
+            own.mkdir()
+            places |= set(passed(wire, attached, own))
+        wire.simulation.stop()
+    return {(f"{place.module.replace('.', '/')}.py", place.name) for place in places}
+
+
+# -- which tests -----------------------------------------------------------------------------------
+
+
+class Uses:
+    """Where names of modules are used: what runs at import has its effect there."""
+
+    @cached_property
+    def _importers(self) -> dict[str, set[Path]]:
+        """By module path: the modules that import something of it."""
+        found: dict[str, set[Path]] = defaultdict(set)
+        for path in modules():
+            package = path.relative_to(ROOT).parent.parts
+            for node in ast.walk(tree_of(path)):
+                if isinstance(node, ast.ImportFrom):
+                    above = package[: len(package) + 1 - node.level] if node.level else ()
+                    parts = (*above, *(node.module or "").split("."))
+                    for alias in ("", *(imported.name for imported in node.names)):
+                        found["/".join(filter(None, (*parts, alias))) + ".py"].add(path)
+        return found
+
+    def importers(self, path: str) -> list[Path]:
+        """The module itself, and those that import of it."""
+        return [ROOT / path, *sorted(self._importers[path] - {ROOT / path})]
+
+    def lines(self, path: str, names: Iterable[str], depth: int = 3) -> set[tuple[str, int]]:
+        """Lines of functions in which names of a module are used, directly or through others."""
+        found: set[tuple[str, int]] = set()
+        for user in self.importers(path) if depth else ():
+            name_of_user = user.relative_to(ROOT).as_posix()
+            used = [use for use in _used_names(user) if use[0] in names]
+            found.update((name_of_user, line) for _, line, bound in used if bound is None)
+            further = {name for _, _, bound in used for name in bound or ()} - set(names)
+            if further:
+                found |= self.lines(name_of_user, further, depth - 1)
+        return found
+
+
+@cache
+def _used_names(path: Path) -> list[tuple[str, int, tuple[str, ...] | None]]:
+    """Names read in a module with their lines; outside functions, the names bound by them."""
+    found: list[tuple[str, int, tuple[str, ...] | None]] = []
+
+    def walk(node: ast.AST, bound: tuple[str, ...] | None) -> None:
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.Lambda():
+                bound = None
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                bound = bound if bound is None else (name,)
+            case ast.ClassDef(name=name):
+                bound = bound if bound is None else (name,)
+            case ast.Name(id=name, ctx=ast.Load()) | ast.Attribute(attr=name):
+                found.append((name, node.lineno, bound))
+        for child in ast.iter_child_nodes(node):
+            walk(child, bound)
+
+    walk(tree_of(path), ())
+    return found
+
+
+class Chooser:
+    """Chooses the tests that may notice a defect, by what was recorded."""
+
+    def __init__(self, record: reached.Record) -> None:
+        self._record = record
+        self._uses = Uses()
+        self._usable = {
+            name for name, reach in record.tests.items() if reach.passed and _exists(name)
+        }
+
+    def tests(self, mutant: Mutant) -> list[str]:
+        """The tests to run, those most about the changed line first."""
+        found = self._reaching(mutant) & self._usable
+        tests = self._best(found, mutant.path.removesuffix(".py").replace("/", "."))
+        for beginning, others in IN_PROCESSES.items():
+            if mutant.path.startswith(beginning):
+                tests += others
+        return tests
+
+    def _reaching(self, mutant: Mutant) -> set[str]:
+        lines = self._record.lines(mutant.path)
+        for span in mutant.lines:
+            if found := set().union(*(lines.get(line, set()) for line in span)):
+                return found
+        if mutant.lines:
+            return set()
+        used = self._uses.lines(mutant.path, mutant.names)
+        found = set().union(*(self._record.lines(path).get(line, set()) for path, line in used))
+        return found or set().union(*lines.values())
+
+    def _best(self, found: set[str], module: str) -> list[str]:
+        """At most so many: half of files that name the module, all with few lines first."""
+        few_lines = sorted(found, key=lambda name: (self._record.tests[name].lines, name))
+        near = [name for name in few_lines if module in _text(name.partition("::")[0])]
+        ordered = dict.fromkeys([*_varied(near)[: MOST_TESTS // 2], *_varied(few_lines)])
+        chosen: list[str] = []
+        seconds = 0.0
+        for name in ordered:
+            takes = self._record.tests[name].seconds
+            if len(chosen) < MOST_TESTS and seconds + takes < MOST_SECONDS:
+                chosen.append(name)
+                seconds += takes
+        return chosen
+
+
+def _varied(names: Iterable[str]) -> list[str]:
+    """Tests in the same order, but those of a function with yet other parameters last."""
+    count: Counter[str] = Counter()
+    first: list[str] = []
+    last: list[str] = []
+    for name in names:
+        function = name.partition("[")[0]
+        count[function] += 1
+        (first if count[function] <= MOST_ALIKE else last).append(name)
+    return first + last
+
+
+@cache
+def _text(file: str) -> str:
+    try:
+        return (ROOT / file).read_text("utf-8")
+    except OSError:
+        return ""
+
+
+def _exists(name: str) -> bool:
+    """True if a test that was recorded has its file and function still."""
+    file, _, function = name.partition("[")[0].partition("::")
+    return f"def {function.rpartition('::')[2]}(" in _text(file)
+
+
+# -- planting --------------------------------------------------------------------------------------
+
+
+class Judge:
+    """Plants one defect at a time in copies, and believes only a test that fails by it alone."""
+
+    def __init__(self, chooser: Chooser) -> None:
+        self._chooser = chooser
+        self._passes: dict[str, bool] = {}
+
+    def judge(self, mutant: Mutant, copy: Path) -> Judged:
+        """Plant a defect in a copy and run the tests that reach it."""
+        begun = time.monotonic()
+        tests = self._chooser.tests(mutant)
+        if mutant.identity in EQUIVALENT:
+            by = EQUAL
+        else:
+            by = self._noticed_by(mutant, list(tests), copy) if tests else UNREACHED
+        package = mutant.path.split("/")[1]
+        seconds = time.monotonic() - begun
+        first_line = (
+            mutant.apply(_text(mutant.path)).encode()[: mutant.change.start].count(b"\n") + 1
+        )
+        return Judged(mutant.identity, package, first_line, by, seconds, len(tests))
+
+    def _noticed_by(self, mutant: Mutant, tests: list[str], copy: Path) -> str:
+        path = copy / mutant.path
+        defective = mutant.apply(path.read_text("utf-8"))
+        while tests:
+            with replaced(path, defective):
+                failed = self._first_failure(tests, copy)
+                repeated = failed and self._first_failure([failed], copy)
+            if not failed:
+                return SURVIVED
+            if repeated and self._passes_without(failed, copy):
+                return failed
+            tests.remove(failed)
+        return SURVIVED
+
+    def _first_failure(self, tests: list[str], copy: Path) -> str:
+        """The test that fails, the first one if it hangs as a whole; empty if all pass."""
+        while tests:
+            status, output = run_tests(tests, copy)
+            if status in (0, 5):
+                return ""
+            failed = [
+                test
+                for test in tests
+                if re.search(rf"^(FAILED|ERROR) {re.escape(test)}", output, re.M)
+            ]
+            if failed:
+                return failed[0]
+            gone = re.findall(r"not found: \S*?(tests/\S+::.*)$", output, re.M)
+            if not any(test in tests for test in gone):
+                return tests[0]  # the process hung, or no module can be imported
+            tests[:] = [test for test in tests if test not in gone]
+        return ""
+
+    def _passes_without(self, test: str, copy: Path) -> bool:
+        if test not in self._passes:
+            self._passes[test] = run_tests([test], copy)[0] == 0
+        return self._passes[test]
+
+
+# -- report ----------------------------------------------------------------------------------------
+
+
+def report(results: Sequence[Judged]) -> str:
+    """The rate of each package, as Markdown, and the defects that were not noticed."""
+    lines = ["| package | planted | noticed | survived | not reached | equivalent | rate |"]
+    lines.append("|---|---:|---:|---:|---:|---:|---:|")
+    for package in (*PACKAGES, "all"):
+        these = [result for result in results if package in (result.package, "all")]
+        if these:
+            count = Counter(result.noticed_by for result in these)
+            noticed = sum(result.noticed for result in these)
+            lines.append(
+                f"| {package} | {len(these)} | {noticed} | {count[SURVIVED]} | {count[UNREACHED]}"
+                f" | {count[EQUAL]} | {rate(these):.1%} |"
+            )
+    for outcome in (UNREACHED, SURVIVED):
+        missed = sorted(result.identity for result in results if result.noticed_by == outcome)
+        lines += [f"\n{outcome}: {len(missed)}", *(f"  {result}" for result in missed)]
+    return "\n".join(lines)
+
+
+def rate(results: Sequence[Judged]) -> float:
+    """The share of noticed ones among those that change behavior."""
+    changing = [result for result in results if result.noticed_by != EQUAL]
+    return sum(result.noticed for result in changing) / len(changing) if changing else 1.0
+
+
+def record_tests(jobs: int) -> int:
+    """Run all tests of the main layer in a copy, and keep what each reaches, by the commit."""
+    commit = reached.git("rev-parse", "HEAD").strip()
+    with copies(1) as (copy,):
+        record = reached.record(copy, commit, (), jobs)
+    print(f"Recorded {len(record.tests)} tests of {commit[:12]} in {reached.folder()}.")
+    return 0
+
+
+def main(requested: argparse.Namespace) -> int:
+    """Record, or plant and report; 1 if less than required is noticed."""
+    if requested.coverage:
+        return record_tests(requested.jobs)
+    record = reached.newest()
+    if record is None:
+        raise SystemExit("Nothing is recorded: run `python -m tests.mutants --coverage` first.")
+    defaults = Defaults(map(tree_of, modules()))
+    packages = [requested.package] if requested.package else PACKAGES
+    sites = {package: list(all_sites(package, defaults)) for package in packages}
+    if requested.stop_path:
+        places = stop_path()
+        sites = {package: _within(found, places) for package, found in sites.items()}
+    if requested.again:
+        missed = {kept["identity"] for kept in json.loads(LAST_RUN.read_text("utf-8"))}
+        each = (mutant for found in sites.values() for site in found for mutant in site.mutants)
+        mutants = [mutant for mutant in each if mutant.identity in missed]
+    else:
+        mutants = sample(sites, requested.random, requested.seed)
+    results: list[Judged] = []
+
+    def show(result: Judged) -> None:
+        results.append(result)
+        kept = [asdict(result) for result in results if not result.noticed]
+        LAST_RUN.write_text(json.dumps(kept, indent=1), "utf-8")
+        print(
+            f"{result.seconds:6.1f} s  {result.noticed_by} ({result.tests} tests)"
+            f" | {result.identity[:200]} (line {result.line})",
+            flush=True,
+        )
+
+    with copies(requested.jobs) as made:
+        dealt(Judge(Chooser(record)).judge, mutants, made, show)
+    print(f"\n{len(mutants)} defects, seed {requested.seed}, recorded at {record.commit[:12]}\n")
+    print(report(results))
+    return 0 if rate(results) >= (1.0 if requested.stop_path else LEAST) else 1
+
+
+def _within(sites: Iterable[Site], places: set[tuple[str, str]]) -> list[Site]:
+    return [site for site in sites if (site.mutants[0].path, site.mutants[0].function) in places]

@@ -1,0 +1,202 @@
+"""Which lines of the product each test reaches, recorded by coverage.py.
+
+As a pytest plugin (`-p tests.reached`) it records one process; `record` has all tests recorded in
+a copy of the checkout, and keeps the result in a cache folder of the user's, one for a commit.
+Code that runs in a process of its own, such as a keeper, is not recorded.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Generator, Iterable
+from difflib import SequenceMatcher
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import platformdirs
+import pytest
+
+if TYPE_CHECKING:
+    from coverage import Coverage
+
+ROOT = Path(__file__).resolve().parent.parent
+PARTS = "DRIVEPANEL_REACHED_PARTS"
+"""The environment variable that names the folder for what each process has recorded."""
+PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.reached", "--timeout", "400")
+
+
+class Reach(NamedTuple):
+    """What is known of one test."""
+
+    lines: int
+    """Lines of the product that it reaches: the fewer, the more it is about each."""
+    seconds: float
+    passed: bool
+
+
+def folder() -> Path:
+    """The cache folder of all records."""
+    return Path(platformdirs.user_cache_dir("drivepanel-tests"))
+
+
+def git(*arguments: str) -> str:
+    """What git prints in the checkout; raises OSError or CalledProcessError without one."""
+    command = ("git", "-C", str(ROOT), *arguments)
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+class Recorder:
+    """Writes the lines that each test of this process reaches into the folder for the parts."""
+
+    def __init__(self, parts: Path) -> None:
+        from coverage import Coverage
+
+        self._parts = parts
+        self._tests: dict[str, tuple[float, bool]] = {}
+        self._coverage: Coverage = Coverage(
+            data_file=str(parts / "lines"), data_suffix=True, config_file=False,
+            include=[str(ROOT / "tui" / "*")], concurrency=["thread"],
+        )  # fmt: skip
+        self._coverage.start()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
+        """Record under the name of the test, its fixtures included."""
+        self._coverage.switch_context(item.nodeid)
+        self._tests[item.nodeid] = (0.0, True)
+        begun = time.monotonic()
+        try:
+            return (yield)
+        finally:
+            passed = self._tests[item.nodeid][1]
+            self._tests[item.nodeid] = (time.monotonic() - begun, passed)
+            self._coverage.switch_context("")
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """A test that fails, or is skipped, notices nothing."""
+        if not report.passed and report.nodeid in self._tests:
+            self._tests[report.nodeid] = (0.0, False)
+
+    def pytest_sessionfinish(self) -> None:
+        """Save what was recorded."""
+        self._coverage.stop()
+        self._coverage.save()
+        (self._parts / f"tests-{os.getpid()}.json").write_text(json.dumps(self._tests), "utf-8")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Record in each process that runs tests, and not in the one that deals them out."""
+    parts = os.environ.get(PARTS)
+    is_dealer = getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput")
+    if parts and not is_dealer:
+        config.pluginmanager.register(Recorder(Path(parts)))
+
+
+def record(copy: Path, commit: str, tests: Iterable[str], jobs: int) -> Record:
+    """Run tests in a copy of the checkout and keep the lines that each reaches."""
+    from coverage import CoverageData
+
+    parts = folder() / f"{commit}.parts"
+    parts.mkdir(parents=True, exist_ok=True)
+    environment = {**os.environ, "PYTHONPATH": str(copy), PARTS: str(parts)}
+    command = [sys.executable, *PYTEST, "-n", str(jobs), "--dist", "worksteal", *tests]
+    subprocess.run(command, cwd=copy, env=environment, check=False)
+    whole = folder() / f"{commit}.lines"
+    whole.unlink(missing_ok=True)
+    data = CoverageData(str(whole))
+    for part in sorted(parts.glob("lines.*")):
+        recorded = CoverageData(str(part))
+        recorded.read()
+        data.update(recorded, map_path=lambda path: Path(path).relative_to(copy).as_posix())
+    known: dict[str, tuple[float, bool]] = {}
+    for part in parts.glob("tests-*.json"):
+        known |= json.loads(part.read_text("utf-8"))
+    lines = _lines_by_test(whole)
+    tests_file = folder() / f"{commit}.json"
+    tests_file.write_text(
+        json.dumps({name: (lines.get(name, 0), *rest) for name, rest in known.items()}), "utf-8"
+    )
+    for part in parts.iterdir():
+        part.unlink()
+    parts.rmdir()
+    return Record(commit)
+
+
+def _lines_by_test(whole: Path) -> dict[str, int]:
+    """How many lines each test reaches, by the tables that coverage.py documents."""
+    with sqlite3.connect(whole) as tables:
+        tables.create_function("ones", 1, lambda bits: int.from_bytes(bits, "big").bit_count())
+        return dict(
+            tables.execute(
+                "SELECT context.context, SUM(ones(numbits)) FROM line_bits"
+                " JOIN context ON context.id = context_id GROUP BY context_id"
+            )
+        )
+
+
+class Record:
+    """The lines that tests have reached at one commit, for the source as it is now."""
+
+    def __init__(self, commit: str) -> None:
+        self.commit = commit
+
+    @cached_property
+    def tests(self) -> dict[str, Reach]:
+        """Each test that was recorded, by its name."""
+        known = json.loads((folder() / f"{self.commit}.json").read_text("utf-8"))
+        return {name: Reach(*reach) for name, reach in known.items()}
+
+    @cached_property
+    def _moved(self) -> dict[str, str]:
+        """Where files were at the commit that have another path today."""
+        status = git("diff", "--name-status", "--diff-filter=R", "-M50%", self.commit, "--", "tui")
+        rows = (line.split("\t") for line in status.splitlines())
+        return {new: old for _, old, new in rows}
+
+    @cache  # noqa: B019 - there is one record in a process
+    def lines(self, path: str) -> dict[int, set[str]]:
+        """By each line of a file as it is now: the tests that reach it."""
+        from coverage import CoverageData
+
+        old = self._moved.get(path, path)
+        data = CoverageData(str(folder() / f"{self.commit}.lines"))
+        data.read()
+        reached = {n: set(found) - {""} for n, found in data.contexts_by_lineno(old).items()}
+        if not reached:
+            return {}
+        before = git("show", f"{self.commit}:{old}").splitlines()
+        return {
+            new: reached[was]
+            for new, was in same_lines(before, (ROOT / path).read_text("utf-8").splitlines())
+            if was in reached
+        }
+
+
+def same_lines(before: list[str], after: list[str]) -> list[tuple[int, int]]:
+    """Each line after a change with the one it was before, from 1.
+
+    Lines that were rewritten count as those whose place they take.
+    """
+    found = []
+    for tag, i1, i2, j1, j2 in SequenceMatcher(None, before, after, autojunk=False).get_opcodes():
+        if tag in ("equal", "replace"):
+            found += [(j + 1, i1 + min(j - j1, i2 - i1 - 1) + 1) for j in range(j1, j2)]
+    return found
+
+
+def newest() -> Record | None:
+    """The record of the newest commit that the present one comes from."""
+    kept = {path.stem for path in folder().glob("*.json")}
+    for commit in git("rev-list", "HEAD").split():
+        if commit in kept:
+            return Record(commit)
+    return None
+
+
+Chooser = Callable[[str, int], set[str]]
