@@ -14,7 +14,7 @@ DEFECTS = (
         "tui/bus/rtu",
         "if is_whole(data[match.start : match.end]):",
         "if match:",
-        "A value that noise on the cable has changed is shown and acted on.",
+        "A value damaged by noise on the cable is shown and acted on.",
         ("tests/bus/test_rtu.py",),
     ),
     Defect(
@@ -30,7 +30,7 @@ DEFECTS = (
         "tui/bus/expectation.py",
         "if head != self.prefix[: len(head)]:",
         "if head[1:] != self.prefix[1 : len(head)]:",
-        "The answer to another kind of request is taken for values.",
+        "The answer to another kind of request is accepted as values.",
         ("tests/bus/test_faults.py::test_wrong_reply_is_thrown_away",),
     ),
     Defect(
@@ -38,7 +38,7 @@ DEFECTS = (
         "tui/bus/expectation.py",
         "return bool(pdu) and self.extent(pdu) == len(pdu)",
         "return bool(pdu) and bool(self.extent(pdu))",
-        "Words of a longer or shorter answer are taken for those that were asked for.",
+        "Words of a longer or shorter answer are accepted as the requested ones.",
         ("tests/bus/test_requests.py", "tests/bus/test_tcp.py::test_wrong_reply_is_thrown_away"),
     ),
     Defect(
@@ -46,7 +46,7 @@ DEFECTS = (
         "tui/bus/requests.py",
         "return Expectation(self.function, pdu, len(pdu))",
         "return Expectation(self.function, pdu[:3], len(pdu))",
-        "A write counts as answered although the drive heard another value.",
+        "A write counts as acknowledged although the drive received another value.",
         ("tests/bus/test_faults.py::test_wrong_reply_is_thrown_away", "tests/bus/test_requests.py"),
     ),
     Defect(
@@ -54,7 +54,7 @@ DEFECTS = (
         "tui/bus/requests.py",
         "return Expectation(self.function, self.pdu()[:5], 5)",
         "return Expectation(self.function, self.pdu()[:3], 5)",
-        "A write of several words counts as answered although the drive took fewer.",
+        "A write of several words counts as acknowledged although the drive took fewer.",
         ("tests/bus/test_faults.py::test_wrong_reply_is_thrown_away", "tests/bus/test_requests.py"),
     ),
     Defect(
@@ -62,7 +62,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "if job.request.changes or job.repeats >= retries:",
         "if job.repeats >= retries:",
-        "A command whose answer was lost is given a second time.",
+        "A command whose answer was lost is sent a second time.",
         ("tests/bus/test_faults.py::test_write_is_sent_once",),
     ),
     Defect(
@@ -78,7 +78,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "self._queue.put_back(job, behind=missed)",
         "self._queue.put_back(job)",
-        "All drives of a line pause for several timeouts when one goes away.",
+        "If one drive stops answering, all drives of its line pause for several timeouts.",
         ("tests/bus/test_faults.py::test_repeated_poll_lets_polls_of_other_drives_pass",),
     ),
     Defect(
@@ -86,7 +86,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "return result.end if job.first_sent is None else min(job.first_sent, result.end)",
         "return result.end",
-        "A value of some seconds ago is shown with the present time.",
+        "A value from some seconds ago is shown with the current time.",
         ("tests/bus/test_faults.py::test_late_reply_to_the_first_try_is_no_newer_than_that",),
     ),
     Defect(
@@ -94,7 +94,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "return since is not None and bool(pdu) and self.pdu == pdu and self.sent >= since",
         "return bool(pdu) and self.pdu == pdu",
-        "A late reply from before a write is taken for the value after it.",
+        "A late reply from before a write is accepted as the value after it.",
         (QUEUE,),
     ),
     Defect(
@@ -102,7 +102,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "return max([self.quiet_until, *expires])",
         "return self.quiet_until",
-        "A slow answer is taken for that of the next request, and all that follow shift.",
+        "A slow answer is accepted for the next request, and all later ones shift.",
         (
             "tests/bus/test_queue.py",
             "tests/bus/test_faults.py::test_late_reply_never_reaches_another_request",
@@ -113,7 +113,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "self.quiet_until = now + min(LATE_MARGIN * record.lateness, quiet)",
         "self.quiet_until = now",
-        "A late answer runs into the next request, and both are lost again and again.",
+        "A late answer collides with the next request, and both are lost repeatedly.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -121,7 +121,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "same = 0 if whole else sum(each.expectation == expectation for each in late)",
         "same = 0",
-        "A look behind a stop takes an answer from before it for the present.",
+        "A read after a stop accepts an answer from before it as current.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -129,7 +129,7 @@ DEFECTS = (
         "tui/bus/rtu",
         "self._silence = silence(link)",
         "self._silence = 0.0",
-        "Strict drives hear two frames as one and do not answer.",
+        "Strict drives receive two frames as one and do not answer.",
         ("tests/bus/test_faults.py::test_silence_is_kept",),
     ),
     Defect(
@@ -137,7 +137,7 @@ DEFECTS = (
         "tui/bus/rtu",
         "return 0 if copy < 0 else copy + len(self.frame)",
         "return 0",
-        "A write through an echoing adapter counts as done with no drive there.",
+        "A write through an echoing adapter counts as done without any drive.",
         ("tests/bus/test_rtu.py", "tests/bus/test_echo.py::test_echo_alone_is_no_answer"),
     ),
     Defect(
@@ -145,7 +145,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "if job.priority is Priority.STOP:\n            return 0.0, 0.0",
         "if job.priority is Priority.STOP:\n            return 3.0, 0.0",
-        "A stop waits behind every poll of the line.",
+        "A stop waits for every poll of the line.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -153,7 +153,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "if owed > OVERDUE:",
         "if False:",
-        "Polls of many drives leave a search, and whoever reads, waiting for good.",
+        "Polls of many drives keep a search, and every read, waiting without end.",
         ("tests/bus/test_line_shares.py",),
     ),
     Defect(
@@ -161,7 +161,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "self._had[mine] = self._had.get(mine, 0.0) + seconds",
         "self._had[mine] = 0.0",
-        "A program that polls 31 drives leaves another one a thirtieth of the line.",
+        "A program that polls 31 drives leaves another program a thirtieth of the line.",
         ("tests/bus/test_line_shares.py",),
     ),
     Defect(
@@ -169,7 +169,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "if job.priority is not Priority.STOP and waiting >= room:",
         "if waiting >= room:",
-        "On a busy line the stop key is told to try again.",
+        'On a busy line a stop key is refused with "try again".',
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -177,7 +177,7 @@ DEFECTS = (
         "tui/bus/schedule",
         'return self.refusal(job) or (job.forbidden() if job.forbidden is not None else "")',
         "return self.refusal(job)",
-        "A run command that waited for the line goes out behind the stop.",
+        "A run command that waited for the line is sent after the stop.",
         ("tests/bus/test_priorities.py",),
     ),
     Defect(
@@ -185,7 +185,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "older = behind[-1] if behind else None",
         "older = behind[0] if behind else None",
-        "A run command meets another reference than the one typed before it.",
+        "A run command takes effect with another reference than the one typed before it.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -193,7 +193,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "self._jobs.remove(older)",
         "older.begun = True",
-        "A reference that was typed over is sent to the drive all the same.",
+        "A reference that was replaced by a newer one is still sent to the drive.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -201,7 +201,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "if on_request or record.next_try is None or now >= record.next_try:",
         "if on_request or record.next_try is None:",
-        "A drive that was off for a moment is never watched again.",
+        "A drive that was off for a moment is never polled again.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -209,7 +209,7 @@ DEFECTS = (
         "tui/bus/schedule",
         "record.next_try = now + rest",
         "record.next_try = now",
-        "One dead drive takes the line's time from all others.",
+        "One dead drive uses up the line's time for all others.",
         ("tests/bus/test_queue.py",),
     ),
     Defect(
@@ -217,7 +217,7 @@ DEFECTS = (
         "tui/bus/limits.py",
         "if read_only and request.changes:",
         "if read_only and request.changes and False:",
-        "A line opened for looking only commands a motor.",
+        "A line that was opened as read-only commands a motor.",
         ("tests/bus/test_requests.py", "tests/bus/test_priorities.py"),
     ),
     Defect(
@@ -225,7 +225,7 @@ DEFECTS = (
         "tui/bus/limits.py",
         "elif request.function not in limits.functions:",
         "elif not limits.functions:",
-        "A drive is sent requests that its manual does not know.",
+        "A drive receives requests that its manual does not list.",
         ("tests/bus/test_requests.py",),
     ),
     Defect(
@@ -233,7 +233,7 @@ DEFECTS = (
         "tui/bus/tcp",
         'return awaited and int.from_bytes(unit[:2], "big") == self._transaction',
         "return awaited",
-        "Over a gateway a late answer is taken for the present one.",
+        "Over a gateway a late answer is accepted as the current one.",
         ("tests/bus/test_tcp.py",),
     ),
     Defect(
@@ -249,7 +249,7 @@ DEFECTS = (
         "tui/bus/rtu/master.py",
         "        return early and seldom and len(self._early) >= JUDGED\n",
         "        return False\n",
-        "A reply that was on its way before the request is taken for its answer.",
+        "A reply that was in flight before the request is accepted as its answer.",
         ("tests/bus/test_faults.py",),
     ),
     Defect(
@@ -257,7 +257,7 @@ DEFECTS = (
         "tui/bus/schedule/connection.py",
         "wire_time = isinstance(link, SerialLink) and not is_pseudo_terminal(link.path)",
         "wire_time = isinstance(link, SerialLink)",
-        "On a busy computer a simulated drive falls silent now and then.",
+        "On a busy computer a simulated drive sometimes does not answer.",
         ("tests/bus/test_faults.py",),
     ),
     Defect(
@@ -265,7 +265,7 @@ DEFECTS = (
         "tui/bus/rtu/master.py",
         "still = clock() - begun > FROZEN_IN_SENDING",
         "still = False",
-        "An answer that came while the program was frozen is shown as that of the next request.",
+        "An answer from while the program was frozen is shown for the next request.",
         ("tests/bus/test_hostile_peers.py",),
     ),
     Defect(
@@ -273,7 +273,7 @@ DEFECTS = (
         "tui/bus/rtu/master.py",
         "max(time, self._sent, self._over) + self._gap",
         "max(time, self._sent) + self._gap",
-        "A backup on a busy computer ends with a damaged answer: the drive was asked as it talked.",
+        "A backup on a busy computer fails: the next request interrupts a reply.",
         (f"{FAULTS}::test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_wire",),
     ),
     Defect(
@@ -281,7 +281,7 @@ DEFECTS = (
         "tui/bus/schedule/patience.py",
         "                    self._note_copy(record, now - late.sent, now)\n",
         "                    pass\n",
-        "Ten minutes after the first copy of a reply the next one is taken for an answer.",
+        "Ten minutes after the first copy of a reply, the next copy is accepted as an answer.",
         (f"{QUEUE}::test_copies_that_go_on_are_waited_for_as_long_as_they_come",),
     ),
     Defect(
@@ -289,7 +289,7 @@ DEFECTS = (
         "tui/bus/schedule/patience.py",
         "after = max(LATE_MARGIN * came, came + self._timing.frame_gap)",
         "after = LATE_MARGIN * came",
-        "A copy that an adapter hands over in its next lump is taken for an answer.",
+        "A copy that an adapter delivers in its next block is accepted as an answer.",
         (f"{QUEUE}::test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before",),
     ),
     Defect(
@@ -297,7 +297,7 @@ DEFECTS = (
         "tui/bus/schedule/patience.py",
         "if 0.0 < state.copies_within < SHORT_WAIT:",
         "if False:",
-        "Each new owner of a line that repeats replies takes one of each drive for an answer.",
+        "Each new owner of a line that repeats replies accepts one copy per drive as an answer.",
         (f"{QUEUE}::test_new_owner_knows_that_line_repeats_replies",),
     ),
     Defect(
@@ -313,7 +313,7 @@ DEFECTS = (
         "tui/bus/schedule/in_step.py",
         "        return self._probes.find(job, 1) if own == before[-1] else None\n",
         "        return None\n",
-        "A converter that is one reply behind shows another register's value of an Altivar 21.",
+        "A converter one reply behind shows another register's value of an Altivar 21.",
         (f"{IN_STEP}::test_drive_with_few_forms_shows_no_wrong_value",),
     ),
     Defect(
@@ -329,7 +329,7 @@ DEFECTS = (
         "tui/bus/schedule/in_step.py",
         "due = max(self._devices.last_reply_by(now), now + self._timing.first_timeout)",
         "due = now",
-        "A drive that is slower than its timeout makes the whole line lost.",
+        "A drive slower than its timeout takes the whole line out of use.",
         (f"{IN_STEP}::test_slow_drive_is_not_named_as_behind",),
     ),
     Defect(
@@ -345,7 +345,7 @@ DEFECTS = (
         "tui/bus/schedule/probes.py",
         "        return free <= max(now, self._devices.quiet_until)\n",
         "        return True\n",
-        "The late reply to a longer read is taken for that of another one.",
+        "The late reply to a longer read is accepted for another one.",
         (f"{IN_STEP}::test_length_of_a_reply_that_may_still_come_is_not_used",),
     ),
     Defect(
@@ -353,7 +353,7 @@ DEFECTS = (
         "tui/bus/schedule/queue.py",
         "        own = self.own_part(pdu)\n",
         "        own = pdu\n",
-        "A client of the gateway gets more registers than it has read.",
+        "A client of the gateway gets more registers than it requested.",
         (f"{IN_STEP}::test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing",),
     ),
 )

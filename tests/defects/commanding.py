@@ -22,7 +22,7 @@ DEFECTS = (
         "tui/session/settings",
         "if back is not None and (back ^ raw) & check & 0xFFFFFFFF:",
         "if back is not None and (back ^ raw) & 0:",
-        "A value that the drive did not take is told as written.",
+        "A value that the drive did not take is reported as written.",
         (WRITING,),
     ),
     Defect(
@@ -30,7 +30,7 @@ DEFECTS = (
         "tui/session/settings",
         "back = await self._read_back(parameter) if read_back else None",
         "back = None",
-        "Nobody looks whether the drive took what was written.",
+        "No read-back checks if the drive took the written value.",
         (WRITING,),
     ),
     Defect(
@@ -38,7 +38,7 @@ DEFECTS = (
         "tui/session/settings",
         "old = before.raw if before is not None else None",
         "old = raw",
-        "The journal cannot tell what a drive held before somebody changed it.",
+        "The journal has a wrong value from before a change.",
         (WRITING,),
     ),
     Defect(
@@ -46,7 +46,7 @@ DEFECTS = (
         "tui/session/settings",
         "forbidden=self.permit.refusal if self.permit is not None else None,",
         "forbidden=None,",
-        "A write that waited for the line goes out behind the stop.",
+        "A write that waited for the line is sent after the stop.",
         (WRITING,),
     ),
     Defect(
@@ -54,7 +54,7 @@ DEFECTS = (
         "tui/session/settings",
         "session.image.doubt(code)",
         "session.image.confirm(code, raw, 1e12)",
-        "A refused value counts as held, and the next stop is chosen by it.",
+        "A refused value counts as set, and the next stop word is chosen by it.",
         (WRITING,),
     ),
     Defect(
@@ -62,7 +62,7 @@ DEFECTS = (
         "tui/session/settings",
         "if not self._means(edit) or (edit.old is not None and held != edit.old):",
         "if not self._means(edit):",
-        "What a colleague set at the keypad meanwhile is overwritten.",
+        "A setting that a colleague changed at the keypad in the meantime is overwritten.",
         ("tests/session/test_applying.py::test_a_change_by_somebody_else_is_not_overwritten",),
     ),
     Defect(
@@ -70,7 +70,7 @@ DEFECTS = (
         "tui/session/settings",
         "if held == edit.new:",
         "if held is not None:",
-        "A setting that the drive refused by silence is told as written.",
+        "A setting that the drive ignored without a reply is reported as written.",
         ("tests/session/test_applying.py::test_a_silent_refusal_is_found_by_reading",),
     ),
     Defect(
@@ -78,7 +78,7 @@ DEFECTS = (
         "tui/session/work.py",
         "self.stops += 1",
         "self.stops += 0",
-        "What was typed before the stop key is carried out behind it.",
+        "A key typed before the stop key takes effect after it.",
         (WORK,),
     ),
     Defect(
@@ -94,7 +94,7 @@ DEFECTS = (
         "tui/session/work.py",
         "worker.cancel()",
         "worker.done()",
-        "A start on its way goes on behind the stop.",
+        "A start in progress continues after the stop.",
         (WORK,),
     ),
     Defect(
@@ -102,7 +102,7 @@ DEFECTS = (
         "tui/session/work.py",
         'dropped = turn is self._turn and self.drop("a command before it was refused")',
         "dropped = False",
-        "After a refused reference the motor is started all the same, at another one.",
+        "After a refused reference the motor still starts, at another reference.",
         (WORK,),
     ),
     Defect(
@@ -110,7 +110,7 @@ DEFECTS = (
         "tui/session/arming.py",
         "if until <= self._clock.monotonic():",
         "if until <= 0.0:",
-        "A panel left alone for an hour starts a motor by the key that somebody leans on.",
+        "A panel that was unattended for an hour starts a motor on an accidental key press.",
         ("tests/session/test_command.py::test_arming_ends_by_itself",),
     ),
     Defect(
@@ -118,7 +118,7 @@ DEFECTS = (
         "tui/session/arming.py",
         "is not LineStatus.CONNECTED",
         "is LineStatus.CLOSED",
-        "A line that comes back finds a drive armed that nobody has looked at since.",
+        "A drive is still armed after its line was lost and came back, without a check.",
         ("tests/session/test_command.py::test_a_lost_line_disarms",),
     ),
     Defect(
@@ -126,7 +126,7 @@ DEFECTS = (
         "tui/session/command",
         "reached = await access.wait_for(chart, {goal, enabled})",
         "reached = next(s for s in chart.states if s.id == goal)",
-        "A slow drive misses the words of its start and stays where it was.",
+        "A slow drive misses the words of its start and does not start.",
         ("tests/session/test_start_walk.py",),
     ),
     Defect(
@@ -135,7 +135,7 @@ DEFECTS = (
         "if held is not None:\n            raise OrderRefused(block_reason_text(held))",
         "if held is not None and not held.text:\n"
         "            raise OrderRefused(block_reason_text(held))",
-        "A motor is started although its enable or its channel forbids it.",
+        "A motor starts although its enable or its channel forbids it.",
         ("tests/session/test_command.py::test_refusals",),
     ),
     Defect(
@@ -143,7 +143,7 @@ DEFECTS = (
         "tui/session/command",
         "access.given.forget_reference()",
         "access.given.forget_words()",
-        "After a reset, which is said to leave the reference at 0, the motor runs at the old one.",
+        "After a reset, which should set the reference to 0, the motor runs at the old one.",
         ("tests/session/test_reset_clears.py",),
     ),
     Defect(
@@ -151,7 +151,7 @@ DEFECTS = (
         "tui/session/command",
         "if turns is None or turns == id:",
         "if turns is None or turns != id:",
-        "A motor that starts the other way is left running.",
+        "A motor that starts in the wrong direction keeps running.",
         ("tests/session/test_command.py::test_a_motor_that_starts_the_other_way_is_stopped",),
     ),
     Defect(
@@ -159,7 +159,7 @@ DEFECTS = (
         "tui/session/command",
         "_check_limits(ReferenceUnits(profile, readings), found)\n    if",
         "pass\n    if",
-        "A reference that was mistyped is written instead of being refused.",
+        "A mistyped reference is limited and written instead of being refused.",
         ("tests/session/test_command.py::test_references_that_are_refused",),
     ),
     Defect(
@@ -168,7 +168,7 @@ DEFECTS = (
         "        if refusal := state_refusal(self.session.profile, chart, id, access.raws):\n"
         "            raise OrderRefused(refusal)\n        at_rest",
         "        at_rest",
-        "A start in fault writes the reference, and only then finds out that nothing can run.",
+        "A start in fault writes the reference before it checks the state.",
         ("tests/cli/test_nothing_written.py::test_a_fault_holds_the_reference_back_too",),
     ),
     Defect(
@@ -176,7 +176,7 @@ DEFECTS = (
         "tui/cli/shared/errors.py",
         "if error.exit_code not in NOTHING_SENT or",
         "if error.exit_code in NOTHING_SENT or",
-        "Status 5 promises that nothing was written although the reference was.",
+        'Status 5 means "nothing was written", but the reference was.',
         ("tests/cli/test_sets.py::test_a_setting_written_before_a_refused_one_gives_status_6",),
     ),
     Defect(
@@ -212,7 +212,7 @@ DEFECTS = (
         "tui/session/command",
         "parameter, raw, why=why, priority=Priority.STOP, read_back=False",
         "parameter, raw, why=why, priority=Priority.BACKGROUND, read_back=False",
-        "A stop waits behind all that the line has to do.",
+        "A stop waits for all other work of the line.",
         ("tests/session/test_stop.py::test_a_stop_goes_before_all_that_waits",),
     ),
     Defect(
@@ -220,7 +220,7 @@ DEFECTS = (
         "tui/session/command",
         "if code in fresh or (turns and since):",
         "if code in trusted:",
-        "After a change at the keypad a stop sends a word that starts the motor.",
+        "After a change at the keypad, a stop sends a word that starts the motor.",
         (f"{STOP}::test_value_changed_at_rest_is_read_again",),
     ),
     Defect(
@@ -228,7 +228,7 @@ DEFECTS = (
         "tui/session/command",
         "if not hertz and kind in STANDING:",
         "if kind in STANDING:",
-        "A motor that coasts at full speed is told as stopped.",
+        "A motor that coasts at full speed is reported as stopped.",
         (f"{STOP}::test_a_motor_that_coasts_is_not_stopped_before_it_stands",),
     ),
     Defect(
@@ -236,7 +236,7 @@ DEFECTS = (
         "tui/session/command",
         "if not hertz and kind in STANDING:",
         "if not hertz:",
-        "A motor that stands enabled at 0 Hz is told as stopped.",
+        "A motor that is enabled at 0 Hz is reported as stopped.",
         (f"{STOP}::test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped",),
     ),
     Defect(
@@ -244,7 +244,7 @@ DEFECTS = (
         "tui/session/command/last_stop.py",
         "                self._line.send_prepared(session.prepared, ended)\n",
         '                ended("")\n',
-        "An error of the panel keeps the stop from the drive, and it is shown as sent.",
+        "An error of the panel keeps a stop from the drive, but the panel shows it as sent.",
         (FAULTS,),
     ),
     Defect(
@@ -252,7 +252,7 @@ DEFECTS = (
         "tui/session/command/stop.py",
         "            except LineLost:\n                raise\n",
         "",
-        "An error in the queue of the line keeps the stop from the drive.",
+        "An error in the queue of the line keeps a stop from the drive.",
         (FAULTS,),
     ),
     Defect(
@@ -260,7 +260,7 @@ DEFECTS = (
         "tui/session/command/stop.py",
         "carried_on(partial(watch_first_frames, begun, self._line.timing, self._last.send))",
         "carried_on(lambda: None)",
-        "A stop that an error in the line's loop has ended is never sent.",
+        "A stop that an error in the line's loop ended is never sent.",
         (FAULTS,),
     ),
     Defect(
@@ -284,7 +284,7 @@ DEFECTS = (
         "tui/session/command/stop.py",
         'self._say(session, Phase.SENDING, "stop waits for the line", ordered)',
         'self._say(session, Phase.STOPPING, "stop waits for the line", ordered)',
-        "A row shows STOPPING though its drive was sent nothing.",
+        "A row shows STOPPING although no stop was sent to its drive.",
         (f"{WAVES}::test_every_drive_is_sent_its_word_before_anything_is_read",),
     ),
     Defect(
@@ -292,7 +292,7 @@ DEFECTS = (
         "tui/session/command/last_known.py",
         '    if state.motion not in ENABLED:\n        return ""\n',
         '    return ""\n',
-        "A motor that its terminals run is shown as STOPPING for seconds.",
+        "A motor run from its terminals is shown as STOPPING for seconds.",
         (f"{WAVES}::test_a_stop_of_a_motor_that_its_terminals_run_is_not_stopped_at_once",),
     ),
     Defect(
@@ -300,7 +300,7 @@ DEFECTS = (
         "tui/session/command",
         "STOP_TRIES = 5",
         "STOP_TRIES = 1",
-        "One disturbed frame, and the motor runs on.",
+        "After one disturbed frame the motor keeps running.",
         ("tests/session/test_stop.py::test_a_dead_drive_is_tried_again_and_reported_of",),
     ),
     Defect(
@@ -308,7 +308,7 @@ DEFECTS = (
         "tui/session/command",
         "if chart is None or found is None or not found.broadcast:",
         "if chart is None or found is None:",
-        "The stop of one drive starts another that reads its word otherwise.",
+        "The stop of one drive starts another drive that interprets its word differently.",
         ("tests/session/test_stop.py::test_all_are_stopped_and_a_broadcast_starts_none",),
     ),
     Defect(
@@ -316,7 +316,7 @@ DEFECTS = (
         "tui/session/starts",
         "await asyncio.to_thread(session.starts.begin, session, order)",
         "await asyncio.sleep(0)",
-        "After a crash nobody knows that the motor was started from here.",
+        "After a crash no program knows that Drive Panel started the motor.",
         ("tests/session/test_start_walk.py",),
     ),
     Defect(
@@ -324,7 +324,7 @@ DEFECTS = (
         "tui/session/command",
         "session.starts.withdraw(session)",
         "session.starts.never_sent(session)",
-        "A motor whose stop was lost is forgotten by the next program.",
+        "The next program does not know of a motor whose stop was lost.",
         ("tests/session/test_start_walk.py",),
     ),
     Defect(
@@ -332,7 +332,7 @@ DEFECTS = (
         "tui/session/starts",
         "self._sent[task.drive] = math.inf",
         "self._sent[task.drive] = -math.inf",
-        "The record of a start is gone before the motor turns.",
+        "The record of a start is removed before the motor turns.",
         (
             "tests/session/test_starts.py::test_a_rest_read_before_the_run_frame_does_not_take_the_record",
         ),
@@ -342,7 +342,7 @@ DEFECTS = (
         "tui/session/command",
         "last = goal == enabled",
         "last = goal == enabled and self.session.starts.sent(self.session) is None",
-        "A motor whose drive was slow to start is forgotten by the next program.",
+        "The next program does not know of a motor whose drive was slow to start.",
         ("tests/session/test_start_walk.py",),
     ),
     Defect(
@@ -350,7 +350,7 @@ DEFECTS = (
         "tui/session/starts",
         "if session.device in self._runs_on:",
         "if not session.device:",
-        "A running motor is forgotten since a second start of it was refused.",
+        "A running motor loses its record because a second start was refused.",
         ("tests/session/test_start_walk.py",),
     ),
     Defect(
@@ -358,7 +358,7 @@ DEFECTS = (
         "tui/session/starts",
         "if not self.unrecorded:\n                raise",
         "if not self.unrecorded:\n                return",
-        "A motor is started from a program that cannot keep a record of it.",
+        "A program that cannot record a start starts a motor.",
         ("tests/session/test_start_walk.py",),
     ),
     Defect(
@@ -374,7 +374,7 @@ DEFECTS = (
         "tui/session/blocks",
         'await self.checks.check_slots("before")',
         "self.checks.check_named()",
-        "Words go to what another program has put into the slots meanwhile.",
+        "Words are sent to parameters that another program assigned to the slots in the meantime.",
         (
             "tests/session/test_exchange.py"
             "::test_an_exchange_needs_arming_and_the_interlocks_of_an_order",
@@ -385,7 +385,7 @@ DEFECTS = (
         "tui/session/proof/prover.py",
         "            self._check_rest(state)\n",
         "",
-        "A motor that the terminals start during a proof is left alone on the run, unasked.",
+        "A motor that the terminals start during a timeout test is not polled, without a question.",
         (f"{PROVER}::test_a_motor_that_begins_to_turn_meanwhile_is_still_polled",),
     ),
     Defect(
@@ -393,7 +393,7 @@ DEFECTS = (
         "tui/session/proof/prover.py",
         "            await self._check_same(rules, readings)\n",
         "",
-        "A drive whose timeout was changed meanwhile is said not to react as set.",
+        "A drive whose timeout was changed during its test is reported as not reacting as set.",
         (f"{PROVER}::test_foreign_change_during_test_proves_nothing",),
     ),
     Defect(
@@ -401,7 +401,7 @@ DEFECTS = (
         "tui/cli/commands/prove.py",
         "if turning and not yes:",
         "if False:",
-        "A hoist falls by one word of a command.",
+        "A hoist load falls after one command, without a question.",
         ("tests/cli/test_prove.py::test_on_the_run_without_a_terminal_takes_a_yes",),
     ),
     Defect(
@@ -409,7 +409,7 @@ DEFECTS = (
         "tui/session/proof/prover.py",
         "reported = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)",
         "reported = (await self._reader.read([rules.timeout])).values()",
-        "A drive that watches its other port is said not to notice a dead line.",
+        "A drive that monitors its other port is reported as ignoring a dead line.",
         ("tests/cli/test_prove.py::test_the_time_out_of_each_port_counts",),
     ),
     Defect(
@@ -417,7 +417,7 @@ DEFECTS = (
         "tui/session/monitor/line_watch.py",
         "            self._keep_alive(kept, UNKNOWN_TIMEOUT)\n",
         "            pass\n",
-        "A drive trips while a word that it does not have is waited for.",
+        "A drive trips while the panel waits for a word that the drive lacks.",
         (f"{LINE_WATCH}::test_drive_is_kept_alive_while_its_timeout_is_learned",),
     ),
     Defect(
@@ -425,7 +425,7 @@ DEFECTS = (
         "tui/session/monitor/timeout.py",
         "            await look_for_drive(reader.session, error)\n",
         "",
-        "A drive without a port's words counts as silent: polls and its feeding wait.",
+        "A drive without a port's words counts as silent, so its polls and keep-alive reads wait.",
         (f"{TIMEOUT}::test_a_drive_is_requested_what_it_has_after_a_silence",),
     ),
 )

@@ -14,7 +14,7 @@ DEFECTS = (
         "tui/session/counters/compare.py",
         "found = (now - before) % MODULO",
         "found = now - before",
-        "After 65536 frames the drive seems to have counted less than nothing.",
+        "After 65536 frames the drive shows a negative count.",
         COMPARED,
     ),
     Defect(
@@ -22,7 +22,7 @@ DEFECTS = (
         "tui/session/counters/compare.py",
         "if frames is None or now.damaged < self.last.damaged:",
         "if frames is None:",
-        "A drive that was switched off and on seems to have heard fewer errors than none.",
+        "After a power cycle the drive shows a negative number of errors.",
         COMPARED,
     ),
     Defect(
@@ -30,7 +30,7 @@ DEFECTS = (
         "tui/session/counters/compare.py",
         "missed = min(frames, found.sent.low) - damaged - found.answered.high",
         "missed = min(frames, found.sent.high) - damaged - found.answered.low",
-        "A request that is on its way at the moment of the look is told as a lost answer.",
+        "A request in flight at the moment of the count is reported as a lost answer.",
         COMPARED,
     ),
     Defect(
@@ -38,7 +38,7 @@ DEFECTS = (
         "tui/bus/tally.py",
         "self.of(device).count_exception(code)",
         "self.of(0).count_exception(code)",
-        "The drive that refuses is not the one of which it is told.",
+        "A refusal is counted for the wrong drive.",
         ("tests/bus/test_counters.py",),
     ),
     Defect(
@@ -46,7 +46,7 @@ DEFECTS = (
         "tui/screens/frames/frame_list.py",
         'AUTO_FOCUS: ClassVar = ""',
         'AUTO_FOCUS: ClassVar = "#typed"',
-        "Space on Frames goes into a field that nobody sees, and stops no motor.",
+        "Space on Frames goes into a hidden field, and stops no motor.",
         ("tests/ui/test_frames_screen.py::test_nothing_takes_the_focus_so_that_space_stops",),
     ),
     Defect(
@@ -54,7 +54,7 @@ DEFECTS = (
         "tui/screens/frames/choice.py",
         "return unanswered and requested is not None and requested.device != BROADCAST_DEVICE",
         "return unanswered and requested is None",
-        "Requests without an answer are missing where only errors are shown.",
+        "Requests without an answer are missing when only errors are shown.",
         ("tests/ui/test_frame_choice.py",),
     ),
     Defect(
@@ -62,7 +62,7 @@ DEFECTS = (
         "tui/session/counters/watch.py",
         "journal.add(_reset_entry(self.session, answer))",
         "pass",
-        "Nobody knows who set the counters of a drive to 0 with which others look for lost frames.",
+        "No record shows who reset the drive's counters that others use to find lost frames.",
         (
             "tests/session/test_counters.py::"
             "test_the_drives_counters_are_reset_and_compared_from_there",
@@ -73,7 +73,7 @@ DEFECTS = (
         "tui/bus/schedule/outcomes.py",
         "tally.count_good(device, was_heard=record.ever_answered and short)",
         "tally.count_good(device, was_heard=True)",
-        "A drive that was switched off for an hour is reported as a poor line.",
+        "A drive that was off for an hour makes the line count as poor.",
         MINUTE,
     ),
     Defect(
@@ -89,7 +89,7 @@ DEFECTS = (
         "tui/session/monitor/line_health.py",
         'if line.foreign >= (1 if "foreign" in before else SEVERAL_FRAMES):',
         "if line.foreign and self._poor:",
-        "Another master commands the drives, and the panel calls the line healthy.",
+        "Another master commands the drives, and the panel reports the line as good.",
         HEALTH,
     ),
     Defect(
@@ -97,7 +97,7 @@ DEFECTS = (
         "tui/session/monitor/line_health.py",
         "return share < (HEALTHY if was_poor else POOR)",
         "return share < POOR",
-        "The alert of a poor line comes and goes each second, until no one looks at it.",
+        "The alert of a poor line appears and disappears each second, until it is ignored.",
         HEALTH,
     ),
     Defect(

@@ -15,7 +15,7 @@ DEFECTS = (
         "tui/session/diagnosis/checks.py",
         "return bool(heard.requested) and heard.nothing and not heard.echoed",
         "return bool(heard.requested) and heard.nothing and bool(sight.neighbors)",
-        "A script takes a line on which nobody answers for a good one.",
+        "A script takes a line without any answer for a good one.",
         (f"{LADDER}::test_a_drive_that_has_not_answered_is_never_reported_to_be_well",),
     ),
     Defect(
@@ -23,7 +23,7 @@ DEFECTS = (
         "tui/session/diagnosis/heard.py",
         "        if not tcp and data == request:\n",
         "        if not tcp and data == asked:\n",
-        "An adapter that repeats what is sent is taken for the drive.",
+        "An adapter that repeats every frame is taken for the drive.",
         (f"{LADDER}::test_only_the_echo_comes_back",),
     ),
     Defect(
@@ -31,7 +31,7 @@ DEFECTS = (
         "tui/session/diagnosis/garbled.py",
         "wanted = sight.link.baud * due / came",
         "wanted = sight.link.baud * came / due",
-        "A person is sent to a baud on which the drive is heard even less.",
+        "The advice leads to a baud at which the drive is received even less.",
         (f"{LADDER}::test_bytes_that_came_at_another_baud_tell_which",),
     ),
     Defect(
@@ -39,7 +39,7 @@ DEFECTS = (
         "tui/session/diagnosis/checks.py",
         "if code in codes]",
         "if code not in codes]",
-        "A gateway that does not reach the drive is looked for in the drive.",
+        "The drive is suspected although the gateway cannot reach it.",
         (f"{LADDER}::test_a_gateway_answers_in_the_drives_place",),
     ),
     Defect(
@@ -47,7 +47,7 @@ DEFECTS = (
         "tui/session/diagnosis/checks.py",
         "return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT",
         "return not sight.heard.damaged",
-        "An adapter that holds nothing back is blamed.",
+        "An adapter that delays nothing is blamed.",
         (f"{LADDER}::test_latency_is_reported_where_it_is_set_and_measured",),
     ),
     Defect(
@@ -55,7 +55,7 @@ DEFECTS = (
         "tui/bus/transport/port_errors.py",
         "grown = [now - then for now, then in zip(self, before, strict=True)]",
         "grown = [now + 0 * then for now, then in zip(self, before, strict=True)]",
-        "What the port counted last week is taken for a wrong baud today.",
+        "Last week's counts of the port are taken for a wrong baud today.",
         (f"{PORTS}::test_added_request_is_counted_if_a_reply_fails",),
     ),
     Defect(
@@ -63,7 +63,7 @@ DEFECTS = (
         "tui/session/diagnosis/asking.py",
         "device, address, 1, priority=Priority.OPERATOR_READ, function=function",
         "device, address, 1, priority=Priority.FEED, function=function",
-        "Asking why goes before the commands of an operator.",
+        "A diagnosis takes priority over the commands of an operator.",
         (f"{LADDER}::test_it_asks_as_an_operator_does",),
     ),
     Defect(
@@ -71,7 +71,7 @@ DEFECTS = (
         "tui/cli/commands/why.py",
         "    if not found.well:\n        raise click.exceptions.Exit(LINE_TROUBLE)\n",
         "",
-        "A script goes on with a drive that does not answer.",
+        "A script continues with a drive that does not answer.",
         (f"{COMMAND}::test_a_port_that_is_not_there",),
     ),
     Defect(
@@ -79,7 +79,7 @@ DEFECTS = (
         "tui/session/diagnosis/garbled.py",
         "if not came or not due or same_speed(sight) or not isinstance(sight.link, SerialLink):",
         "if not came or not due or not isinstance(sight.link, SerialLink):",
-        "It is said that the speed is right, and to open the line at another one.",
+        "The advice says that the speed is right, and to open the line at another one.",
         (
             "tests/session/test_diagnosis.py::"
             "test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed",
@@ -90,7 +90,7 @@ DEFECTS = (
         "tui/session/diagnosis/next_steps.py",
         "yield from wiring_hints(sight, answers=True)",
         "yield from wiring_hints(sight)",
-        "A person changes over the wires of a drive that answers by them.",
+        "A person swaps the wires of a drive that answers.",
         ("tests/session/test_diagnosis.py::test_answering_drive_has_correct_wires",),
     ),
     Defect(
@@ -98,7 +98,7 @@ DEFECTS = (
         "tui/session/diagnosis/measure.py",
         "        if paused.second >= TURNS:",
         "        if self.second:",
-        "A person looks for a second drive where an adapter sends each frame twice.",
+        "A person looks for a second drive although an adapter sends each frame twice.",
         (f"{MEASURED}::test_a_copy_during_the_next_request_is_no_second_drive",),
     ),
     Defect(
@@ -106,7 +106,7 @@ DEFECTS = (
         "tui/session/diagnosis/measure.py",
         "prompt = due and frame.time - now.began < PROMPT",
         "prompt = due",
-        "A slow drive is said to show values of other registers.",
+        "A slow drive is reported as showing values of other registers.",
         (f"{MEASURED}::test_one_behind_is_at_once_and_a_late_reply_is_not",),
     ),
     Defect(
@@ -115,7 +115,7 @@ DEFECTS = (
         "if exchange.older and "
         '(exchange.replies or exchange.damaged or exchange.older == "second"):',
         "if exchange.older and exchange.replies:",
-        "Two drives at one address are called a converter that is behind.",
+        "Two drives at one address are reported as a converter that is behind.",
         (f"{MEASURED}::test_an_older_reply_is_counted_by_what_else_came",),
     ),
     Defect(
@@ -123,7 +123,7 @@ DEFECTS = (
         "tui/session/diagnosis/measure.py",
         "and body[2] in unreached:",
         "and body[2] in ():",
-        "A gateway that misses the drive now and then is called well.",
+        "A gateway that sometimes misses the drive is reported as good.",
         (f"{MEASURED}::test_a_gateway_that_misses_the_drive_is_counted",),
     ),
     Defect(
@@ -131,7 +131,7 @@ DEFECTS = (
         "tui/session/diagnosis/gateway_probe.py",
         "    if others - {device, ANY_UNIT}:\n        return None  # the gateway passes units on\n",
         "",
-        "An address without a drive is called a gateway that answers unit 255 only.",
+        "An unused address is reported as a gateway that answers only unit 255.",
         (f"{MEASURED}::test_no_connection_is_made_beside_a_line_that_answers",),
     ),
     Defect(
@@ -147,7 +147,7 @@ DEFECTS = (
         "tui/session/proof/prover.py",
         "                if clock.monotonic() >= limit:\n                    raise\n",
         "                raise\n",
-        "Behind a gateway that closes idle connections nobody learns what the drive did.",
+        "Behind a gateway that closes idle connections, a timeout test has no result.",
         (
             "tests/session/test_prover.py::"
             "test_connection_closed_in_a_silence_is_read_once_it_is_back",

@@ -12,7 +12,7 @@ DEFECTS = (
         "tui/session/unsaved.py",
         "elif self._held[code] != before:",
         "elif False:",
-        "A setting that was changed at the keypad is lost at power-off, and nothing said so.",
+        "A setting changed at the keypad is lost at power-off without a warning.",
         (f"{EDITOR}::test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved",),
     ),
     Defect(
@@ -36,7 +36,7 @@ DEFECTS = (
         "tui/drive/read_plan.py",
         "ordered = [p for p in wanted if p.function == function]",
         "ordered = wanted",
-        "A run of words goes over two spaces of addresses, and shows values of the other.",
+        "A read covers two address spaces and shows values of the wrong one.",
         ("tests/session/test_language.py",),
     ),
     Defect(
@@ -44,7 +44,7 @@ DEFECTS = (
         "tui/drive/profile/rules/charts.py",
         "        if not ways:",
         "        if ways == [None]:",
-        "A motor is run by a profile that has no way to stop it.",
+        "A motor runs by a profile that has no way to stop it.",
         ("tests/drive/test_profile_check.py",),
     ),
     Defect(
@@ -52,7 +52,7 @@ DEFECTS = (
         "tui/drive/profile/rules/charts.py",
         "if not before.mask & ~state.mask and",
         "if before.mask & ~state.mask and",
-        "A tripped drive of one's own profile is shown in the state above.",
+        "A tripped drive with the user's own profile is shown in an earlier state.",
         ("tests/drive/test_profile_check.py",),
     ),
     Defect(
@@ -60,7 +60,7 @@ DEFECTS = (
         "tui/drive/profile/check.py",
         "reported += [rule for rule in _broken_rules(data) if",
         "reported += [rule for rule in () if",
-        "Faults of a profile are told one run after another.",
+        "Faults of a profile are reported one per run.",
         ("tests/drive/test_profile_check.py",),
     ),
     Defect(
@@ -92,7 +92,7 @@ DEFECTS = (
         "tui/drive/values.py",
         "counts.to_integral_value(ROUND_HALF_UP)",
         'counts.to_integral_value("ROUND_DOWN")',
-        "A ramp that was typed is written shorter than it was meant.",
+        "A typed ramp is written shorter than typed.",
         ("tests/drive/test_values.py",),
     ),
     Defect(
@@ -100,7 +100,7 @@ DEFECTS = (
         "tui/drive/values.py",
         "if not low <= raw <= high and raw not in names:",
         "if not low <= raw and raw not in names:",
-        "A value past what the manual allows is written to the drive.",
+        "A value above the range in the manual is written to the drive.",
         ("tests/drive/test_values.py",),
     ),
     Defect(
@@ -124,7 +124,7 @@ DEFECTS = (
         "tui/drive/chart.py",
         "return word >> mark.bit & 1 == mark.value",
         "return word >> mark.bit & 1 != mark.value",
-        "A drive in alarm looks well, and a drive that is well looks alarmed.",
+        "A drive in alarm looks healthy, and a healthy drive shows an alarm.",
         ("tests/drive/test_profiles_atv71.py", "tests/session/test_drive_state.py"),
     ),
     Defect(
@@ -132,7 +132,7 @@ DEFECTS = (
         "tui/drive/chart.py",
         'return "reverse" if word >> mark.bit & 1 == mark.reverse else "forward"',
         'return "forward" if word >> mark.bit & 1 == mark.reverse else "reverse"',
-        "A motor that turns backwards is shown turning forwards.",
+        "A motor in reverse is shown as running forward.",
         ("tests/drive/test_profiles_atv71.py", "tests/session/test_drive_state.py"),
     ),
     Defect(
@@ -140,7 +140,7 @@ DEFECTS = (
         "tui/drive/chart.py",
         "return None if faults.shows_last or raw == faults.none else raw",
         "return None",
-        "A tripped drive whose status word knows no fault is shown ready, and is run.",
+        "A tripped drive whose status word has no fault bit is shown as ready, and is run.",
         ("tests/session/test_fault_word.py",),
     ),
     Defect(
@@ -148,7 +148,7 @@ DEFECTS = (
         "tui/drive/chart.py",
         "return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind",
         "return self.state.kind",
-        "Settings that need standstill are written to a motor that runs on with a fault.",
+        "Settings that need standstill are written to a motor that runs with a fault.",
         ("tests/session/test_fault_word.py",),
     ),
     Defect(
@@ -156,7 +156,7 @@ DEFECTS = (
         "tui/drive/channel.py",
         'if unread == "":\n            continue',
         'if unread == "" and row.when[-1].holds(raws) is None:\n            continue',
-        "A drive that its terminals command is said to be commanded by the line.",
+        "A drive under terminal control is shown as commanded by the line.",
         ("tests/drive/test_channels.py",),
     ),
     Defect(
@@ -164,7 +164,7 @@ DEFECTS = (
         "tui/drive/channel.py",
         "value = (raws[row.parameter] & row.mask) >> row.shift",
         "value = raws[row.parameter]",
-        "The wrong one is said to command a drive, or nobody.",
+        "The wrong commander of a drive is shown, or none.",
         ("tests/drive/test_channels.py",),
     ),
     Defect(
@@ -172,7 +172,7 @@ DEFECTS = (
         "tui/drive/channel.py",
         "if raw is None or raw in switch.fixed or",
         "if raw is None or raw not in switch.fixed or",
-        "Nobody is warned that an input takes a running motor from the line.",
+        "No warning says that an input takes a running motor from the line.",
         ("tests/drive/test_channels.py",),
     ),
     Defect(
@@ -180,7 +180,7 @@ DEFECTS = (
         "tui/drive/command_blocked.py",
         "if found is not None and not found.by_line:",
         "if found is not None and found.by_line is False:",
-        "A run command is sent to a drive of which nobody knows who commands it.",
+        "A run command is sent to a drive whose commander is unknown.",
         ("tests/drive/test_channels.py",),
     ),
     Defect(
@@ -188,7 +188,7 @@ DEFECTS = (
         "tui/drive/command_blocked.py",
         'return CommandBlocked(f"{lock.parameter} is not known, and it decides: {lock.text}")',
         "return None",
-        "A motor is started although the word that forbids it could not be read.",
+        "A motor starts although the word that forbids it could not be read.",
         ("tests/drive/test_orders.py",),
     ),
     Defect(
@@ -196,7 +196,7 @@ DEFECTS = (
         "tui/drive/orders.py",
         "kept = raws.get(where, 0) & optional_bits(chart, where)",
         "kept = 0",
-        "A run command switches an option of the drive off.",
+        "A run command switches off an option of the drive.",
         ("tests/session/test_command.py::test_options_of_an_altivar_21_stay_from_order_to_order",),
     ),
     Defect(
@@ -212,7 +212,7 @@ DEFECTS = (
         "tui/drive/orders.py",
         "for other in charts\n                ):",
         "for other in [chart]\n                ):",
-        "A drive whose chart is not known is given a word that starts it in another.",
+        "A drive with an unknown chart receives a stop word that starts it in another chart.",
         ("tests/session/test_stop_words.py", "tests/session/test_stop.py"),
     ),
     Defect(
@@ -220,7 +220,7 @@ DEFECTS = (
         "tui/drive/read_plan.py",
         "if reading.single_words_only or count > longest:",
         "if reading.single_words_only or count > longest + 1:",
-        "A drive refuses, or leaves unanswered, a read that is one word too long.",
+        "A drive refuses or ignores a read that is one word too long.",
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(
@@ -228,7 +228,7 @@ DEFECTS = (
         "tui/drive/read_plan.py",
         "if start < end - 1 and last - ordered[start].address >= longest:",
         "if start < end - 1 and last - ordered[start].address > longest // 2:",
-        "A screen of a drive is read in twice as many requests as it takes.",
+        "A screen of a drive needs twice as many requests as necessary.",
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(
@@ -236,7 +236,7 @@ DEFECTS = (
         "tui/drive/read_plan.py",
         "if not reading.gaps_readable and not _all_known(",
         "if reading.gaps_readable and not _all_known(",
-        "A read goes over words that the drive does not have, and brings nothing.",
+        "A read covers words that the drive does not have, and returns nothing.",
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(
@@ -252,7 +252,7 @@ DEFECTS = (
         "tui/drive/read_plan.py",
         'checked=block.effective == "at-once",',
         "checked=False,",
-        "After another program changed the scanner one value is shown as another.",
+        "After another program changed the scanner, one value is shown as another.",
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(
@@ -276,7 +276,7 @@ DEFECTS = (
         "tui/drive/settings/writable.py",
         "if not any(r.never_set and r.raw == raw for r in watch.reactions):",
         "if watch.reactions:",
-        "A drive can be set to run on when the line is lost.",
+        "A drive can be set to keep running when the line is lost.",
         ("tests/drive/test_edits.py",),
     ),
     Defect(
@@ -284,7 +284,7 @@ DEFECTS = (
         "tui/drive/settings/write_sequence.py",
         "chosen = next(free, waiting[0])",
         "chosen = waiting[0]",
-        "Restoring is refused by the drive since a limit stands in the way.",
+        "The drive refuses a restore because of a limit that is written later.",
         ("tests/drive/test_edits.py",),
     ),
     Defect(
@@ -300,7 +300,7 @@ DEFECTS = (
         "tui/drive/settings/compare.py",
         "return _plain(a.number) == _plain(b.number)",
         "return int(a.number) == int(b.number)",
-        "Two drives with other ramps are said to be set alike.",
+        "Two drives with different ramps are reported as equal.",
         ("tests/drive/test_parameter_set.py",),
     ),
     Defect(
@@ -308,7 +308,7 @@ DEFECTS = (
         "tui/drive/settings/set_reading.py",
         "if END_OF_SET not in tables:",
         "if END_OF_SET not in tables:\n        return\n    if not tables:",
-        "Half a backup is restored as if it were whole.",
+        "Half a backup is restored as if it were complete.",
         ("tests/drive/test_parameter_set.py",),
     ),
     Defect(
@@ -316,7 +316,7 @@ DEFECTS = (
         "tui/drive/settings/set_reading.py",
         "if reported != count:",
         "if reported is None:",
-        "A backup from which lines were lost is restored as if it were whole.",
+        "A backup with missing lines is restored as if it were complete.",
         ("tests/drive/test_parameter_set.py",),
     ),
     Defect(
@@ -324,7 +324,7 @@ DEFECTS = (
         "tui/drive/settings/multiple.py",
         "counts.to_integral_value(ROUND_FLOOR)",
         'counts.to_integral_value("ROUND_CEILING")',
-        "A current past what the drive allows is written, and cut by the drive.",
+        "A current above the drive's limit is written, and the drive truncates it.",
         ("tests/drive/test_factory.py",),
     ),
     Defect(
@@ -332,7 +332,7 @@ DEFECTS = (
         "tui/drive/settings/limits.py",
         'return "above" if of is parameter.max_of and number > limit else ""',
         'return "above" if of is parameter.min_of and number > limit else ""',
-        "A thermal current far above the drive's own is written.",
+        "A thermal current far above the drive's own rating is written.",
         ("tests/drive/test_factory.py",),
     ),
     Defect(
@@ -340,7 +340,7 @@ DEFECTS = (
         "tui/drive/settings/factory.py",
         "return by.raws.get(str(raws.get(by.parameter)))",
         "return parameter.factory",
-        "On a 60 Hz drive nobody has touched, speeds are told as changed.",
+        "On an untouched 60 Hz drive, speeds are reported as changed.",
         ("tests/drive/test_factory.py",),
     ),
     Defect(
@@ -348,7 +348,7 @@ DEFECTS = (
         "tui/drive/settings/factory.py",
         "return {**raws, source.code: source.factory}",
         "return raws",
-        "A ramp ten times shorter than the factory's is told as unchanged.",
+        "A ramp ten times shorter than the factory's is reported as unchanged.",
         ("tests/drive/test_factory.py",),
     ),
     Defect(
@@ -356,7 +356,7 @@ DEFECTS = (
         "tui/drive/settings/factory.py",
         "return known not in UNVERIFIED",
         "return True",
-        "What only a sister family's manual tells is taken for this drive's.",
+        "A fact from a sister family's manual is shown as this drive's.",
         ("tests/drive/test_factory.py",),
     ),
     Defect(
@@ -380,7 +380,7 @@ DEFECTS = (
         "tui/drive",
         "closed_inputs(profile, inputs)) if part)",
         "closed_inputs(profile, raws)) if part)",
-        "The question before a reset names inputs that were closed earlier as closed now.",
+        "The question before a reset names inputs as closed that were closed only earlier.",
         ("tests/drive/test_fault_reset.py",),
     ),
     Defect(
@@ -388,7 +388,7 @@ DEFECTS = (
         "tui/drive/hints.py",
         "return (raw >> reported.bit & 1) == reported.value",
         "return (raw >> reported.bit & 1) != reported.value",
-        "Faults says that a reset works while the cause is there.",
+        "Faults says that a reset works although the cause is still present.",
         ("tests/drive/test_fault_help.py",),
     ),
     Defect(
@@ -396,7 +396,7 @@ DEFECTS = (
         "tui/drive/hints.py",
         "if ready is not None:",
         "if ready:",
-        "What was recalled is told although the drive says that the cause is still there.",
+        "A remembered reset result is shown although the drive reports the cause as present.",
         ("tests/drive/test_fault_help.py",),
     ),
     Defect(
@@ -412,7 +412,7 @@ DEFECTS = (
         "tui/drive/profile/guide.py",
         "self._read = read",
         "self._read = (lambda told=read(): told) if read else None",
-        "The first picture waits for advice on faults that nobody has.",
+        "The first picture waits for advice on faults that no drive has.",
         ("tests/drive/test_fault_help.py",),
     ),
     Defect(
@@ -420,7 +420,7 @@ DEFECTS = (
         "tui/drive/model.py",
         "if model.class_b == class_b]",
         "if model is not None]",
-        "A drive of 400 V with another filter is taken for the first with its code.",
+        "A drive of 400 V with another filter is identified as the first with its code.",
         ("tests/drive/test_family_page.py",),
     ),
     Defect(
@@ -428,7 +428,7 @@ DEFECTS = (
         "tui/screens/monitor/words.py",
         "if (bit.on if on else bit.off).casefold() not in PLAIN_ANSWERS:",
         "if on and bit.on.casefold() not in PLAIN_ANSWERS:",
-        "Quick stop active is dim while the quick stop is active.",
+        '"Quick stop active" is dim while the quick stop is active.',
         ("tests/ui/test_monitor_words.py",),
     ),
     Defect(
@@ -436,7 +436,7 @@ DEFECTS = (
         "tui/drive/hints.py",
         "known = raws if latest else {",
         "known = raws if latest or raws else {",
-        "The mains at the last fault rules out a cause of the fault before.",
+        "The mains voltage at the last fault rules out a cause of the fault before.",
         ("tests/ui/test_fault_doctor.py",),
     ),
 )

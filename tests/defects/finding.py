@@ -17,7 +17,7 @@ DEFECTS = (
         "tui/cli/running/scanning.py",
         "if text := (await listen_first(line, LISTEN)).text:",
         "if (text := (await listen_first(line, LISTEN)).text) and False:",
-        "A running plant's controller loses its answers while drives are searched for.",
+        "The controller of a running plant loses its answers during a search for drives.",
         (f"{SCAN}::test_another_master_ends_it_before_anything_is_sent",),
     ),
     Defect(
@@ -25,7 +25,7 @@ DEFECTS = (
         "tui/bus/rtu/master.py",
         "if len(self._idle) < MUCH_TALK:",
         "if True:",
-        "A master that leaves no long silences is not noticed, and disturbed.",
+        "A master without long silences is not detected, and is disturbed.",
         (f"{MASTERS}::test_a_master_is_heard_on_a_line_on_which_nothing_is_sent",),
     ),
     Defect(
@@ -41,7 +41,7 @@ DEFECTS = (
         "tui/session/connect/search.py",
         "silent = await first(self.devices, Priority.BACKGROUND, how.within)",
         "silent = await first(self.devices, Priority.BACKGROUND, None)",
-        "To search 31 addresses takes ten times as long.",
+        "A search of 31 addresses takes ten times as long.",
         (f"{SEARCH}::test_an_empty_address_costs_one_request_and_the_longest_turnaround",),
     ),
     Defect(
@@ -65,7 +65,7 @@ DEFECTS = (
         "tui/session/connect/identifying.py",
         "            if not await control():\n",
         "            if not await control() and False:\n",
-        "A lost identification is taken for a family that has none.",
+        "A lost identification is interpreted as a family that has none.",
         (f"{FIND}::test_silence_beside_a_lost_read_infers_no_family",),
     ),
     Defect(
@@ -81,7 +81,7 @@ DEFECTS = (
         "tui/bus/identification.py",
         "            if objects.setdefault(number, content) != content:\n",
         "            if objects.setdefault(number, content) is None:\n",
-        "Two drives at one address are taken for the one whose name came first.",
+        "Two drives at one address appear as the one whose name arrived first.",
         ("tests/bus/test_faults.py::test_object_with_two_contents_is_named_and_refused",),
     ),
     Defect(
@@ -97,7 +97,7 @@ DEFECTS = (
         "tui/bus/schedule/patience.py",
         "on_request = within is not None or priority < Priority.POLL",
         "on_request = priority < Priority.POLL",
-        "A drive without function 43 is not asked by 17, and not polled for a second once found.",
+        "A drive without function 43 is not tried with 17, and its first poll is a second late.",
         ("tests/bus/test_api.py::test_probe_of_silent_device_waits_for_no_back_off",),
     ),
     Defect(
@@ -113,7 +113,7 @@ DEFECTS = (
         "tui/cli/running/scanning.py",
         "        if not (self.yes or may_ask()):\n",
         "        if False:\n",
-        "A script lets a motor coast, as its drive is asked no more.",
+        "A script lets a motor coast because polling of its drive stops.",
         (f"{SCAN}::test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act",),
     ),
     Defect(
@@ -129,7 +129,7 @@ DEFECTS = (
         "tui/cli/commands/scan.py",
         "    if others := line.facts.others:\n",
         "    if (others := line.facts.others) and False:\n",
-        "The panel beside it loses its drives, which trip.",
+        "Another panel on the line loses its drives, which trip.",
         (f"{SCAN}::test_a_line_that_others_use_is_not_taken_for_other_settings",),
     ),
     Defect(
@@ -137,7 +137,7 @@ DEFECTS = (
         "tui/cli/commands/scan.py",
         "    except KeyboardInterrupt:\n",
         "    except ZeroDivisionError:\n",
-        "Whoever ends a long search does not learn what it came to.",
+        "A long search that is canceled does not show its results.",
         (f"{SCAN}::test_ctrl_c_keeps_what_was_found",),
     ),
     Defect(
@@ -145,7 +145,7 @@ DEFECTS = (
         "tui/session/fleet.py",
         "self._strangers.keep(identity.device)",
         "pass",
-        "A drive of no known family trips while a person looks up which one it is.",
+        "A drive of an unknown family trips while a person looks up its family.",
         (f"{SETTINGS}::test_drives_are_still_polled_while_the_person_decides_known_or_not",),
     ),
     Defect(
@@ -153,7 +153,7 @@ DEFECTS = (
         "tui/screens/connection/other_settings.py",
         "if self.found or self.search.answered:",
         "if self.found:",
-        "Two drives at one address are asked once and left alone, unasked.",
+        "Two drives at one address get one request and are then not polled, without a question.",
         (f"{SETTINGS}::test_unexpected_answer_tries_no_other_setting_unasked",),
     ),
     Defect(
@@ -161,7 +161,7 @@ DEFECTS = (
         "tui/screens/connection/scanning.py",
         "self.families = await asyncio.to_thread(_families)",
         'self.families = ""',
-        "Nobody knows before the search that a drive will watch the line from then on.",
+        "The search does not say beforehand that it starts the timeout of a drive.",
         (f"{SETTINGS}::test_possible_drives_are_named_before_first_request",),
     ),
     Defect(
@@ -169,7 +169,7 @@ DEFECTS = (
         "tui/session/connect/search.py",
         "return first + LATE_WAIT + (self._silent.times + still) * self._cost_again",
         "return first",
-        "A search that says that a second is left takes ten.",
+        "A search that shows one second left takes ten.",
         (f"{SEARCH}::test_remaining_estimate_counts_silent_addresses_again",),
     ),
     Defect(
@@ -177,7 +177,7 @@ DEFECTS = (
         "tui/cli/running/scanning.py",
         "self.costs is None\n            or not later[0].slow",
         "True",
-        "A search that is as good as done goes on for a minute and a half, and nobody knows why.",
+        "A search that is almost done takes another minute and a half, without a message.",
         (f"{SCAN}::test_slow_setting_is_reported_before_it_is_tried",),
     ),
     Defect(
@@ -185,7 +185,7 @@ DEFECTS = (
         "tui/session/connect/search.py",
         "if paused := line.facts.paused.get(device):",
         "if False and (paused := ('', '')):",
-        "Who comes to a line looks for a broken wire, at a drive that is being proved.",
+        "A person looks for a broken wire at a drive whose timeout is being tested.",
         (f"{SEARCH}::test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one",),
     ),
     Defect(
@@ -193,7 +193,7 @@ DEFECTS = (
         "tui/screens/connection/scanning.py",
         "if not self.found and self.search is not None and self.search.answered:",
         "if False:",
-        "It is said that nobody answers where two drives answer at once.",
+        '"No answer" is shown although two drives answer at once.',
         (f"{SETTINGS}::test_unexpected_answer_tries_no_other_setting_unasked",),
     ),
 )  # fmt: skip

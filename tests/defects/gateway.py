@@ -13,7 +13,7 @@ DEFECTS = (
         "tui/bus/gateway/server.py",
         "        talk.make_room()\n        task.cancel()\n",
         "",
-        "Connections that a program forgot keep the one out that comes to stop a motor.",
+        "Connections that a program forgot keep out the client that would stop a motor.",
         ("tests/bus/test_gateway.py",),
     ),
     Defect(
@@ -21,7 +21,7 @@ DEFECTS = (
         "tui/bus/gateway/talk.py",
         "writes=bool(self._writes)",
         "writes=False",
-        "A client whose stop is still on its way is thrown out with it.",
+        "A client whose stop is still pending is disconnected, and its stop is lost.",
         ("tests/bus/test_gateway.py",),
     ),
     Defect(
@@ -29,7 +29,7 @@ DEFECTS = (
         "tui/bus/gateway/room.py",
         "if counts[connection.address] == most",
         "if most",
-        "Clients of one computer that connect again and again throw the others out.",
+        "Clients of one computer that reconnect repeatedly disconnect the others.",
         ("tests/bus/test_gateway.py",),
     ),
     Defect(
@@ -37,7 +37,7 @@ DEFECTS = (
         "tui/bus/gateway/talk.py",
         "self._under_way - self._writes if self.goes else self._under_way",
         "self._under_way",
-        "The stop of a connection that makes room is not sent.",
+        "The stop of a connection that is closed for another one is not sent.",
         ("tests/bus/test_gateway.py",),
     ),
     Defect(
@@ -45,7 +45,7 @@ DEFECTS = (
         "tui/session/gateway/host_turns.py",
         "DECIDING: 1, STOPPING: 1}",
         "DECIDING: 1000, STOPPING: 1000}",
-        "Stops that one host sends again and again hold up the stop of another.",
+        "Stops that one host repeats delay the stop of another.",
         ("tests/session/test_gateway_stops.py",),
     ),
     Defect(
@@ -61,7 +61,7 @@ DEFECTS = (
         "tui/session/gateway/host_turns.py",
         "READS_EACH_HOST = 8",
         "READS_EACH_HOST = 1000",
-        "The reads of one host hold up those of another.",
+        "The reads of one host delay those of another.",
         ("tests/session/test_gateway_stops.py",),
     ),
     Defect(
@@ -69,7 +69,7 @@ DEFECTS = (
         "tui/cli/plant/metrics_server.py",
         "if any(host not in names for host in _hosts(headers)):",
         "if False:",
-        "A web page reads the drives of a plant through a browser in its network.",
+        "A web page reads the drives of a plant through a browser in the plant's network.",
         ("tests/cli/test_metrics.py",),
     ),
     Defect(
@@ -77,7 +77,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "if self._commands and not self._rules.commands:",
         "if False:",
-        "Any program that reaches the port starts motors.",
+        "Any program that reaches the port can start motors.",
         (GATEWAY,),
     ),
     Defect(
@@ -93,7 +93,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "if len(stops) == len(words):",
         "if False:",
-        "The stop of a controller is refused where it may not command.",
+        "The stop of a controller is refused if it has no permission to command.",
         (GATEWAY,),
     ),
     Defect(
@@ -101,7 +101,7 @@ DEFECTS = (
         "tui/session/gateway/gateway.py",
         "            line.drives.keep_chart_known(device)\n",
         "",
-        "A stop waits until another word is read.",
+        "A stop waits for the read of another word.",
         ("tests/session/test_gateway_stops.py",),
     ),
     Defect(
@@ -109,7 +109,7 @@ DEFECTS = (
         "tui/bus/schedule/dispatcher.py",
         "            self._outcomes.values.drop(job.request.device)\n",
         "            pass\n",
-        "A word runs the motor, as another program has just changed what it does.",
+        "A stop word runs the motor because another program changed its meaning.",
         ("tests/session/test_gateway_stops.py",),
     ),
     Defect(
@@ -125,7 +125,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "                self._line.resting.release(self._session.device)\n",
         "                pass\n",
-        "Reads keep the motor of a controller running that has died.",
+        "Reads keep a motor running whose controller has died.",
         ("tests/session/test_gateway_resting.py",),
     ),
     Defect(
@@ -141,7 +141,7 @@ DEFECTS = (
         "tui/bus/schedule/dispatcher.py",
         "        if (free := self._back_to_back.not_before(job)) > now:\n            return free\n",
         "",
-        "A poll is begun just before the next request of a client, which waits for its end.",
+        "A poll begins just before the next request of a client, which then waits for it.",
         ("tests/session/test_gateway_stops.py",),
     ),
     Defect(
@@ -149,7 +149,7 @@ DEFECTS = (
         "tui/bus/schedule/back_to_back.py",
         "return max(free_until, self._stop_until)",
         "return free_until",
-        "A stop waits for one more exchange than the one in flight and what is read for it.",
+        "A stop waits for one more exchange than the one in flight and its own reads.",
         ("tests/bus/test_back_to_back.py",),
     ),
     Defect(
@@ -157,7 +157,7 @@ DEFECTS = (
         "tui/bus/schedule/back_to_back.py",
         "if job.priority < Priority.POLL or owed else",
         "if job.priority < Priority.POLL else",
-        "A client that asks without end keeps all polls from the line.",
+        "A client with endless requests keeps all polls from the line.",
         ("tests/bus/test_back_to_back.py",),
     ),
     Defect(
@@ -165,7 +165,7 @@ DEFECTS = (
         "tui/bus/schedule/back_to_back.py",
         "max(self._free_until, self._gap_until)",
         "self._free_until",
-        "A read at a random moment waits for half a poll on a full line.",
+        "On a full line, a read at a random moment waits for half a poll.",
         ("tests/bus/test_back_to_back.py",),
     ),
     Defect(
@@ -181,7 +181,7 @@ DEFECTS = (
         "tui/session/gateway/commanding.py",
         'self._line.facts.give_stop([device], f"Modbus TCP client {client}")',
         "pass",
-        "A controller's stop leaves the work of a panel going.",
+        "A controller's stop does not end the work of a panel.",
         (GATEWAY,),
     ),
     Defect(
@@ -189,7 +189,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "await self._send_alone(stop)",
         "pass",
-        "A stop that is written with its reference is refused with it.",
+        "A stop that is written with its reference is refused together with it.",
         (GATEWAY,),
     ),
     Defect(
@@ -205,7 +205,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "if self._line.pending.void(self._write):",
         "if False:",
-        "A command that was looked at during a stop goes out after it.",
+        "A command that was being checked during a stop is sent after it.",
         (GATEWAY,),
     ),
     Defect(
@@ -217,7 +217,7 @@ DEFECTS = (
         """answer = "ok"
         try:
             pdu =""",
-        "The journal says that a drive took a value, and nobody knows.",
+        "The journal says that a drive took a value although the result is unknown.",
         (f"{GATEWAY}::test_write_cut_by_end_of_serve_is_not_recorded_as_done",),
     ),
     Defect(
@@ -225,7 +225,7 @@ DEFECTS = (
         "tui/session/gateway/started.py",
         "await asyncio.to_thread(self._keeper.begin, session, order)",
         "pass",
-        "Nobody stops the motor of a controller whose gateway was killed.",
+        "No program stops the motor of a controller whose gateway was killed.",
         (GATEWAY,),
     ),
     Defect(
@@ -233,7 +233,7 @@ DEFECTS = (
         "tui/session/gateway/started.py",
         "        if left:",
         "        if False:",
-        "A service that is restarted leaves motors that nobody commands.",
+        "A restarted service leaves motors running without a commander.",
         (GATEWAY,),
     ),
     Defect(
@@ -241,7 +241,7 @@ DEFECTS = (
         "tui/drive/foreign_write.py",
         "return bool(charts) and all(",
         "return bool(charts) and any(",
-        "A word passes as a stop that runs the motor in the I/O profile.",
+        "A word that runs the motor in the I/O profile passes as a stop.",
         (WORDS,),
     ),
     Defect(
@@ -249,7 +249,7 @@ DEFECTS = (
         "tui/drive/foreign_write.py",
         "if status is None or state_of(chart, status).id not in order.states:",
         "if False:",
-        "A halt word passes as a stop where the drive takes it for something else.",
+        "A halt word passes as a stop although the drive interprets it differently.",
         (WORDS,),
     ),
     Defect(
@@ -257,7 +257,7 @@ DEFECTS = (
         "tui/drive/foreign_write.py",
         "or parameter.code in _ordered(profile) for parameter in found",
         "for parameter in found",
-        "A client takes the control of a Powerdrive by writing a setting.",
+        "A client takes control of a Powerdrive by writing a setting.",
         (WORDS,),
     ),
     Defect(
@@ -265,7 +265,7 @@ DEFECTS = (
         "tui/drive/foreign_write.py",
         "if parameter.code in _named_only(profile) or not is_verified(parameter):",
         "if False:",
-        "A client that may write settings decides who commands the drive.",
+        "A client with permission for settings decides who commands the drive.",
         (WORDS,),
     ),
     Defect(
@@ -273,7 +273,7 @@ DEFECTS = (
         "tui/session/gateway/drives.py",
         "if session.contradiction:",
         "if False:",
-        "Words are told apart by the profile of another family.",
+        "Words are classified by the profile of another family.",
         (GATEWAY,),
     ),
     Defect(
@@ -281,7 +281,7 @@ DEFECTS = (
         "tui/session/gateway/gateway.py",
         "if state.next_try is not None:\n        return Priority.POLL",
         "if False:\n        return Priority.POLL",
-        "A client that asks for a drive which is not there slows all others down.",
+        "A client that requests a missing drive slows all others down.",
         (GATEWAY,),
     ),
     Defect(
@@ -289,7 +289,7 @@ DEFECTS = (
         "tui/session/gateway/drives.py",
         "if profiles and stops else None",
         "if profiles else None",
-        "A drive that does not say who it is takes any command.",
+        "A drive that does not identify itself accepts any command.",
         (GATEWAY,),
     ),
     Defect(
@@ -297,7 +297,7 @@ DEFECTS = (
         "tui/bus/gateway/server.py",
         "if request.pdu[0] in WRITE_FUNCTIONS:",
         "if not request.pdu:",
-        "A stop waits until a silent drive before it was given up.",
+        "A stop waits until a silent drive before it times out.",
         ("tests/bus/test_gateway.py::test_a_write_waits_for_no_read_before_it",),
     ),
     Defect(
@@ -305,7 +305,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "if not self._may_go_first():",
         "if True:",
-        "A stop waits for many seconds on what the client asked of a silent drive before.",
+        "A stop waits many seconds for the client's earlier requests to a silent drive.",
         (f"{GATEWAY}::test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them",),
     ),
     Defect(
@@ -313,7 +313,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "return not self._line.pending.changes_before(self._write, registers)",
         "return True",
-        "A word passes as a stop which runs the motor by what is set just before it.",
+        "A word passes as a stop although a setting just before it makes it run the motor.",
         (f"{GATEWAY}::test_a_word_that_stops_by_what_was_set_before_it_waits_for_that",),
     ),
     Defect(
@@ -321,7 +321,7 @@ DEFECTS = (
         "tui/session/gateway/in_turn.py",
         "for pending_write in self._pending[at:]:",
         "for pending_write in self._pending[at : at + 1]:",
-        "What a client sends behind its stop is refused as if it had come before.",
+        "A client's requests after its stop are refused as if they came before it.",
         (f"{GATEWAY}::test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them",),
     ),
     Defect(
@@ -329,7 +329,7 @@ DEFECTS = (
         "tui/bus/gateway/server.py",
         "if not writes and talk.full:",
         "if False:",
-        "A client that asks on and on is served without a bound.",
+        "A client with endless requests is served without a limit.",
         ("tests/bus/test_gateway.py::test_reads_that_pile_up_keep_no_write_in_the_socket",),
     ),
     Defect(
@@ -337,7 +337,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "if self._request.stale:",
         "if False:",
-        "A gateway that was frozen starts the motor of a client that has given up long ago.",
+        "A gateway that was frozen starts a motor for a client that gave up long ago.",
         (f"{GATEWAY}::test_requests_from_a_suspension_only_stop",),
     ),
     Defect(
@@ -345,7 +345,7 @@ DEFECTS = (
         "tui/bus/gateway/server.py",
         "if self._awake.just_woke:",
         "if False:",
-        "What a client sent while the gateway was frozen counts as sent just now.",
+        "Requests sent while the gateway was frozen count as new.",
         ("tests/bus/test_gateway.py::test_requests_delayed_by_a_suspended_loop_are_recognized",),
     ),
     Defect(
@@ -353,7 +353,7 @@ DEFECTS = (
         "tui/session/gateway/writes.py",
         "gone = self._commands and self._request.client.left",
         "gone = False",
-        "A motor is started for a client that has closed its connection.",
+        "A motor starts for a client that has closed its connection.",
         (GATEWAY,),
     ),
     Defect(
@@ -361,7 +361,7 @@ DEFECTS = (
         "tui/session/gateway/commanding.py",
         "or self._barred.get((device, client))",
         "",
-        "A controller that repeats its run word starts the motor that another client has stopped.",
+        "A controller that repeats its run word starts the motor that another client stopped.",
         (f"{GATEWAY}::test_a_client_that_repeats_its_run_word_does_not_undo_the_stop_of_another",),
     ),
     Defect(
@@ -369,7 +369,7 @@ DEFECTS = (
         "tui/bus/gateway/pdu.py",
         "if size != 2 * count or len(data) != size:",
         "if len(data) < 2 * count:",
-        "A damaged request is half understood and written.",
+        "A damaged request is partly understood and written.",
         ("tests/bus/test_gateway.py",),
     ),
     Defect(
@@ -377,7 +377,7 @@ DEFECTS = (
         "tui/session/gateway/resting.py",
         "not (rests or clock.monotonic() - begun < timeout)",
         "False",
-        "A motor did not obey its stop, and reads keep its drive from acting by itself.",
+        "A motor ignored its stop, and reads keep its drive's timeout from acting.",
         ("tests/session/test_gateway_resting.py",),
     ),
 )

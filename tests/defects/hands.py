@@ -14,7 +14,7 @@ DEFECTS = (
         "tui/screens/frame.py",
         "typing=takes_space(self.focused))",
         "typing=False)",
-        "A dialog says that Space stops, and it is typed into the name of a file.",
+        "A dialog says that Space stops, but Space is typed into a file name.",
         KEYS,
     ),
     Defect(
@@ -22,7 +22,7 @@ DEFECTS = (
         "tui/screens/frame.py",
         "            parts[DIALOG_KEYS] = [key_line(stops)]",
         "            parts.setdefault(DIALOG_KEYS, [] if self._frame_parts else [key_line(stops)])",
-        "What stops is told as it was before the cursor went into a text.",
+        "The stop key shown is not updated when the cursor enters a text field.",
         KEYS,
     ),
     Defect(
@@ -31,7 +31,7 @@ DEFECTS = (
         "        if before is not None and before.session.known_identity == identity:\n"
         "            return\n",
         "",
-        "A slip in the name of a profile, and no key stops the motor that runs.",
+        "After a typing error in a profile name, no key stops the running motor.",
         ("tests/ui/test_found.py",),
     ),
     Defect(
@@ -39,7 +39,7 @@ DEFECTS = (
         "tui/session/fleet.py",
         "runs = any(item is before for item in self.line_watch.under_command())",
         "runs = False",
-        "A motor that was started here goes on when the panel is left, and nobody is asked.",
+        "The panel closes without a question while a motor that it started runs.",
         ("tests/ui/test_found.py",),
     ),
     Defect(
@@ -47,7 +47,7 @@ DEFECTS = (
         "tui/screens/key_dispatcher.py",
         '            self.events.add("failed", text)\n            self.unreached = text,',
         "            _ = text,",
-        "F9 stops all but one drive, and says nothing of it.",
+        "F9 stops all but one drive without reporting that one.",
         ("tests/ui/test_stop_keys.py",),
     ),
     Defect(
@@ -55,7 +55,7 @@ DEFECTS = (
         "tui/screens/frame.py",
         "                *not_stopped_lines(view.not_stopped, width),\n",
         "",
-        "Who runs a motor that a stop does not stop is cut off, or covered.",
+        "The commander of a motor that did not stop is truncated or covered.",
         ("tests/ui/test_stop_keys.py::test_nothing_covers_that_a_motor_is_not_stopped",),
     ),
     Defect(
@@ -63,7 +63,7 @@ DEFECTS = (
         "tui/terminal/reader.py",
         "                self._stops.last_stop(error)\n",
         "                pass\n",
-        "An error in reading the keys takes the stop key away.",
+        "An error in reading the keys disables the stop key.",
         ("tests/terminal/test_reader.py",),
     ),
     Defect(
@@ -71,7 +71,7 @@ DEFECTS = (
         "tui/screens/key_dispatcher.py",
         "                fleet.last_stop(error, chosen)\n",
         "                pass\n",
-        "An error in the panel takes the stop key away.",
+        "An error in the panel disables the stop key.",
         (
             "tests/ui/test_stop_keys.py::test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive",
         ),
@@ -81,7 +81,7 @@ DEFECTS = (
         "tui/screens/frames/counter_keys.py",
         "Task(self._reset_drive, owner=self.console), stamp",
         "Task(self._reset_drive, armed=False)",
-        "A drive is written to though its arming has ended while a question stood.",
+        "A drive is written to although its arming ended while a question was open.",
         ("tests/ui/test_frames_screen.py",),
     ),
     Defect(
@@ -89,7 +89,7 @@ DEFECTS = (
         "tui/session/work.py",
         "if stamp == self.stops:\n                self.arming.arm(",
         "if True:\n                self.arming.arm(",
-        "A stop comes while the key that arms has its effect, and the drive stays armed.",
+        "A stop arrives while the arm key takes effect, and the drive stays armed.",
         ("tests/session/test_command.py", ARMING_KEY),
     ),
     Defect(
@@ -97,7 +97,7 @@ DEFECTS = (
         "tui/screens/command/arming.py",
         "if stroke is not None and stroke.stamp != self.app.stop_stamp():",
         "if stroke is not None and stroke.stamp is None:",
-        "A stop comes just before the key that arms has its effect, and the drive stays armed.",
+        "A stop arrives just before the arm key takes effect, and the drive stays armed.",
         (ARMING_KEY,),
     ),
     Defect(
@@ -105,7 +105,7 @@ DEFECTS = (
         "tui/screens/key_dispatcher.py",
         "if name in STOP_KEYS or self.screen.is_modal:",
         "if True:",
-        "Keys typed while the demo opens open a real line of another day instead.",
+        "Keys typed while the demo opens open a real line of an earlier day instead.",
         (
             f"{OPENING}::test_keys_of_the_tour_typed_too_early_open_no_line_and_work_later",
             f"{OPENING}::test_stops_work_while_a_second_line_opens",
@@ -116,7 +116,7 @@ DEFECTS = (
         "tui/screens/key_dispatcher.py",
         "if stroke is None or stroke.read_at > self.opening.ended:",
         "if True:",
-        "A key that a slow panel takes late opens a drive, or another line, of its own.",
+        "A key that a slow panel handles late opens a drive or another line.",
         (f"{OPENING}::test_a_key_read_while_a_line_opens_is_ignored_though_it_is_handled_later",),
     ),
     Defect(
@@ -124,7 +124,7 @@ DEFECTS = (
         "tui/screens/connection/line_keys.py",
         "asks = here is not None or self.scanning",
         "asks = here is not None",
-        "Enter on another line closes the one that is being searched, without a question.",
+        "Enter on another line closes the line being searched, without a question.",
         (f"{OPENING}::test_enter_on_another_line_asks_while_the_search_goes_on",),
     ),
     Defect(
@@ -132,7 +132,7 @@ DEFECTS = (
         "tui/screens/dialogs/question.py",
         "self._voided = self._answered = False\n",
         "self._voided = self._answered = False\n        self._key_at = 0.0\n",
-        "Who types @ while a question stands ends the panel, and every motor with it.",
+        "Typing @ while a question is open closes the panel and stops every motor.",
         ("tests/ui/test_keys.py",),
     ),
     Defect(
@@ -140,7 +140,7 @@ DEFECTS = (
         "tui/screens/dialogs/question.py",
         "return now - max(self._drawn, self._typed_at) < NOT_TYPING",
         "return now - self._drawn < self.SETTLED",
-        "Who types a word with a y in it writes what a question that has just come asks about.",
+        "A typed word with a y in it confirms a question that has just appeared.",
         ("tests/ui/test_questions.py",),
     ),
     Defect(
@@ -148,7 +148,7 @@ DEFECTS = (
         "tui/terminal/dialects.py",
         "        self._late_until = self._late_before\n        if self._cut is not None:",
         "        if False and self._cut is not None:",
-        "Behind tmux a link cuts F12 in two, a report comes in between, and nothing stops.",
+        "In tmux, a terminal report splits an F12 that the link cut in two, and nothing stops.",
         ("tests/terminal/test_dialects.py",),
     ),
     Defect(
@@ -156,7 +156,7 @@ DEFECTS = (
         "tui/screens/dialogs/files.py",
         "except OSError as error:",
         "except FileExistsError as error:",
-        "A long text is pasted for the name of a file, and the panel ends, motors and all.",
+        "Pasting a long text as a file name ends the panel and its motors.",
         ("tests/ui/test_dialog_keys.py",),
     ),
     Defect(
@@ -164,7 +164,7 @@ DEFECTS = (
         "tui/screens/dialogs/question.py",
         "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",
         "part.styles.max_height = 30",
-        "A question hides the end of what follows, or its keys, on a small terminal.",
+        "On a small terminal a question hides its last lines or its keys.",
         KEYS,
     ),
 )

@@ -42,7 +42,7 @@ DEFECTS = (
         "tui/session/byte_order.py",
         "LEAST_REGISTERS = 3\n",
         "LEAST_REGISTERS = 1\n",
-        "A value out of its range takes a healthy drive from its person.",
+        "One value out of range takes a healthy drive out of use.",
         (f"{BYTES}::test_values_read_anyway_show_that_bytes_are_swapped_from_now_on",),
     ),
     Defect(
@@ -50,7 +50,7 @@ DEFECTS = (
         "tui/session/byte_order.py",
         "        self._was_away = self._tested\n",
         "        self._was_away = False\n",
-        "Behind another gateway a motor is commanded by swapped words.",
+        "Through another gateway a motor is commanded by swapped words.",
         (f"{BYTES}::test_line_that_was_lost_is_checked_again_before_a_command",),
     ),
     Defect(
@@ -66,7 +66,7 @@ DEFECTS = (
         "tui/session/arming.py",
         "return self._line.held or self.barred or",
         "return self._line.held or",
-        "A drive is commanded by the words of another family.",
+        "A drive is commanded with the words of another family.",
         (CONTRADICTION,),
     ),
     Defect(
@@ -74,7 +74,7 @@ DEFECTS = (
         "tui/session/connect/contradiction.py",
         "return reported.startswith(stem) or stem.startswith(reported)",
         "return False",
-        "A drive of a kind that looks like its profile's is refused.",
+        "A drive of a type similar to its profile's is refused.",
         (CONTRADICTION,),
     ),
     Defect(
@@ -82,7 +82,7 @@ DEFECTS = (
         "tui/session/command/stop.py",
         "if not session.contradiction or own is None:",
         "if True or own is None:",
-        "The stop key runs a motor that was taken for another family's.",
+        "The stop key runs a motor whose drive was identified as another family.",
         (f"{CONTRADICTION}::test_a_contradicted_drive_is_stopped_as_what_it_says_it_is",),
     ),
     Defect(
@@ -90,7 +90,7 @@ DEFECTS = (
         "tui/cli/shared/options.py",
         "    if session.contradiction:\n",
         "    if False:\n",
-        "A setting of one family is written into another.",
+        "A setting of one family is written to a drive of another.",
         (f"{IDENTITY}::test_another_drive_is_reported_and_not_written_exits_with_5",),
     ),
     Defect(
@@ -106,7 +106,7 @@ DEFECTS = (
         "tui/drive/first_stop.py",
         "if alone is not None and alone.word == what.word:",
         "if alone is not None:",
-        "A motor that was just stopped is started by the stop of the family named.",
+        "The stop for the named family starts a motor that was just stopped.",
         (FIRST,),
     ),
     Defect(
@@ -114,7 +114,7 @@ DEFECTS = (
         "tui/session/command/first_stop.py",
         "journal.add(_entry(line, device, what, answer))",
         "pass",
-        "Nobody finds out what stopped, or moved, a motor.",
+        "No record shows what stopped or moved a motor.",
         (
             "tests/session/test_first_stop.py::test_it_is_in_the_journal_with_what_was_reported_to_it",
         ),
@@ -124,7 +124,7 @@ DEFECTS = (
         "tui/session/monitor/timeout.py",
         "for code in (rules.timeout, *rules.other_timeouts):",
         "for code in (rules.timeout,):",
-        "A drive on its other port trips without a word.",
+        "A drive on its other port trips without a warning.",
         (TIMEOUT,),
     ),
     Defect(
@@ -132,7 +132,7 @@ DEFECTS = (
         "tui/session/monitor/timeout.py",
         "return any(raws.get(chart.command) for chart in session.profile.data.charts)",
         "return False",
-        "A drive that another program has commanded trips after a read, without a word.",
+        "A drive that another program commanded trips after a read, without a warning.",
         (TIMEOUT,),
     ),
     Defect(
@@ -140,7 +140,7 @@ DEFECTS = (
         "tui/cli/shared/ending.py",
         "        finally:\n            try:",
         "        else:\n            try:",
-        "A command that fails leaves a timeout running and says nothing of it.",
+        "A failed command leaves a timeout running and does not report it.",
         (f"{LEFT}::test_it_is_reported_where_the_command_failed",),
     ),
     Defect(
@@ -148,7 +148,7 @@ DEFECTS = (
         "tui/cli/shared/ending.py",
         "                if not came:\n                    raise\n",
         "                raise\n",
-        "A command that has written all ends with a traceback and status 1 by a late SIGTERM.",
+        "A late SIGTERM gives a successful command a traceback and status 1.",
         (
             f"{LEFT}::test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done",
         ),
@@ -158,7 +158,7 @@ DEFECTS = (
         "tui/cli/commands/stop.py",
         "worst = max(worst, LINE_TROUBLE)",
         "worst = max(worst, 0)",
-        "A script takes a motor that did not answer for stopped.",
+        "A script takes a motor whose drive did not answer for stopped.",
         ("tests/line/test_commands.py::test_stop_all_stops_each",),
     ),
 )

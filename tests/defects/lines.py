@@ -15,7 +15,7 @@ DEFECTS = (
         "tui/bus/transport/port_names.py",
         "own = bool(usb.serial) and not _has_twin(usb, os.path.basename(real), system)",
         "own = True",
-        "Settings are written to the drive on the other of two adapters of one make.",
+        "With two adapters of one make, settings are written to the drive on the wrong one.",
         (f"{NAMES}::test_two_with_one_serial_number_are_distinguished",),
     ),
     Defect(
@@ -23,7 +23,7 @@ DEFECTS = (
         "tui/session/connect/known_line.py",
         "before is not None and before != name.key:",
         "before is not None and not name.key:",
-        "After adapters were replugged the motor of another machine is started.",
+        "After adapters were replugged, the motor of another machine starts.",
         (f"{KNOWN}::test_another_adapter_under_the_same_name_holds_the_line",),
     ),
     Defect(
@@ -31,7 +31,7 @@ DEFECTS = (
         "tui/session/connect/known_lines.py",
         "return self.stated == now.stated",
         "return self.vendor == now.vendor",
-        "A drive that was put in another's place is run with what was meant for that.",
+        "A replaced drive runs with the commands meant for the earlier one.",
         (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),
     ),
     Defect(
@@ -39,7 +39,7 @@ DEFECTS = (
         "tui/session/connect/known_line.py",
         "if device not in self._changed and None not in self._changed and before != now:",
         "if before != now:\n                self._changed = {}",
-        "The second command writes to the wrong drive, as the first has taken it for known.",
+        "The second command writes to the wrong drive, as the first one accepted it as known.",
         (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),
     ),
     Defect(
@@ -47,7 +47,7 @@ DEFECTS = (
         "tui/bus/limits.py",
         "    if held and request.changes:\n        return held\n",
         "",
-        "A line that is held is written to by whatever does not ask for arming.",
+        "A line on hold accepts writes from code that requires no arming.",
         (f"{KNOWN}::test_a_held_line_takes_nothing_but_a_stop",),
     ),
     Defect(
@@ -55,7 +55,7 @@ DEFECTS = (
         "tui/bus/line.py",
         'held = "" if priority is Priority.STOP else self.held',
         "held = self.held",
-        "A motor cannot be stopped since somebody has changed the adapter.",
+        "A motor cannot be stopped because the adapter was changed.",
         (
             f"{KNOWN}::test_the_real_line_holds_too",
             f"{COMMANDS}::test_a_stop_goes_to_a_drive_that_is_another_one",
@@ -66,7 +66,7 @@ DEFECTS = (
         "tui/session/arming.py",
         "return self._line.held or self.barred",
         "return self.barred",
-        "The panel shows a drive as armed that takes no command.",
+        "The panel shows a drive as armed that accepts no command.",
         (f"{KNOWN}::test_a_held_line_arms_nothing",),
     ),
     Defect(
@@ -74,7 +74,7 @@ DEFECTS = (
         "tui/session/arming.py",
         "        if self._line.held:\n            self.disarm(",
         "        if not self._line.link:\n            self.disarm(",
-        "A drive that was armed stays so though another adapter has come under its line's name.",
+        "A drive stays armed although another adapter now has its line's name.",
         (f"{KNOWN}::test_a_held_line_arms_nothing",),
     ),
     Defect(
@@ -82,7 +82,7 @@ DEFECTS = (
         "tui/session/starts/starts.py",
         "line=remembered_text(task.record.line)",
         "line=task.record.line",
-        "A motor left running is looked for on the adapter that has its number now.",
+        "A motor left running is searched for on the adapter that now has the old number.",
         (f"{KNOWN}::test_a_start_is_found_where_its_adapter_is_plugged_in_now",),
     ),
     Defect(
@@ -90,7 +90,7 @@ DEFECTS = (
         "tui/cli/shared/line_argument.py",
         'usual |= {"device": (named.device,), "devices": (named.device,)}',
         'usual |= {"devices": (named.device,)}',
-        "A command by a drive's name goes to the drive at address 1.",
+        "A command with a drive's name goes to the drive at address 1.",
         (f"{COMMANDS}::test_a_name_stands_where_a_line_is_typed",),
     ),
     Defect(
@@ -98,7 +98,7 @@ DEFECTS = (
         "tui/cli/shared/line_argument.py",
         '    if ctx.params.get("every"):\n        return None\n',
         "",
-        "A stop of all sends one family's stop word to drives of others.",
+        "A stop of all sends one family's stop word to drives of other families.",
         (f"{COMMANDS}::test_the_profile_of_one_drive_stops_no_other",),
     ),
     Defect(
@@ -106,7 +106,7 @@ DEFECTS = (
         "tui/session/connect/named_lines.py",
         "        if found := _salvaged(line_settings().text, text):\n            return found\n",
         "",
-        "A missing bracket in the settings keeps a motor from being stopped.",
+        "A missing bracket in the settings file prevents stopping a motor.",
         (f"{NAMED}::test_a_stop_finds_its_line_in_a_broken_file",),
     ),
     Defect(
@@ -114,7 +114,7 @@ DEFECTS = (
         "tui/session/connect/named_lines.py",
         'return found._replace(device=int(parts["device"]))',
         "return found",
-        "A stop by name stops the drive at address 1 while the other runs on.",
+        "A stop by name stops the drive at address 1 while the named one keeps running.",
         (f"{NAMED}::test_a_stop_finds_its_drive_in_a_broken_file",),
     ),
     Defect(
@@ -122,7 +122,7 @@ DEFECTS = (
         "tui/cli/shared/line_argument.py",
         "if isinstance(opts, MutableMapping) and self._is_left_out(ctx, opts):",
         "if False:",
-        "With DRIVEPANEL_LINE a code is taken for the line, and the command refused.",
+        "With DRIVEPANEL_LINE, a code is taken for the line, and the command is refused.",
         (f"{COMMANDS}::test_the_environment_says_which_line_is_selected",),
     ),
 )

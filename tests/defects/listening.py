@@ -12,7 +12,7 @@ DEFECTS = (
         "tui/bus/transport/serial_listening.py",
         "os.O_RDONLY | os.O_NOCTTY",
         "os.O_RDWR | os.O_NOCTTY",
-        "A listener that is to send nothing could disturb a motor that another master commands.",
+        "A listener that should send nothing could disturb a motor of another master.",
         ("tests/bus/test_listening_line.py::test_the_system_lets_nothing_be_written",),
     ),
     Defect(
@@ -20,7 +20,7 @@ DEFECTS = (
         "tui/bus/transport/serial_listening.py",
         "termios.TCSANOW",
         "termios.TCSADRAIN",
-        "Opening a port to listen waits for its output, and touches it.",
+        "Opening a port to listen waits for its output, and so affects it.",
         ("tests/line/test_listening.py::test_no_write_no_break_no_drain_reaches_the_port",),
     ),
     Defect(
@@ -44,7 +44,7 @@ DEFECTS = (
         "tui/wire/heard/lengths.py",
         "or due is None or any(n > len(data) for n in due):",
         "and True:",
-        "A reply that ends with a zero is cut short, and its values are lost.",
+        "A reply that ends with a zero is truncated, and its values are lost.",
         (
             "tests/wire/test_heard.py::test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it",
         ),
@@ -54,7 +54,7 @@ DEFECTS = (
         "tui/wire/heard/pairing.py",
         "frame.device != requested.device or frame.function",
         "frame.function",
-        "A late reply of one drive is told as the values of another.",
+        "A late reply of one drive is shown as the values of another.",
         ("tests/wire/test_heard.py::test_results_of_requests",),
     ),
     Defect(
@@ -62,7 +62,7 @@ DEFECTS = (
         "tui/wire/heard/pairing.py",
         "and not _repeated(requested, frame)\n",
         "\n",
-        "A drive that answers nothing is told to take its commands.",
+        "A drive that answers nothing is reported as accepting its commands.",
         ("tests/wire/test_heard.py::test_a_write_that_is_sent_again_is_no_reply",),
     ),
     Defect(
@@ -70,7 +70,7 @@ DEFECTS = (
         "tui/wire/heard/pairing.py",
         "if same and last is not None",
         "if False and last is not None",
-        "Nobody learns that two drives have one address.",
+        "Two drives at one address are not reported.",
         ("tests/session/test_listening.py::test_two_drives_at_one_address_are_reported",),
     ),
     Defect(
@@ -78,7 +78,7 @@ DEFECTS = (
         "tui/session/listening/words.py",
         'if exchange.answer not in ("ok", "broadcast"):',
         'if exchange.answer == "again":',
-        "A command that the drive refused is told as if it held.",
+        "A command that the drive refused is shown as active.",
         ("tests/session/test_listening.py",),
     ),
     Defect(
@@ -86,7 +86,7 @@ DEFECTS = (
         "tui/session/listening/families.py",
         'return AssumedProfile(first, "likely",',
         'return AssumedProfile(first, "identified",',
-        "A guessed family is shown as one that the drive has told.",
+        "A guessed family is shown as one that the drive has reported.",
         ("tests/session/test_listening.py::test_a_family_is_likely_by_what_the_drive_answers",),
     ),
     Defect(
@@ -95,7 +95,7 @@ DEFECTS = (
         "        if exchange.turnaround is not None:\n",
         "        if exchange.turnaround is None:\n            self.fed = exchange.time\n"
         "        else:\n",
-        "A drive that trips for want of requests is told to be fed.",
+        "A drive that trips for lack of requests is shown as kept alive.",
         ("tests/session/test_listening.py::test_a_request_that_is_not_answered_feeds_nobody",),
     ),
     Defect(
@@ -103,7 +103,7 @@ DEFECTS = (
         "tui/session/listening/tally.py",
         "now - self.fed if self.fed is not None else 0.0)",
         "0.0)",
-        "A master that has died is told to feed its drives.",
+        "A master that has exited is shown as keeping its drives alive.",
         ("tests/session/test_listening.py::test_a_pause_that_goes_on_counts_too",),
     ),
     Defect(
@@ -111,7 +111,7 @@ DEFECTS = (
         "tui/session/capture_file.py",
         "            self._file.truncate(self._size)\n",
         "",
-        "A full disk leaves a file of frames that no program reads.",
+        "A full disk leaves a capture file that no program can read.",
         ("tests/session/test_capture_file.py",),
     ),
     Defect(
@@ -119,7 +119,7 @@ DEFECTS = (
         "tui/screens/hear.py",
         "if acting := watch.left_alone():",
         "if (acting := watch.left_alone()) and False:",
-        "A drive trips because somebody wanted to see what goes over the line.",
+        "A drive trips because a person listened to the line.",
         (f"{HEARING}::test_a_drive_that_the_panel_feeds_is_not_left_alone",),
     ),
     Defect(
@@ -127,7 +127,7 @@ DEFECTS = (
         "tui/screens/hear.py",
         "if running := watch.under_command():",
         "if (running := watch.under_command()) and False:",
-        "A motor runs on, started from here, and nobody asks it or can stop it any more.",
+        "A motor started by the panel runs on, and the panel no longer polls or stops it.",
         (f"{HEARING}::test_why_the_panel_may_not_fall_silent",),
     ),
     Defect(
@@ -143,7 +143,7 @@ DEFECTS = (
         "tui/screens/hear.py",
         "if here.fleet.found else",
         "if False else",
-        "One key ends the panel's watch over its drives.",
+        "One key ends the panel's polling of its drives.",
         (f"{HEARING}::test_drives_that_do_not_act_are_left_to_their_master_with_a_yes",),
     ),
 )

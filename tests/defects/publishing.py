@@ -14,7 +14,7 @@ DEFECTS = (
         "tui/session/sharing/observer_poller.py",
         "return self._silence() > timeout + ACTED_AFTER",
         "return True",
-        "A motor whose controller died runs on for the sake of a graph.",
+        "A graph keeps a motor running whose controller has died.",
         (BYSTANDER,),
     ),
     Defect(
@@ -22,7 +22,7 @@ DEFECTS = (
         "tui/session/sharing/observer_poller.py",
         "if sign is None and not self.orphan:",
         "if sign is None:",
-        "A service that comes back keeps the motor of the one before running.",
+        "A restarted service keeps the motor of its predecessor running.",
         (BYSTANDER,),
     ),
     Defect(
@@ -30,7 +30,7 @@ DEFECTS = (
         "tui/session/monitor/monitor.py",
         "if why := self.held_back():",
         'if why := "":',
-        "A monitor asks a drive that it is to leave alone.",
+        "A monitor polls a drive whose polling is paused.",
         ("tests/session/test_monitor_faults.py",),
     ),
     Defect(
@@ -38,7 +38,7 @@ DEFECTS = (
         "tui/session/gateway/commanding.py",
         "if self._by.get(device) == client:",
         "if True:",
-        "A SCADA that reads is taken for the controller that died.",
+        "A SCADA system that reads is taken for the controller that died.",
         ("tests/session/test_gateway.py",),
     ),
     Defect(
@@ -46,7 +46,7 @@ DEFECTS = (
         "tui/cli/plant/metrics.py",
         "if not good:",
         "if False:",
-        "A graph shows the last value of a drive that is gone.",
+        "A graph shows the last value of a drive that no longer answers.",
         (METRICS,),
     ),
     Defect(
@@ -54,7 +54,7 @@ DEFECTS = (
         "tui/cli/plant/status.py",
         "if session is not None and cycle.is_stale(now):",
         "if False:",
-        "Values stay good though nobody reads the drive any more.",
+        "Values stay good although no program reads the drive any longer.",
         (METRICS,),
     ),
     Defect(
@@ -70,7 +70,7 @@ DEFECTS = (
         "tui/cli/plant/mqtt.py",
         "sent: dict[str, str] = {}",
         'sent: dict[str, str] = self.__dict__.setdefault("_sent", {})',
-        "A broker that was restarted never hears of what has not changed.",
+        "A restarted broker never receives values that have not changed.",
         (MQTT,),
     ),
     Defect(
@@ -78,7 +78,7 @@ DEFECTS = (
         "tui/cli/plant/mqtt.py",
         "will=aiomqtt.Will(will, OFFLINE, qos=1, retain=True),",
         "will=None,",
-        "A program that was killed stays online at the broker.",
+        "The broker shows a killed program as online.",
         (MQTT,),
     ),
     Defect(
@@ -86,7 +86,7 @@ DEFECTS = (
         "tui/cli/plant/broker.py",
         "if parts.password is not None:",
         "if False:",
-        "Every user of the computer reads the password for the broker.",
+        "Every user of the computer can read the password for the broker.",
         (MQTT,),
     ),
     Defect(
@@ -94,7 +94,7 @@ DEFECTS = (
         "tui/cli/shared/served_lines.py",
         "own = (named.device,) if named.device is not None else ()",
         "own = ()",
-        "A line's name does not bring its drive to serve.",
+        "`serve` ignores the drive of a line's name.",
         ("tests/cli/test_serve.py",),
     ),
 )

@@ -10,7 +10,7 @@ DEFECTS = (
         "tui/session/journal_file.py",
         'b"\\n" + _mark() + line',
         'b"\\n" + line',
-        "Nobody sees that a crash cut an entry of the journal off.",
+        "The journal does not mark an entry that a crash cut off.",
         ("tests/session/test_journal_file.py::test_half_a_line_is_kept_and_marked",),
     ),
     Defect(
@@ -18,7 +18,7 @@ DEFECTS = (
         "tui/session/journal_file.py",
         'line if end[-1:] in (b"", b"\\n") else',
         "line if True else",
-        "The first write behind a crash is not on record.",
+        "The first write after a crash is not recorded.",
         ("tests/session/test_journal_file.py::test_half_a_line_is_kept_and_marked",),
     ),
     Defect(
@@ -26,7 +26,7 @@ DEFECTS = (
         "tui/session/journal_file.py",
         "fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)",
         "pass",
-        "Two programs that write at a time lose a file of the journal.",
+        "Two programs that write at the same time lose a file of the journal.",
         ("tests/session/test_journal_file.py",),
     ),
     Defect(
@@ -34,7 +34,7 @@ DEFECTS = (
         "tui/session/journal_file.py",
         "os.ftruncate(handle, start)",
         "pass",
-        "A full disk leaves the journal with damage that nothing did.",
+        "After a full disk the journal shows damage without a cause.",
         ("tests/session/test_journal_file.py",),
     ),
     Defect(
@@ -42,7 +42,7 @@ DEFECTS = (
         "tui/session/journal_file.py",
         "OWN_MODE = 0o600",
         "OWN_MODE = 0o644",
-        "Everybody on the computer reads what was written to the drives.",
+        "Every user of the computer can read the journal of writes.",
         ("tests/session/test_journal_file.py::test_the_journal_is_its_owners_alone",),
     ),
     Defect(
@@ -50,7 +50,7 @@ DEFECTS = (
         "tui/session/journal.py",
         "atexit.register(ending)",
         "pass",
-        "The last write before a program ends is not on record.",
+        "The last write before a program ends is not recorded.",
         (
             "tests/session/test_journal_file.py"
             "::test_a_program_that_ends_puts_its_last_entries_down",
@@ -61,7 +61,7 @@ DEFECTS = (
         "tui/session/journal.py",
         "if why and not before:\n                self._cry()",
         "if before and not why:\n                self._cry()",
-        "A run of an hour says at its end only that nothing of it is on record.",
+        "A run of an hour reports only at its end that nothing was recorded.",
         ("tests/session/test_journal_file.py::test_trouble_is_reported_at_once_and_once",),
     ),
     Defect(
@@ -69,7 +69,7 @@ DEFECTS = (
         "tui/session/settings/write.py",
         "answer, lost = str(error), True",
         "answer, lost = str(error), False",
-        "The journal never tells what became of a write whose answer was lost.",
+        "The journal never shows the result of a write whose answer was lost.",
         ("tests/session/test_writing.py::test_a_lost_answer_is_completed_once_the_drive_is_read",),
     ),
     Defect(
@@ -77,7 +77,7 @@ DEFECTS = (
         "tui/session/settings/write.py",
         "answer, lost = CUT_SHORT, True",
         "pass",
-        "A setting that a stop cut short stands in the journal as taken.",
+        "The journal shows a setting as written although a stop interrupted it.",
         ("tests/session/test_writing.py::test_a_write_that_a_stop_cuts_short_is_not_kept_as_done",),
     ),
     Defect(
@@ -85,7 +85,7 @@ DEFECTS = (
         "tui/session/blocks/exchange.py",
         "answer, lost = CUT_SHORT, True",
         "pass",
-        "Words of a block that a stop cut short stand in the journal as taken.",
+        "The journal shows words of a block as written although a stop interrupted them.",
         ("tests/session/test_exchange.py::test_write_cut_by_stop_is_not_recorded_as_done",),
     ),
     Defect(
@@ -93,7 +93,7 @@ DEFECTS = (
         "tui/session/image.py",
         "self._waiting_for.pop(code, None)\n            self._doubted",
         "self._doubted",
-        "The journal says that a lost write was taken, by the value of the next one.",
+        "The journal confirms a lost write by the value of the next one.",
         (
             "tests/session/test_writing.py"
             "::test_a_lost_answer_is_not_completed_by_what_a_later_write_left",
@@ -104,7 +104,7 @@ DEFECTS = (
         "tui/session/logs.py",
         "[return-value]\n\n    def handleError(",
         "[return-value]\n\n    def handle_error(",
-        "A full disk answers a stop that worked with six tracebacks.",
+        "On a full disk, a successful stop prints six tracebacks.",
         (
             "tests/cli/test_journal_trouble.py"
             "::test_a_full_disk_is_reported_in_a_sentence_and_nothing_else_fails",
@@ -115,7 +115,7 @@ DEFECTS = (
         "tui/cli/shared/standard_streams.py",
         '"run", "stop", ',
         '"run", ',
-        "A script takes a stop that worked for a failed one, as its disk is full.",
+        "On a full disk, a script takes a successful stop for a failed one.",
         (
             "tests/cli/test_journal_trouble.py"
             "::test_lost_output_does_not_report_done_work_as_failed",
@@ -126,7 +126,7 @@ DEFECTS = (
         "tui/widgets/strip.py",
         "    if view.off_record:\n        text.append(off_record, ALARM)\n",
         "",
-        "The panel commands motors and nobody sees that nothing is on record.",
+        "The panel commands motors without showing that nothing is recorded.",
         ("tests/ui/test_strip.py",),
     ),
     Defect(
@@ -134,7 +134,7 @@ DEFECTS = (
         "tui/bus/rtu/master.py",
         "await self._transport.take_in()",
         "await asyncio.sleep(0)",
-        "An answer that came before its question is shown as the present value.",
+        "An answer that arrived before its request is shown as the current value.",
         ("tests/bus/test_hostile_peers.py::test_bytes_before_a_request_are_not_its_reply",),
     ),
     Defect(
@@ -142,7 +142,7 @@ DEFECTS = (
         "tui/bus/tcp/master.py",
         "await self._transport.take_in()",
         "await asyncio.sleep(0)",
-        "A gateway that counts along answers before it is asked, and is believed.",
+        "A gateway that guesses the next transaction number answers early and is accepted.",
         (
             "tests/bus/test_hostile_peers.py"
             "::test_bytes_before_a_request_with_guessed_number_are_no_reply",
@@ -153,7 +153,7 @@ DEFECTS = (
         "tui/bus/transport/tcp.py",
         "        await asyncio.sleep(0)\n        await asyncio.sleep(0)\n",
         "        await asyncio.sleep(0)\n",
-        "An answer that came before its question is shown as the present value.",
+        "An answer that arrived before its request is shown as the current value.",
         ("tests/bus/test_hostile_peers.py::test_a_connection_hands_over_what_the_system_holds",),
     ),
     Defect(
@@ -161,7 +161,7 @@ DEFECTS = (
         "tui/bus/rtu/exchange.py",
         "if len(self.buffer) > FLOOD:",
         "if len(self.buffer) < 0:",
-        "A device server that sends noise holds every stop of its line up for minutes.",
+        "A device server that sends noise delays every stop of its line for minutes.",
         (
             "tests/bus/test_hostile_peers.py"
             "::test_a_reply_is_found_behind_a_flood_and_the_flood_is_not_kept",
@@ -172,7 +172,7 @@ DEFECTS = (
         "tui/bus/rtu/exchange.py",
         "max(0, len(self.buffer) - MAX_FRAME)",
         "max(0, len(self.buffer))",
-        "Drives behind a noisy adapter do not answer any more.",
+        "Drives connected through a noisy adapter no longer answer.",
         ("tests/bus/test_rtu.py", "tests/bus/test_hostile_peers.py"),
     ),
     Defect(
@@ -180,7 +180,7 @@ DEFECTS = (
         "tui/drive/small_file.py",
         "if stat.S_ISREG(mode):",
         "if not stat.S_ISDIR(mode):",
-        "A device in place of a parameter set is read until the memory is full.",
+        "A device instead of a parameter set is read until the memory is full.",
         ("tests/cli/test_hostile_files.py",),
     ),
     Defect(
@@ -188,7 +188,7 @@ DEFECTS = (
         "tui/drive/small_file.py",
         "data = file.read(longest + 1)",
         "data = file.read(longest)",
-        "The first part of a file is taken for all of it.",
+        "The first part of a file is accepted as all of it.",
         ("tests/cli/test_hostile_files.py",),
     ),
     Defect(
@@ -196,7 +196,7 @@ DEFECTS = (
         "tui/drive/toml_text.py",
         "    if _is_deep(tables):",
         "    if not tables:",
-        "A file nested without end is answered with a traceback.",
+        "A file nested without end causes a traceback.",
         ("tests/drive/test_toml_text.py",),
     ),
     Defect(
@@ -204,7 +204,7 @@ DEFECTS = (
         "tui/session/stored.py",
         "except (OSError, ValueError, RecursionError):",
         "except (OSError, ValueError):",
-        "The panel no longer starts: a file in its folder is damaged.",
+        "The panel no longer starts because a file in its folder is damaged.",
         ("tests/test_hostile.py",),
     ),
     Defect(
@@ -212,7 +212,7 @@ DEFECTS = (
         "tui/drive/profile/shared_rows.py",
         "return repr(value) if isinstance(value, list | dict) else value",
         "return value",
-        "One broken profile of a person's own hides all others behind a traceback.",
+        "One broken user profile hides all others, with a traceback.",
         ("tests/drive/test_toml_text.py",),
     ),
     Defect(
@@ -220,7 +220,7 @@ DEFECTS = (
         "tui/session/connect/identify.py",
         "number: plain(value.decode",
         "number: str(value.decode",
-        "A drive's name, taken out of JSON by a script, sets the terminal's title.",
+        "A drive's name that a script takes from JSON sets the terminal's title.",
         ("tests/cli/test_texts.py::test_a_drives_name",),
     ),
     Defect(
@@ -228,7 +228,7 @@ DEFECTS = (
         "tui/session/report.py",
         'for line in (*part, "")), lines=True)',
         'for line in (*part, "")) or "", lines=True).replace("␛", "\\x1b")',
-        "Who prints a report of a drive with an odd name has the screen blanked.",
+        "Printing a report of a drive with an odd name clears the screen.",
         ("tests/cli/test_texts.py",),
     ),
     Defect(
@@ -236,7 +236,7 @@ DEFECTS = (
         "tui/drive/plain.py",
         'return ["" if cell is None else plain(str(cell)) for cell in cells]',
         'return ["" if cell is None else str(cell) for cell in cells]',
-        "Who prints a recording of a drive with an odd profile has the clipboard written.",
+        "Printing a recording of a drive with an odd profile writes the clipboard.",
         ("tests/cli/test_texts.py",),
     ),
     Defect(
@@ -244,7 +244,7 @@ DEFECTS = (
         "tui/session/journal.py",
         "escaped_json(json.dumps(asdict(entry), ensure_ascii=False))",
         "json.dumps(asdict(entry), ensure_ascii=False)",
-        "Who prints the journal's file has the screen blanked.",
+        "Printing the journal's file clears the screen.",
         ("tests/cli/test_texts.py",),
     ),
     Defect(
@@ -252,7 +252,7 @@ DEFECTS = (
         "tui/session/logs.py",
         "return plain(super().format(record), lines=True)",
         "return super().format(record)",
-        "Who prints the log has the screen blanked.",
+        "Printing the log clears the screen.",
         ("tests/cli/test_texts.py", "tests/cli/test_logs.py"),
     ),
     Defect(
@@ -260,7 +260,7 @@ DEFECTS = (
         "tui/drive/plain.py",
         r'f"\\U{ord(c):08X}" if commands(c) else c',
         "c",
-        "Who prints a backup of a drive with an odd profile has the screen blanked.",
+        "Printing a backup of a drive with an odd profile clears the screen.",
         ("tests/cli/test_texts.py",),
     ),
     Defect(
@@ -268,7 +268,7 @@ DEFECTS = (
         "tui/cli/shared/signals.py",
         "for number in ending_signals() - kept}",
         'for number in _numbers(("SIGHUP", "SIGTERM", *OF_KEYS[:1])) - kept}',
-        "Ctrl-\\ or SIGUSR1 ends the program, and the motor that it started runs on.",
+        "Ctrl-\\ or SIGUSR1 ends the program, and its motor keeps running.",
         ("tests/line/test_signals.py",),
     ),
     Defect(
@@ -276,7 +276,7 @@ DEFECTS = (
         "tui/cli/shared/signals.py",
         "signal.pthread_sigmask(signal.SIG_BLOCK, held)",
         "signal.pthread_sigmask(signal.SIG_BLOCK, ())",
-        "A program that commands a motor is frozen by one key, and stops nothing.",
+        "One key freezes a program that commands a motor, and stops nothing.",
         ("tests/line/test_signals.py",),
     ),
     Defect(
@@ -284,7 +284,7 @@ DEFECTS = (
         "tui/session/logs.py",
         "            signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())\n",
         "            pass\n",
-        "The system suspends the program by the one thread that does not hold the signal back.",
+        "The signal suspends the program by the one thread that does not block it.",
         ("tests/line/test_signals.py",),
     ),
     Defect(
@@ -292,7 +292,7 @@ DEFECTS = (
         "tui/screens/leaving.py",
         "here += self._left_behind(fleet)",
         "here += []",
-        "The panel is left without a word of a motor that no program commands.",
+        "The panel closes without a word about a motor that no program commands.",
         ("tests/line/test_left_behind.py",),
     ),
     Defect(
@@ -300,7 +300,7 @@ DEFECTS = (
         "tui/cli/commands/stop.py",
         "await asyncio.to_thread(forget_start, session)",
         "pass",
-        "Lines shows a motor that may run, although it was stopped from the shell.",
+        "Lines shows a motor as possibly running although it was stopped from the shell.",
         ("tests/line/test_left_behind.py",),
     ),
 )

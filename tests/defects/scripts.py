@@ -20,7 +20,7 @@ DEFECTS = (
         "tui/cli/shared/errors.py",
         "INTERRUPTED = 130",
         "INTERRUPTED = 1",
-        "A comparison that was broken off counts as two drives that differ.",
+        "A canceled comparison counts as a difference between two drives.",
         ("tests/cli/test_usage.py::test_an_end_by_ctrl_c_is_no_difference",),
     ),
     Defect(
@@ -28,7 +28,7 @@ DEFECTS = (
         "tui/cli/shared/errors.py",
         "        if as_json:",
         "        if not as_json:",
-        "A script that reads JSON finds nothing where a drive did not answer.",
+        "A script that reads JSON gets no error for a drive that did not answer.",
         ("tests/cli/test_usage.py::test_an_error_is_one_object_on_standard_output_too",),
     ),
     Defect(
@@ -36,7 +36,7 @@ DEFECTS = (
         "tui/cli/shared/devices.py",
         "    if len(given) > 1:",
         "    if not given:",
-        "A write meant for one of two drives goes to the first that was named.",
+        "A write for one of two drives goes to the first one named.",
         ("tests/cli/test_watch.py::test_one_drive_command_takes_one_exits_with_2",),
     ),
     Defect(
@@ -44,7 +44,7 @@ DEFECTS = (
         "tui/session/monitor/cycle.py",
         "elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):",
         "elif reading.quality is Quality.GOOD and not snapshot.cycle:",
-        "A recorder goes on with values of a drive that is gone.",
+        "A recorder continues with values of a drive that no longer answers.",
         ("tests/cli/test_watch.py::test_nothing_is_good_once_the_server_is_gone",),
     ),
     Defect(
@@ -52,7 +52,7 @@ DEFECTS = (
         "tui/cli/shared/watch_outputs.py",
         "read_at = snapshot.wall - (snapshot.time - reading.time)",
         "read_at = snapshot.wall",
-        "A value that was read an hour ago carries the time of now.",
+        "A value that was read an hour ago has the current time.",
         ("tests/cli/test_watch.py::test_nothing_is_good_once_the_server_is_gone",),
     ),
     Defect(
@@ -60,7 +60,7 @@ DEFECTS = (
         "tui/cli/shared/watch_outputs.py",
         "        line = [drive.line_name] if self.lines else []",
         "        line = [drive.session.profile.name] if self.lines else []",
-        "The rows of drive 1 on two lines cannot be told from one another.",
+        "The rows of drive 1 on two lines look the same.",
         ("tests/cli/test_watch_lines.py::test_every_output_tells_the_line_of_a_value",),
     ),
     Defect(
@@ -79,7 +79,7 @@ DEFECTS = (
         "tui/cli/shared/several_lines.py",
         "(not own or set(devices) == set(own)):",
         "(own or not set(devices) == set(own)):",
-        "Another drive beside the named one is watched by its scales.",
+        "Another drive beside the named one is polled with the wrong scales.",
         ("tests/cli/test_watch_lines.py::test_the_drives_that_are_selected",),
     ),
     Defect(
@@ -87,7 +87,7 @@ DEFECTS = (
         "tui/cli/shared/csv_files.py",
         "    if path.exists() and not (append or force):",
         "    if path.exists() and append and force:",
-        "The record of a night is overwritten by the same command in the morning.",
+        "The same command in the morning overwrites the record of the night.",
         ("tests/cli/test_watch.py::test_a_file_is_replaced_or_continued_only_as_requested",),
     ),
     Defect(
@@ -95,7 +95,7 @@ DEFECTS = (
         "tui/cli/shared/csv_files.py",
         "            if not whole:  # a row that a crash has cut",
         "            if not file:  # a row that a crash has cut",
-        "The first row after a crash is glued to half a row.",
+        "The first row after a crash is appended to half a row.",
         ("tests/cli/test_watch.py::test_a_row_that_a_crash_has_cut_stays_alone",),
     ),
     Defect(
@@ -119,7 +119,7 @@ DEFECTS = (
         "tui/drive/settings/set_reading.py",
         "        if conversion.lossy:",
         "        if not conversion.rounded:",
-        "A value that was edited in a backup is restored as another one.",
+        "A value edited in a backup is restored as another one.",
         ("tests/cli/test_sets.py::test_a_set_does_not_round_in_silence",),
     ),
     Defect(
@@ -127,7 +127,7 @@ DEFECTS = (
         "tui/cli/commands/write.py",
         "if codes.count(code) > 1):",
         "if codes.count(code) > 2):",
-        "Of two values for one parameter the second is written, and nobody says so.",
+        "The second of two values for one parameter is written without a message.",
         ("tests/cli/test_sets.py::test_repeated_code_exits_with_2",),
     ),
     Defect(
@@ -135,7 +135,7 @@ DEFECTS = (
         "tui/cli/shared/sets.py",
         "codes = setting_codes(session.profile) if settings_only else []",
         "codes = list[str]()",
-        "Two backups around a run differ though nobody changed a setting.",
+        "Two backups around a run differ although no setting changed.",
         ("tests/cli/test_sets.py::test_two_backups_around_a_run_are_the_same_but_for_their_time",),
     ),
     Defect(
@@ -143,7 +143,7 @@ DEFECTS = (
         "tui/cli/commands/backup.py",
         "    if values.absent:",
         "    if not values.raws:",
-        "A backup without some parameters counts as done.",
+        "A backup with missing parameters counts as complete.",
         ("tests/cli/test_sets.py::test_incomplete_backup_exits_with_4",),
     ),
     Defect(
@@ -151,7 +151,7 @@ DEFECTS = (
         "tui/drive/settings/compare.py",
         'return Side("factory", raws, texts=texts, unsure=unsure, left=left)',
         'return Side("factory", raws, texts=texts, unsure=unsure)',
-        "Every drive with an address of its own differs from the factory.",
+        "Every drive with its own address differs from the factory.",
         ("tests/cli/test_sets.py::test_line_settings_are_not_compared_with_the_factory",),
     ),
     Defect(
@@ -159,7 +159,7 @@ DEFECTS = (
         "tui/cli/shared/output.py",
         'return {"schema": JSON_SCHEMA, "command": _command(), **data}',
         'return {"command": _command(), **data}',
-        "A script cannot tell which fields it may count on.",
+        "A script does not know which fields a document guarantees.",
         ("tests/cli/test_documents.py::test_printed_documents_fit_the_schema",),
     ),
     Defect(
@@ -167,7 +167,7 @@ DEFECTS = (
         "tui/cli/shared/shells.py",
         'return f"{item.type},{item.value[kept:]}"',
         'return f"{item.type},{item.value}"',
-        "Completing sim:atv makes sim:sim:atv of it.",
+        "Completing sim:atv results in sim:sim:atv.",
         ("tests/cli/test_completion.py",),
     ),
     Defect(
@@ -175,7 +175,7 @@ DEFECTS = (
         "tui/cli/shared/say.py",
         "line = line[os.write(stream.fileno(), line) :]",
         "stream.write(line.decode()); stream.flush(); line = b''",
-        "A program is aborted at its end, where nobody reads what a thread of it says.",
+        "A program aborts at its end if nothing reads the output of one of its threads.",
         (f"{INPUTS}::test_it_ends_well_while_nobody_reads_what_it_says",),
     ),
 )

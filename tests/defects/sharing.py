@@ -24,7 +24,7 @@ DEFECTS = (
         "tui/bus/shared_state.py",
         "if writes and self.gated else",
         "if False else",
-        "A program that is wrong about itself writes to a drive that is not armed.",
+        "A faulty program writes to a drive that is not armed.",
         (LEASES,),
     ),
     Defect(
@@ -40,7 +40,7 @@ DEFECTS = (
         "tui/bus/leases.py",
         "if lease.until is not None and time.monotonic() > lease.until:",
         "if False:",
-        "A program that hangs for an hour starts a motor when it goes on.",
+        "A program that hung for an hour starts a motor when it resumes.",
         (LEASES,),
     ),
     Defect(
@@ -48,7 +48,7 @@ DEFECTS = (
         "tui/bus/share/heartbeat.py",
         "if monotonic() - self._turned < LOOP_HANGS:",
         "if True:",
-        "The motor of a program that hangs for good runs on.",
+        "The motor of a program that hangs keeps running.",
         (HEARTBEAT,),
     ),
     Defect(
@@ -56,7 +56,7 @@ DEFECTS = (
         "tui/bus/share/greeting.py",
         'if peer_of(client.writer.get_extra_info("socket")) != peer:',
         "if False:",
-        "A frozen program counts as alive, and its motor runs on.",
+        "A frozen program counts as alive, and its motor keeps running.",
         (HEARTBEAT,),
     ),
     Defect(
@@ -72,7 +72,7 @@ DEFECTS = (
         "tui/bus/share/commanding.py",
         "known = not care or other or facts.holder.hear_care(device, care)",
         "known = True",
-        "A motor is started that the keeper of the line cannot stop.",
+        "A motor starts that the keeper of the line cannot stop.",
         (LEASES,),
     ),
     Defect(
@@ -80,7 +80,7 @@ DEFECTS = (
         "tui/bus/share/server.py",
         "if due := client.due_stops(self._inside.clock()):",
         "if due := ():",
-        "A program is killed between the stop key and the first frame: the motor runs on.",
+        "A program is killed between the stop key and the first frame: the motor keeps running.",
         (LEASES, "tests/line/test_keeper.py"),
     ),
     Defect(
@@ -88,7 +88,7 @@ DEFECTS = (
         "tui/session/sharing/orphan_motors.py",
         'self._spawn(partial(self._stop, devices, by), f"stop for {by}")',
         "pass",
-        "The keeper hears of a stop that nobody sends, and does not send it.",
+        "The keeper knows of a stop that no program sends, and does not send it.",
         (CARE,),
     ),
     Defect(
@@ -104,7 +104,7 @@ DEFECTS = (
         "tui/bus/share/keeper_share.py",
         "set_programs(self._keeping.before)",
         "set_programs(())",
-        "A motor runs on whose program died together with the keeper of its line.",
+        "A motor keeps running whose program died together with the keeper of its line.",
         ("tests/line/test_keeper.py::test_the_motor_stops_when_its_program_dies_with_the_keeper",),
     ),
     Defect(
@@ -120,7 +120,7 @@ DEFECTS = (
         "tui/keeper/process.py",
         "signal.signal(signal.SIGALRM, signal.SIG_DFL)",
         "signal.signal(signal.SIGALRM, signal.SIG_IGN)",
-        "A keeper that was frozen goes on with what is old.",
+        "A keeper that was frozen continues with outdated work.",
         (f"{HUNG}::test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on",),
     ),
     Defect(
@@ -144,7 +144,7 @@ DEFECTS = (
         "tui/bus/share/owner_watch.py",
         "owner.program.name == KEEPER and owner.version == VERSION",
         "owner.version == VERSION",
-        "A panel that holds its line is killed by another program.",
+        "Another program kills a panel that holds its line.",
         (f"{WATCH}::test_nothing_but_a_known_keeper_at_the_other_end_is_killed",),
     ),
     Defect(
@@ -152,7 +152,7 @@ DEFECTS = (
         "tui/bus/share/owner_watch.py",
         "            self._awake = now\n",
         "            pass\n",
-        "After each pause of the computer a program kills a keeper that is well.",
+        "After each pause of the computer a program kills a healthy keeper.",
         (f"{WATCH}::test_a_program_that_stood_still_itself_kills_nothing",),
     ),
     Defect(
@@ -160,7 +160,7 @@ DEFECTS = (
         "tui/session/sharing/orphan_motors.py",
         "self._lost.setdefault(session.device, self._clock.monotonic())",
         "self._clock.monotonic()",
-        "A keeper lives for ever on a port whose number another program has got.",
+        "A keeper never ends on a port whose number another program has got.",
         ("tests/session/test_guardian.py",),
     ),
     Defect(
@@ -168,7 +168,7 @@ DEFECTS = (
         "tui/bus/share/news_heard.py",
         "error_of(*news.failure) if news.failure is not None else None",
         "None",
-        "A port that is not there is waited for, and not reported as missing.",
+        "The panel waits for a missing port instead of reporting it.",
         ("tests/line/test_keeper.py::test_a_port_that_is_not_there_is_reported_at_once",),
     ),
     Defect(
@@ -176,7 +176,7 @@ DEFECTS = (
         "tui/bus/share/client.py",
         "            self._requested.fail_all(reported)\n",
         "            pass\n",
-        "A stop waits for a frozen program for ever, and nobody is told that the motor runs.",
+        "A stop waits for a frozen program, and no message says that the motor runs.",
         (STOPS,),
     ),
     Defect(
@@ -184,7 +184,7 @@ DEFECTS = (
         "tui/bus/share/requested.py",
         "                    self._requested[number] = _without_asker(job)\n",
         "                    self._withdraw(number)\n",
-        "The keeper hangs, is ended by hand, and the next one does not send the stop.",
+        "The keeper hangs and is killed by hand, and the next one does not send the stop.",
         (STOPS,),
     ),
     Defect(
@@ -192,7 +192,7 @@ DEFECTS = (
         "tui/bus/share/requested.py",
         "            if stops:\n",
         "            if False:\n",
-        "A stop is not even handed over, as the look before it has failed.",
+        "A stop is not even handed over because the read before it failed.",
         (f"{STOPS}::test_the_look_before_a_stop_fails_so_that_the_stop_is_given",),
     ),
     Defect(
@@ -200,7 +200,7 @@ DEFECTS = (
         "tui/bus/share/owner_watch.py",
         "        if not dies or now - self._killed > DIES_WITHIN:\n",
         "        if False:\n",
-        "A keeper in another container hangs, and a stop waits for it without a word.",
+        "A keeper in another container hangs, and a stop waits for it without a message.",
         (WATCH, STOPS),
     ),
     Defect(
@@ -208,7 +208,7 @@ DEFECTS = (
         "tui/bus/share/owner_watch.py",
         "            sent = max(sent, self._begun + TAKEN_IN_WITHIN)\n",
         "            sent = now\n",
-        "`stop` waits for a frozen keeper for two seconds more than a panel does.",
+        "`stop` waits two seconds longer for a frozen keeper than a panel does.",
         (WATCH,),
     ),
     Defect(
@@ -216,7 +216,7 @@ DEFECTS = (
         "tui/bus/share/heartbeat.py",
         "lambda: self._stood > SENDS_WITHIN",
         "lambda: False",
-        "A frozen panel goes on with a run command from before a stop.",
+        "A frozen panel continues with a run command from before a stop.",
         (STOPS,),
     ),
     Defect(
@@ -224,7 +224,7 @@ DEFECTS = (
         "tui/bus/share/heartbeat.py",
         "if client.is_silent(now, LOOKS_IN_VAIN):",
         "if False:",
-        "A frozen program commands its drive for ever, and a recorder feeds its motor.",
+        "A frozen program keeps command of its drive, and a recorder keeps its motor running.",
         (f"{FROZEN}::test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more",),
     ),
     Defect(
@@ -232,7 +232,7 @@ DEFECTS = (
         "tui/bus/share/server.py",
         "gone = client.program.id in self._gone_before",
         "gone = False",
-        "A program that stood still for a minute takes its drive back, armed as it was.",
+        "A program that was frozen for a minute takes its drive back, still armed.",
         (f"{FROZEN}::test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more",),
     ),
     Defect(
@@ -240,7 +240,7 @@ DEFECTS = (
         "tui/bus/share/attached.py",
         "return now - self.heard > SILENT_CLIENT and self.looks > looks",
         "return now - self.heard > SILENT_CLIENT",
-        "An owner that stood still itself stops the motors of all others.",
+        "An owner that was itself frozen stops the motors of all other programs.",
         (FROZEN,),
     ),
     Defect(
@@ -248,7 +248,7 @@ DEFECTS = (
         "tui/session/fleet.py",
         "set(self._departed) <= set(before)",
         "len(self._departed) <= len(before) + 1",
-        "A panel that has just come offers nobody the motor of a program that was killed.",
+        "A panel that has just opened offers no takeover of a killed program's motor.",
         ("tests/session/test_handover.py::test_program_present_earlier_is_missed_too",),
     ),
     Defect(
@@ -256,7 +256,7 @@ DEFECTS = (
         "tui/session/sharing/orphan_motors.py",
         "absent = pids_absent(self._line.facts) | {program.process}",
         "absent = pids_absent(self._line.facts) - {program.process}",
-        "A recorder feeds the motor of a frozen program for ever.",
+        "A recorder keeps the motor of a frozen program running without end.",
         ("tests/session/test_guardian.py",),
     ),
     Defect(
@@ -264,7 +264,7 @@ DEFECTS = (
         "tui/screens/line_owner.py",
         "starts.left_running = self.leave_running",
         "starts.left_running = False",
-        "A fan that is to run on is stopped by a recorder when its panel is killed.",
+        "A recorder stops a fan that should keep running when its panel is killed.",
         (
             "tests/line/test_shared_programs.py"
             "::test_hangup_choice_applies_to_every_loss_of_the_panel",
@@ -275,7 +275,7 @@ DEFECTS = (
         "tui/session/starts/starts.py",
         "            left_running=left_running,\n        )  # fmt: skip",
         "        )  # fmt: skip",
-        "A motor that a panel took over runs on when that panel is killed.",
+        "A motor that a panel took over keeps running when that panel is killed.",
         ("tests/session/test_starts.py",),
     ),
     Defect(
@@ -283,7 +283,7 @@ DEFECTS = (
         "tui/bus/share/attached.py",
         "if job.commands and late > TOO_LATE:",
         "if False:",
-        "A run command goes out long after its person was told that nobody answers.",
+        'A run command is sent long after its person got a "no answer" message.',
         (f"{ENDS}::test_a_command_that_lay_in_the_socket_for_long_is_not_sent",),
     ),
     Defect(
@@ -291,7 +291,7 @@ DEFECTS = (
         "tui/bus/stop_counts.py",
         "known[program] = count",
         'known[""] = max(known.get("", 0), count)',
-        "Of two stops given at once one voids nothing.",
+        "Of two stops at the same time, one cancels nothing.",
         (f"{STOPS}::test_counts_only_go_up_and_one_telling_counts_once",),
     ),
     Defect(
@@ -307,7 +307,7 @@ DEFECTS = (
         "tui/bus/stop_counts.py",
         "if program in counts and is_newer(known := counts[program], own):",
         "if program in counts and is_newer(known := counts[program], own) and False:",
-        "A program's stop is no news where another program counted for it before.",
+        "A program's stop counts as known because another program counted for it before.",
         (f"{BOUNDS}::test_stop_count_that_others_raised_falls_back_to_its_own_program",),
     ),
     Defect(
@@ -315,7 +315,7 @@ DEFECTS = (
         "tui/bus/share/server.py",
         "case StopGiven() if message.program.id == client.program.id:",
         "case StopGiven():",
-        "The stop of a program is no news where another one sent its count before.",
+        "A program's stop counts as known because another program sent its count before.",
         (f"{BOUNDS}::test_stop_in_the_name_of_another_program_ends_the_connection_only",),
     ),
     Defect(
@@ -323,7 +323,7 @@ DEFECTS = (
         "tui/bus/share/server.py",
         "self._tell_all(stop, but=stop.program.id)",
         "pass",
-        "A stop from one panel leaves the work of another one going.",
+        "A stop from one panel does not end the work of another one.",
         (STOPS,),
     ),
     Defect(
@@ -331,7 +331,7 @@ DEFECTS = (
         "tui/bus/shared_state.py",
         "if stamp != self.stops.stamp(device):",
         "if False:",
-        "A run command that waited behind a stop starts the motor again.",
+        "A run command that waited during a stop starts the motor again.",
         (STOPS,),
     ),
     Defect(
@@ -339,7 +339,7 @@ DEFECTS = (
         "tui/bus/shared_state.py",
         "if holder is not None and holder != program:",
         "if False:",
-        "Two programs write to one drive in turns.",
+        "Two programs write to one drive in turn.",
         ("tests/bus/test_share.py::test_a_drive_that_another_program_commands_takes_no_write",),
     ),
     Defect(
@@ -347,7 +347,7 @@ DEFECTS = (
         "tui/bus/share/requested.py",
         "if not job.request.changes or job.priority is Priority.STOP:",
         "if True:",
-        "A write is sent twice where its owner was killed.",
+        "A write is sent twice because its owner was killed.",
         (ENDS,),
     ),
     Defect(
@@ -355,7 +355,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "self._inside.dispatcher.proof.doubt(self._quiet_until)",
         "pass",
-        "The answer to the killed program's request is taken for the next one's.",
+        "The answer to the killed program's request is accepted for the next one's.",
         (ENDS, STEP),
     ),
     Defect(
@@ -363,7 +363,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "inside.timing.late_reply if before.socket else",
         "0.0 if before.socket else",
-        "The first value after a holder that was killed is the reply to its last request.",
+        "The first value after a killed holder is the reply to the holder's last request.",
         (f"{ENDS}::test_one_that_comes_after_a_killed_owner_keeps_the_same_silence",),
     ),
     Defect(
@@ -371,7 +371,7 @@ DEFECTS = (
         "tui/bus/schedule/step_proof.py",
         "            if result.kind is ResultKind.REPLY:",
         "            if True:",
-        "A drive that answers a dead program's requests is believed to answer this one's.",
+        "The reply to a dead program's request is accepted for this one's.",
         (STEP,),
     ),
     Defect(
@@ -379,7 +379,7 @@ DEFECTS = (
         "tui/bus/schedule/step_proof.py",
         "self._devices.may_come(device, expectation, sent, self._clock())",
         "pass",
-        "After a proof that failed each value is that of the register before.",
+        "After a failed check of the replies, each value is that of the register before.",
         (STEP,),
     ),
     Defect(
@@ -395,7 +395,7 @@ DEFECTS = (
         "tui/bus/schedule/step_proof.py",
         "return job.priority is not Priority.STOP or not job.request.changes",
         "return True",
-        "After a keeper was killed, no stop goes out for two seconds.",
+        "After a keeper was killed, no stop is sent for two seconds.",
         (STEP,),
     ),
     Defect(
@@ -403,7 +403,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "self._lock.give_back(last if quiet > 0 or stopped else None)",
         "self._lock.give_back(None)",
-        "Whoever opens the line just after another program gets that one's answer.",
+        "A program that opens the line just after another one gets the other's answer.",
         (f"{ENDS}::test_one_that_comes_after_an_owner_that_ended_keeps_it_too",),
     ),
     Defect(
@@ -411,7 +411,7 @@ DEFECTS = (
         "tui/bus/share/server.py",
         "                self._missing(program)\n",
         "                pass\n",
-        "A recorder feeds a motor whose program was killed together with the panel.",
+        "A recorder keeps a motor running whose program was killed together with the panel.",
         (f"{ENDS}::test_programs_that_went_with_the_owner_are_missed_by_the_next",),
     ),
     Defect(
@@ -419,7 +419,7 @@ DEFECTS = (
         "tui/bus/schedule/dispatcher.py",
         "self._outcomes.values.drop(job.request.device)",
         "pass",
-        "A value that was just changed is shown as it was before.",
+        "A value that was just changed is shown unchanged.",
         ("tests/bus/test_share.py",),
     ),
     Defect(
@@ -427,7 +427,7 @@ DEFECTS = (
         "tui/bus/schedule/shared_values.py",
         "if word is None or word[1] != first[1]:",
         "if word is None:",
-        "A value of 32 bits is put together from two moments.",
+        "A value of 32 bits is combined from two moments.",
         ("tests/bus/test_share.py",),
     ),
     Defect(
@@ -435,7 +435,7 @@ DEFECTS = (
         "tui/bus/schedule/shared_values.py",
         "if first is None or first[1] < oldest:",
         "if first is None:",
-        "A value is shown as fresh that was read long ago.",
+        "A value that was read long ago is shown as fresh.",
         ("tests/bus/test_share.py",),
     ),
     Defect(
@@ -451,7 +451,7 @@ DEFECTS = (
         "tui/session/sharing/orphan_motors.py",
         "if takers else begun",
         "if frozen else begun",
-        "A motor stops before the person beside it can take it over.",
+        "A motor stops before another person can take it over.",
         ("tests/session/test_guardian.py",),
     ),
     Defect(
@@ -459,7 +459,7 @@ DEFECTS = (
         "tui/session/sharing/orphan_motors.py",
         "and not record.left_running",
         "",
-        "A pump that was to run on is stopped.",
+        "A pump that should keep running is stopped.",
         ("tests/session/test_guardian.py",),
     ),
     Defect(
@@ -467,7 +467,7 @@ DEFECTS = (
         "tui/session/sharing/handover.py",
         "session is not None and session.state(SEEN_WITHIN).motion in SURELY_STANDING",
         "True",
-        "Another program gets a drive whose motor runs, and nobody here was there to say so.",
+        "Another program gets a drive with a running motor without an answer from a person.",
         ("tests/session/test_handover.py",),
     ),
     Defect(
@@ -475,7 +475,7 @@ DEFECTS = (
         "tui/session/drive.py",
         'session.work.stop(f"{by}, {program.text}")',
         "pass",
-        "Work on a drive goes on although another program has stopped it.",
+        "Work on a drive continues although another program has stopped it.",
         ("tests/session/test_handover.py",),
     ),
     Defect(
@@ -483,7 +483,7 @@ DEFECTS = (
         "tui/bus/schedule/outcomes.py",
         "return result.turnaround + self._clock() - result.end > longest + STILL",
         "return False",
-        "After a standstill of the program an old value has the time of now.",
+        "After a program was frozen, an old value has the current time.",
         (f"{STOPS}::test_an_answer_that_waited_for_a_stopped_program_is_requested_again",),
     ),
     Defect(
@@ -491,7 +491,7 @@ DEFECTS = (
         "tui/bus/schedule/outcomes.py",
         "return result.turnaround + self._clock() - result.end > longest + STILL",
         "return self._clock() - result.sent > longest + STILL",
-        "At 1200 baud a backup never ends: an answer of 61 words is on the wire for 1.2 s.",
+        "At 1200 baud a backup never ends: an answer of 61 words takes 1.2 s on the wire.",
         ("tests/bus/test_outcomes.py",),
     ),
     Defect(
@@ -499,7 +499,7 @@ DEFECTS = (
         "tui/session/blocks/write.py",
         "            await self._see_taken(step, error)",
         "            raise",
-        "The owner of the line ends, and a block stays half written though the line goes on.",
+        "The owner of the line ends, and a block stays half written although the line continues.",
         (f"{MAPPING}::test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once",),
     ),
     Defect(
@@ -507,7 +507,7 @@ DEFECTS = (
         "tui/session/blocks/write.py",
         "            raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost",
         "            raise lost from None",
-        "A scanner is half written, and the person is told of one slot only.",
+        "A scanner is half written, and only one slot is reported.",
         (f"{MAPPING}::test_writes_before_line_loss_are_reported",),
     ),
     Defect(
@@ -515,7 +515,7 @@ DEFECTS = (
         "tui/cli/commands/block.py",
         "            complain(_cut_short(sent))",
         "            pass",
-        "Ctrl-C leaves a scanner half written, without a word.",
+        "Ctrl-C leaves a scanner half written without a message.",
         (f"{BLOCK}::test_write_cut_by_signal_is_reported_by_slot",),
     ),
     Defect(
@@ -523,7 +523,7 @@ DEFECTS = (
         "tui/cli/commands/block.py",
         "isinstance(cause, LineError | NotTaken)",
         "isinstance(cause, NotTaken)",
-        "A script takes a line that was lost for a refusal, and does not try again.",
+        "A script takes a lost line for a refusal, and does not retry.",
         (f"{BLOCK}::test_a_line_that_is_lost_meanwhile_is_no_refusal",),
     ),
     Defect(
@@ -531,7 +531,7 @@ DEFECTS = (
         "tui/cli/commands/orders.py",
         "within = patience(console.session.line, LEARNT_WITHIN)",
         "within = LEARNT_WITHIN",
-        "status and run fail beside a panel at 1200 baud.",
+        "`status` and `run` fail beside a panel at 1200 baud.",
         ("tests/cli/test_patience.py",),
     ),
     Defect(
@@ -539,7 +539,7 @@ DEFECTS = (
         "tui/session/settings/apply.py",
         "except (*LOST_ANSWERS, LineLost) as error:",
         "except LOST_ANSWERS as error:",
-        "The owner of the line ends, and a restore beside it stops half way.",
+        "The owner of the line ends, and another program's restore stops half way.",
         (f"{APPLYING}::test_a_line_that_goes_on_at_another_owner_is_gone_on_with",),
     ),
     Defect(
@@ -547,7 +547,7 @@ DEFECTS = (
         "tui/session/settings/restore.py",
         "stopped = unseen = str(error)",
         "stopped = str(error)",
-        "A restore whose line is lost at the end tells 0 not written, and status 4.",
+        "A restore whose line is lost at the end reports 0 failures, and status 4.",
         ("tests/cli/test_sets.py::test_restore_that_cannot_compare_again_says_why_exits_with_3",),
     ),
     Defect(
@@ -555,7 +555,7 @@ DEFECTS = (
         "tui/session/starts/folders.py",
         "        for shared in self._shared():\n            try:",
         "        for shared in ():\n            try:",
-        "A motor runs for good whose program is gone: a service of another user asks its drive on.",
+        "Another user's service keeps a motor running whose program has exited.",
         ("tests/session/test_guardian.py::test_the_motor_of_another_user_of_the_group_is_stopped",),
     ),
     Defect(
@@ -563,7 +563,7 @@ DEFECTS = (
         "tui/session/monitor/trend_notes.py",
         "if (note.device, note.kind) != (self._device, self._kind):",
         "if note.device != self._device:",
-        "Monitor shows as trend what the family at that address before had measured.",
+        "Monitor shows the trend of the drive that had the address before.",
         (
             "tests/session/test_trend_notes.py::test_a_trend_of_another_family_at_the_same_address"
             "_is_not_taken",
@@ -574,7 +574,7 @@ DEFECTS = (
         "tui/bus/notes.py",
         "while self._size > MOST_NOTES or (",
         "while (",
-        "A keeper grows with what programs leave, until the computer has no memory left.",
+        "A keeper stores the data of exited programs until the computer has no memory left.",
         ("tests/bus/test_notes.py::test_the_oldest_notes_make_room_for_new_ones",),
     ),
     Defect(
@@ -583,7 +583,7 @@ DEFECTS = (
         "                self._events = deque(events, maxlen=EVENTS_KEPT)\n",
         "                self._events = deque(events, maxlen=EVENTS_KEPT)\n"
         "                self._newest = event\n",
-        "The message line shows, as if it were new, what another program said minutes ago.",
+        "The message line shows another program's message from minutes ago as new.",
         ("tests/session/test_trend_notes.py::test_a_message_of_another_program_is_not_the_newest",),
     ),
     Defect(
@@ -591,7 +591,7 @@ DEFECTS = (
         "tui/session/command/under_way.py",
         "            if now > direct_at:",
         "            if given and now > direct_at:",
-        "The line's loop hangs in the panel, and its stop key acts after 2 s.",
+        "The line's loop hangs in the panel, and its stop key takes effect after 2 s.",
         (
             "tests/session/test_hung_loop.py::test_the_keeper_stops_drives_whose_stop_does_not_begin",
         ),
@@ -625,7 +625,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "path, self._find_holder, self._drop_lock, within",
         "path, self._find_holder, self._drop_lock",
-        "The keeper dies while the disk takes nothing: for 10 s no program reads or stops.",
+        "The keeper dies while the disk hangs: for 10 s no program reads or stops.",
         (
             "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
         ),
@@ -635,7 +635,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "        self._lock.hand_over()\n\n    def _give_to_keeper",
         "\n    def _give_to_keeper",
-        "After the disk is back nobody can attach: a program keeps a lock and serves nobody.",
+        "After the disk recovers no program can attach: one keeps a lock and serves no line.",
         (
             "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
         ),
@@ -645,7 +645,7 @@ DEFECTS = (
         "tui/bus/program_use.py",
         "        if not program:\n            return",
         "        if program is None:\n            return",
-        "After a stop that was repeated no client understands the keeper, and none stays attached.",
+        "After a repeated stop no client understands the keeper, and none stays attached.",
         (
             "tests/bus/test_program_use.py::test_a_request_of_no_program_leaves_the_counters"
             "_a_message",
@@ -656,7 +656,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "        if not self._finding:\n            self._lock",
         "        if True:\n            self._lock",
-        "A keeper is started with a lock that is closed already, and the line's thread ends.",
+        "A keeper starts with a lock that is already closed, and the line's thread ends.",
         (
             "tests/bus/test_share_ends.py::test_a_line_that_closes_leaves_the_lock_to_the_thread_that"
             "_uses_it",
@@ -667,7 +667,7 @@ DEFECTS = (
         "tui/session/starts/starts.py",
         "{record.device for record in living if not record.is_foreign}",
         "{record.device for record in living}",
-        "A container was killed; the motor of the next program that is killed runs on for good.",
+        "After a container was killed, the motor of the next killed program keeps running.",
         (
             "tests/session/test_starts.py::test_a_record_of_an_earlier_container_hides_no_later_start",
         ),
@@ -677,7 +677,7 @@ DEFECTS = (
         "tui/bus/share/sharing.py",
         "            if self._off:\n                raise",
         "            if False:\n                raise",
-        "The disk was slow: a keeper holds the line beside its program, and stops its motor.",
+        "On a slow disk a keeper holds the line beside its program, and stops its motor.",
         (
             "tests/bus/test_share_ends.py::test_no_keeper_is_started_once_its_program_holds_the_line",
         ),
@@ -687,7 +687,7 @@ DEFECTS = (
         "tui/session/command/under_way.py",
         "                direct_at = now + AGAIN_AFTER\n",
         "                direct_at = now + 1e9\n",
-        "The keeper was busy for half a second: a motor runs on while the panel hangs.",
+        "The keeper is busy for half a second: a motor keeps running while the panel hangs.",
         ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_requested_again",),
     ),
     Defect(
@@ -695,7 +695,7 @@ DEFECTS = (
         "tui/bus/share/beside.py",
         "        if connection.recv(len(GIVEN)) != GIVEN:",
         "        if connection.recv(len(GIVEN)) is None:",
-        "A stop that the keeper did not take counts as given, and is not tried again.",
+        "A stop that the keeper did not accept counts as sent, and is not retried.",
         ("tests/bus/test_plain_stop.py::test_a_stop_that_nobody_takes_is_no_stop",),
     ),
 )

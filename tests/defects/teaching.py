@@ -13,7 +13,7 @@ DEFECTS = (
         "tui/drive/teaching.py",
         "if len({look.word for look in looks}) < 2:\n        return None",
         "if not looks:\n        return None",
-        "One chance fit decides what a current is shown as.",
+        "One accidental match decides the scale of a current.",
         LEARNT,
     ),
     Defect(
@@ -29,7 +29,7 @@ DEFECTS = (
         "tui/drive/teaching.py",
         "        if self.signed is None:\n            return None\n",
         "",
-        "A motor that turns backwards is shown at a speed that it cannot have.",
+        "A motor in reverse is shown at an impossible speed.",
         (*LEARNT, *KEPT),
     ),
     Defect(
@@ -37,7 +37,7 @@ DEFECTS = (
         "tui/session/teaching/kept.py",
         "        if self.stated:\n            others =",
         "        if not self.stated:\n            others =",
-        "A drive that was put in the place of another is shown in the other's scale.",
+        "A replaced drive is shown in the scale of the earlier one.",
         KEPT,
     ),
     Defect(
@@ -45,7 +45,7 @@ DEFECTS = (
         "tui/session/teaching/kept.py",
         "        _set_aside_if_damaged(drive, path)\n",
         "",
-        "All that was taught of a drive is lost since its file could not be read once.",
+        "All learned scales of a drive are lost because its file could not be read once.",
         KEPT,
     ),
     Defect(
@@ -53,7 +53,7 @@ DEFECTS = (
         "tui/session/teaching/teacher.py",
         "        if not self._unkept:\n            self._known = on_disk\n",
         "",
-        "What a colleague taught meanwhile is written over.",
+        "A scale that a colleague taught in the meantime is overwritten.",
         KEPT,
     ),
     Defect(
@@ -61,7 +61,7 @@ DEFECTS = (
         "tui/session/teaching/teacher.py",
         "self._taught_scales(), self._known.reference)",
         "self._taught_scales(), self._known.reference or self.proposal())",
-        "A word of which no manual says what it does gives a motor its reference.",
+        "An undocumented word gives a motor its reference.",
         KEPT,
     ),
     Defect(
@@ -69,7 +69,7 @@ DEFECTS = (
         "tui/session/teaching/teacher.py",
         "            self._known = TaughtLooks(self._known.looks)\n",
         "            pass\n",
-        "A reference goes out in a scale for which nobody has confirmed it.",
+        "A reference is sent in a scale that no person has confirmed.",
         KEPT,
     ),
 )

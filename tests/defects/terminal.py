@@ -12,7 +12,7 @@ DEFECTS = (
         "tui/terminal/dialects.py",
         "*cut, self._last = self._cut",
         "*cut, _ = self._cut",
-        "After Esc and [ no digit, and not the next letter either, is a key: k does not stop.",
+        "After Esc and [, digits and the next letter are ignored: k does not stop.",
         ("tests/terminal/test_dialects.py::test_reports_keep_no_sequence_waiting",),
     ),
     Defect(
@@ -20,7 +20,7 @@ DEFECTS = (
         "tui/terminal/dialects.py",
         "self._began, self._mark, self._state = began, mark, self._escape",
         "self._began, self._mark, self._state = began, mark, self._ground",
-        "An F12 right after a terminal's reply that lost its last character does not stop.",
+        "An F12 directly after a truncated reply of the terminal does not stop.",
         (
             "tests/terminal/test_dialects.py::test_reply_that_loses_its_backslash_gives_no_alt_key",
             "tests/terminal/test_dialects.py::test_stop_key_after_a_cut_or_incomplete_reply_stops",
@@ -31,7 +31,7 @@ DEFECTS = (
         "tui/terminal/pacing.py",
         "        if on_its_way and sum(on_its_way) > ahead and",
         "        if len(on_its_way) > 8 and sum(on_its_way) > ahead and",
-        "Over a slow link the panel shows what the motor did seconds ago.",
+        "Over a slow link the panel shows the motor's state of seconds ago.",
         PACE,
     ),
     Defect(
@@ -39,7 +39,7 @@ DEFECTS = (
         "tui/terminal/pacing.py",
         "AHEAD_OF_REST if rest else AHEAD if hurry else 0",
         "AHEAD_OF_REST if rest else 0",
-        "Over a slow link a stop is not told until the picture before it has come.",
+        "Over a slow link a stop is shown only after the frame before it.",
         PACE,
     ),
     Defect(
@@ -47,7 +47,7 @@ DEFECTS = (
         "tui/terminal/pacing.py",
         "for at, size in self._requested if now < at + self._patience]",
         "for at, size in self._requested]",
-        "A panel stands still for good on a terminal that never answers.",
+        "The panel freezes on a terminal that never answers.",
         PACE,
     ),
     Defect(
@@ -55,7 +55,7 @@ DEFECTS = (
         "tui/terminal/pacing.py",
         "            not self._answers\n            and bool(self._requested)\n",
         "            False\n            and bool(self._requested)\n",
-        "On a terminal that never answers a stop is shown seconds late.",
+        "On a terminal that never answers, a stop is shown seconds late.",
         PACE,
     ),
     Defect(
@@ -63,7 +63,7 @@ DEFECTS = (
         "tui/terminal/pacing.py",
         "self._piece = max(PIECE_LEAST, int(size * PIECE_TIME / took))",
         "self._piece = WHOLE",
-        "Over a slow link every key waits behind a whole picture.",
+        "Over a slow link every key waits for a whole frame.",
         PACE,
     ),
     Defect(
@@ -71,7 +71,7 @@ DEFECTS = (
         "tui/terminal/pacing.py",
         "            self._piece = min(WHOLE, GROWTH * self._piece)\n",
         "            self._piece = PIECE_LEAST\n",
-        "A fast link gets its pictures in small pieces, one answer after the other.",
+        "A fast link gets its frames in small pieces, each after an answer.",
         PACE,
     ),
     Defect(
@@ -79,7 +79,7 @@ DEFECTS = (
         "tui/terminal/driver.py",
         "        os.kill(os.getpid(), signal.SIGHUP)\n",
         "",
-        "A panel that lost its terminal keeps its motor running for good, with nobody before it.",
+        "A panel that lost its terminal keeps its motor running, without a person.",
         (
             "tests/terminal/test_driver.py"
             "::test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does",

@@ -10,7 +10,7 @@ DEFECTS = (
         "tui/session/monitor/alarms.py",
         "now = FaultOnset(wall, onset is not None or device in self._free, code)",
         "now = FaultOnset(wall, True, code)",
-        "A panel that is opened on a fault of yesterday says that the drive has tripped just now.",
+        "A panel opened on yesterday's fault reports that the drive has just tripped.",
         ("tests/session/test_alarms.py",),
     ),
     Defect(
@@ -18,7 +18,7 @@ DEFECTS = (
         "tui/session/trips.py",
         "if last is not None and ongoing and not tripped:",
         "if False:",
-        "The report lists one trip as often as a panel was opened on it.",
+        "The report lists a trip once for each panel that was opened on it.",
         ("tests/session/test_trips.py",),
     ),
     Defect(
@@ -26,7 +26,7 @@ DEFECTS = (
         "tui/session/read/reader.py",
         "        self.session.take(found)\n",
         "        _ = priority < Priority.POLL and self.session.take(found)\n",
-        "Parameters and stops do not know what Monitor shows.",
+        "Parameters and stops do not use the values that Monitor has read.",
         ("tests/session/test_reader.py",),
     ),
     Defect(
@@ -42,7 +42,7 @@ DEFECTS = (
         "tui/session/read/reader.py",
         "if {code: raw.raw for code, raw in raws.items()} != check.slots:",
         "if not raws:",
-        "After another program changed the scanner one value is shown as another.",
+        "After another program changed the scanner, one value is shown as another.",
         (
             "tests/session/test_slots.py"
             "::test_a_scanner_changed_under_way_never_shows_one_value_as_another",
@@ -53,7 +53,7 @@ DEFECTS = (
         "tui/session/image.py",
         "if before is not None and before.time > reading.time:",
         "if before is not None and before.time < -1:",
-        "A value from before is shown as the present one.",
+        "An older value is shown as the current one.",
         ("tests/session/test_owners.py::test_an_older_reply_never_takes_the_place_of_a_newer_one",),
     ),
     Defect(
@@ -61,7 +61,7 @@ DEFECTS = (
         "tui/session/image.py",
         "if held[c].time >= since}",
         "if held[c].time >= 0}",
-        "A stop is chosen by what the drive held before somebody else set it up.",
+        "A stop word is chosen by values from before another person set up the drive.",
         ("tests/session/test_owners.py::test_possibly_changed_value_is_known_but_not_trusted",),
     ),
     Defect(
@@ -69,7 +69,7 @@ DEFECTS = (
         "tui/session/read/reader.py",
         "raws = await self._exchange(check.request, priority, since)",
         "raws = await self._exchange(check.request, priority)",
-        "Slots that another program changed are taken as they were: one value stands as another.",
+        "Slots changed by another program count as unchanged, and one value is shown as another.",
         ("tests/session/test_slots.py::test_slots_that_were_read_before_the_block_are_read_again",),
     ),
     Defect(
@@ -77,7 +77,7 @@ DEFECTS = (
         "tui/session/read/reader.py",
         "        return max((since, *(image.changed(place.code) for place in request.places)))\n",
         "        return since\n",
-        "A value that was read in the cycle before is told as not read now.",
+        "A value from the previous cycle is reported as not read in this one.",
         ("tests/session/test_slots.py::test_own_value_is_read_again_and_foreign_is_not",),
     ),
     Defect(
@@ -85,7 +85,7 @@ DEFECTS = (
         "tui/session/read/reader.py",
         "since = self._slots.learned if self._block_of(request) else -math.inf",
         "since = -math.inf",
-        "Words of slots that were changed since are told by the new ones.",
+        "Words of slots that changed in the meantime are decoded by the new slots.",
         ("tests/session/test_slots.py::test_a_block_that_was_read_before_its_slots_is_read_again",),
     ),
     Defect(
@@ -93,7 +93,7 @@ DEFECTS = (
         "tui/session/read/proof.py",
         'return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""',
         'return left[0] if left and self._confirmed(slot, left[0]) else ""',
-        "A current is shown as a frequency since both were zero at rest.",
+        "A current is shown as a frequency because both were zero at standstill.",
         ("tests/session/test_proof.py",),
     ),
     Defect(
@@ -101,7 +101,7 @@ DEFECTS = (
         "tui/session/read/proof.py",
         "SURE = 3",
         "SURE = 1",
-        "One chance fit decides which value a block brings.",
+        "One accidental match decides which value a block returns.",
         ("tests/session/test_proof.py",),
     ),
     Defect(
@@ -109,7 +109,7 @@ DEFECTS = (
         "tui/session/read/reader.py",
         "self._slots.distrust()",
         "self._slots.heard()",
-        "After a reset of the drive its block brings other values than are shown.",
+        "After a reset of the drive its block returns other values than shown.",
         ("tests/session/test_slots.py::test_a_fault_ends_the_trust_in_what_counts_until_a_reset",),
     ),
     Defect(
@@ -117,7 +117,7 @@ DEFECTS = (
         "tui/session/monitor",
         "STALE_CYCLES = 3",
         "STALE_CYCLES = 30",
-        "Values of half a minute ago are shown as the present ones.",
+        "Values from half a minute ago are shown as current.",
         ("tests/session/test_monitor_faults.py", "tests/session/test_owners.py"),
     ),
     Defect(
@@ -125,7 +125,7 @@ DEFECTS = (
         "tui/session/monitor",
         "if code and code in readings and not snapshot.error\n",
         "if code and code in readings\n",
-        "A trend shows a motor running evenly while nobody heard the drive.",
+        "A trend shows a motor running evenly while the drive does not answer.",
         ("tests/session/test_monitor_faults.py",),
     ),
     Defect(
@@ -133,7 +133,7 @@ DEFECTS = (
         "tui/session/monitor",
         "error, contact = str(fault), contact_of(fault)\n                    failures += 1",
         "failures += 1",
-        "A drive that does not answer looks alive.",
+        "A drive that does not answer looks healthy.",
         ("tests/session/test_monitor_faults.py",),
     ),
     Defect(
@@ -149,7 +149,7 @@ DEFECTS = (
         "tui/bus/shared_state.py",
         "        self.keep_alives.end(program.id)\n",
         "",
-        "Reads keep a motor running whose program has died.",
+        "Reads keep a motor running whose program has exited.",
         ("tests/bus/test_keep_alive.py",),
     ),
     Defect(
@@ -165,7 +165,7 @@ DEFECTS = (
         "tui/session/monitor",
         "if silent > TOLD_SHARE * watch.timeout:",
         "if silent > 1000 * watch.timeout:",
-        "A drive that is about to trip is not told of.",
+        "A drive that is about to trip is not reported.",
         ("tests/session/test_line_watch.py",),
     ),
     Defect(
@@ -173,7 +173,7 @@ DEFECTS = (
         "tui/session/connect",
         'reference = texts.get(REFERENCE, "")',
         'reference = texts.get(NAME, "")',
-        "A drive is taken for another family, and its words mean something else.",
+        "A drive is identified as another family, and its words have other meanings.",
         ("tests/line/test_on_a_line.py::test_identify",),
     ),
     Defect(
@@ -181,7 +181,7 @@ DEFECTS = (
         "tui/session/drive_state.py",
         "fault_raw = raws.get(profile.data.faults.parameter)",
         "fault_raw = raws.get(profile.data.charts[0].status)",
-        "A trip is explained by the cause and remedy of another fault.",
+        "A trip is shown with the cause and remedy of another fault.",
         ("tests/session/test_drive_state.py",),
     ),
     Defect(
@@ -189,7 +189,7 @@ DEFECTS = (
         "tui/session/monitor/fault_record.py",
         "            self.latest = replace(self.latest, fault=snapshot.state.fault)\n",
         "            _ = replace(self.latest, fault=snapshot.state.fault)\n",
-        "The record of a trip does not say which fault it was.",
+        "The record of a trip does not name its fault.",
         ("tests/session/test_fault_record.py",),
     ),
     Defect(
