@@ -37,7 +37,7 @@ def test_drive_does_not_trip_while_the_loop_of_its_program_is_busy() -> None:
     with bench(STRICT) as (simulation, line):
         with open_drives(line) as drives:
             drives.drive(profile="atv71")
-            shared = drives._opened.line
+            shared = drives._calls.line
             alive = shared.facts.keep_alives
             wait_until(
                 lambda: [keep_alive.timeout for keep_alive in alive.kept.values()] == [TIMEOUT],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 import threading
@@ -14,6 +15,8 @@ import pytest
 import tui.session.api as api
 from tui.bus.program import Program
 from tui.session.api import (
+    AsyncDrive,
+    AsyncDriveLine,
     Drive,
     DriveError,
     DriveLine,
@@ -59,9 +62,23 @@ def test_the_page_names_all_of_it() -> None:
     for name in api.__all__:
         assert f"`{name}`" in text, name
     for owner in (Drive, DriveLine):
-        for part in vars(owner):
+        for part in dir(owner):
             if not part.startswith("_"):
                 assert f"`{owner.__name__}.{part}`" in text, part
+
+
+@pytest.mark.parametrize(
+    ("blocking", "awaited"), [(Drive, AsyncDrive), (DriveLine, AsyncDriveLine)]
+)
+def test_async_calls_have_the_names_and_arguments_of_the_blocking_ones(
+    blocking: type, awaited: type
+) -> None:
+    names = [name for name in {*dir(blocking), *dir(awaited)} if not name.startswith("_")]
+    for name in names:
+        calls = getattr(blocking, name), getattr(awaited, name)
+        if callable(calls[0]):
+            arguments = [inspect.signature(call).parameters for call in calls]
+            assert arguments[0] == arguments[1], name
 
 
 def test_values_go_by_what_was_requested(drive: Drive) -> None:
@@ -202,7 +219,7 @@ def test_a_stop_of_another_program_voids_what_follows_inside_the_block_alone(
     line: DriveLine, drive: Drive
 ) -> None:
     """A script that lives on may arm again; one stop is told of more than once."""
-    facts = line._fleet.line.facts
+    facts = line._calls.line.facts
     other = Program("another's id", "stop", 4711)
     facts.hear_stop((1,), "drivepanel stop", other)
     with drive.armed():

@@ -1,18 +1,22 @@
 """A line and its drives for scripts: open, read, watch, write, stop. docs/api.md explains how.
 
-Each call waits until it is done, from any thread. What goes wrong is raised: LineError by the
-line, DriveError by the drive, its profile, or a check from here.
+Each call waits until it is done, in any thread or asyncio loop. Errors are raised: LineError by the
+line, DriveError by the drive, its profile, or a check of this package.
 """
 
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
 from ..settings.typed import WouldRound
+from .async_drive import AsyncDrive
+from .async_line import AsyncDriveLine, open_drives_async
 from .drive import Drive
 from .line import DriveLine, open_drives
 from .values import DriveValue, NotStopped, NotWritten, Sample
 
 __all__ = [
+    "AsyncDrive",
+    "AsyncDriveLine",
     "Drive",
     "DriveError",
     "DriveLine",
@@ -23,4 +27,5 @@ __all__ = [
     "Sample",
     "WouldRound",
     "open_drives",
+    "open_drives_async",
 ]

@@ -9,6 +9,7 @@ An internal error anywhere on that way costs no stop: see `LastStop`.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import threading
 import time
@@ -190,15 +191,29 @@ class Stopper:
 
     def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
         """Wait from another thread until these stops have ended, or the time is up."""
-        devices = {session.device for session in sessions}
         # the thread that waits does so by the real clock, whichever the drives have
-        end = time.monotonic() + seconds
-        while True:
-            reports = [report for device, report in self._reports.items() if device in devices]
-            summary = StopSummary(reports)
-            if (len(reports) == len(devices) and summary.ended) or time.monotonic() > end:
-                return summary
+        wanted, end = {session.device for session in sessions}, time.monotonic() + seconds
+        while (summary := self._over(wanted)) is None and time.monotonic() < end:
             time.sleep(STANDSTILL_POLL_INTERVAL)
+        return summary or self._summary(wanted)
+
+    async def ended(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
+        """Wait in any loop until these stops have ended, or the time is up."""
+        wanted, end = {session.device for session in sessions}, time.monotonic() + seconds
+        while True:
+            if (summary := self._over(wanted)) is not None or time.monotonic() > end:
+                return summary or self._summary(wanted)
+            await asyncio.sleep(STANDSTILL_POLL_INTERVAL)
+
+    def _over(self, devices: set[int]) -> StopSummary | None:
+        """The stops of these drives, once nothing more is awaited of any."""
+        summary = self._summary(devices)
+        return summary if len(summary.reports) == len(devices) and summary.ended else None
+
+    def _summary(self, devices: set[int]) -> StopSummary:
+        return StopSummary(
+            [report for device, report in self._reports.items() if device in devices]
+        )
 
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
         """Report how far a stop has come; an error in doing so costs no stop."""

@@ -1,0 +1,97 @@
+"""The calls to one drive, which `Drive` waits for and `AsyncDrive` awaits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from tui.bus.api import ModbusLine
+from tui.drive.errors import DriveError
+
+from ..arming import NotArmed
+from ..command.stop_report import StopSummary
+from ..drive import DriveSession
+from ..fleet import Fleet
+from ..read.reader import Reader
+from ..settings.apply import apply_edits
+from ..settings.eeprom import save_to_eeprom
+from ..settings.typed import stage_typed
+from ..work import Permit
+from .samples import SampleFeed
+from .values import DriveValue, NotStopped, NotWritten, value_from
+
+STANDS_WITHIN = 120.0
+"""Seconds in which a motor must reach standstill after a stop."""
+
+
+class DriveCalls:
+    """One drive of an open line. Coroutines run in the line's loop, the rest in any thread."""
+
+    def __init__(self, session: DriveSession, fleet: Fleet) -> None:
+        self.session = session
+        self.fleet = fleet
+
+    @property
+    def line(self) -> ModbusLine:
+        """The line of the drive."""
+        return self.session.line
+
+    def named(self, codes: tuple[str, ...]) -> dict[str, str]:
+        """The drive's own code for each spelling. Raises DriveError for an unknown one."""
+        return {code: self.session.profile.find(code).code for code in codes}
+
+    async def read(self, named: Mapping[str, str]) -> dict[str, DriveValue]:
+        """Read current values, by code as requested; one that the drive refuses has no value."""
+        found = await Reader(self.session).read(list(named.values()))
+        clock = self.session.clock
+        return {requested: value_from(found[code], clock) for requested, code in named.items()}
+
+    def watch(self, codes: tuple[str, ...], every: float) -> SampleFeed:
+        """Watch values, a cycle each `every` seconds."""
+        return SampleFeed(self.session, self.named(codes), every)
+
+    @contextmanager
+    def armed(self) -> Iterator[None]:
+        """Let the block write to this drive; a stop ends that. Raises DriveError."""
+        self.session.arming.arm(seconds=math.inf)
+        try:
+            yield
+        finally:
+            self.session.arming.disarm()
+
+    def permit(self) -> Permit:
+        """The right to write from now on. Raises NotArmed."""
+        if not self.session.arming.armed:
+            why = self.session.arming.why_disarmed or "Not armed."
+            raise NotArmed(f"{why} Write inside `with drive.armed():`.")
+        return self.session.work.permit()
+
+    async def write(
+        self, values: Mapping[str, object], permit: Permit, *, rounded: bool
+    ) -> dict[str, str]:
+        """Write settings, each read back; the results by code. Raises as `Drive.write`."""
+        typed = [(self.session.profile.find(code).code, str(v)) for code, v in values.items()]
+        if len({code for code, _ in typed}) < len(typed):
+            raise DriveError("One parameter is given more than once. Which value is meant?")
+        edits, _ = await stage_typed(self.session, typed, rounded=rounded)
+        journal = self.fleet.journal
+        done = await apply_edits(self.session, journal, edits, permit=permit, why="script")
+        if missed := {r.edit.code: r.text for r in done.results if not r.done}:
+            raise NotWritten(missed)
+        return {result.edit.code: result.text for result in done.results}
+
+    async def save(self, permit: Permit) -> str:
+        """Keep the settings in the drive's EEPROM; returns what was done."""
+        return await save_to_eeprom(self.session, self.fleet.journal, permit)
+
+    def order_stop(self) -> None:
+        """Order the ramp stop; no loop is waited for. Raises LineClosed."""
+        self.fleet.stop([self.session], by="a script")
+
+    @staticmethod
+    def stop_text(summary: StopSummary) -> str:
+        """The result of a stop. Raises NotStopped unless the motor is at standstill."""
+        if summary.failed or not summary.ended:
+            raise NotStopped(summary.text)
+        return summary.text
