@@ -31,7 +31,7 @@ from benchmarks.hello import TEXTS
 from benchmarks.terminal import Figures, Key, Terminal, press_often, spread, steady
 from benchmarks.wire import ROOT
 from tui.cli.opening import open_panel
-from tui.terminal.dialects import APART
+from tui.safety import BURST_GAP
 
 SIZES = ((80, 24), (120, 40))
 SLOW = 20_000.0
@@ -92,7 +92,7 @@ WORD = Key("\t", word_sign)
 HELP = Key("?", saying("Keys on Monitor", "──╮", "──╯"))
 HELLO_TEXT = Key("w", saying(*TEXTS))
 HELLO_HELP = Key("?", saying("Line 0 of a help", "──╮", "──╯"))
-HELD = APART * 1e3
+HELD = BURST_GAP * 1e3
 """Time in ms for which the panel holds a key back, as others may follow it at once."""
 HTOP_HELP = Key("?", saying("Released under the GNU", "F10Quit"))
 

@@ -6,7 +6,8 @@ import asyncio
 
 import pytest
 
-from tui.bus.share.heartbeat import BACK_AT_LATEST, BACK_LOOK, BACK_WITHIN, programs_back
+from tui.bus.share.heartbeat import BACK_LOOK, programs_back
+from tui.safety import BACK_AT_LATEST, BACK_WITHIN
 
 
 class StarvedLoop:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from tui.bus.share.attached import SILENT_CLIENT
-from tui.bus.share.heartbeat import BEAT_INTERVAL, LOOP_HANGS, Heartbeat
+from tui.bus.share.heartbeat import Heartbeat
 from tui.bus.share.messages import Alive, Pulse, packed
 from tui.bus.share.place import Peer, owner_of, short_path
+from tui.safety import BEAT_INTERVAL, LOOP_HANGS, SILENT_CLIENT
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest

@@ -23,13 +23,14 @@ from tui.bus.master import LineContext, Sending
 from tui.bus.requests import Read
 from tui.bus.result import Piece, ResultKind
 from tui.bus.rtu.exchange import FLOOD, RtuExchange
-from tui.bus.rtu.master import FROZEN_IN_SENDING, RtuMaster
+from tui.bus.rtu.master import RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.tcp.master import TcpMaster
 from tui.bus.trace import Trace
 from tui.bus.transport.base import Receiver
 from tui.bus.transport.serial_posix import PosixSerial
 from tui.bus.transport.tcp import TcpTransport
+from tui.safety import FROZEN_IN_SENDING
 
 from .conftest import BRISK, OpenLine
 from .peer import honest_pdu, reply, tcp_reply

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from tui.bus.errors import NoAnswer
-from tui.bus.keep_alive import LONGEST_TIMEOUT, READS_PER_TIMEOUT, SHORTEST_TIMEOUT, KeepAlive
+from tui.bus.keep_alive import LONGEST_TIMEOUT, SHORTEST_TIMEOUT, KeepAlive
 from tui.bus.line import Line
 from tui.bus.model import Priority, Timing
 from tui.bus.program import Program
@@ -20,6 +20,7 @@ from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.share.messages import NoMessage, packed, unpacked
 from tui.bus.shared_state import SharedState
+from tui.safety import READS_PER_TIMEOUT
 
 from .conftest import OpenLine, Share
 from .peer import PtyPeer, eventually, honest, honest_pdu

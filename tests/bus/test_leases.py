@@ -13,9 +13,9 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.bounds import MOST_CARE
 from tui.bus.errors import RequestRefused
-from tui.bus.leases import RENEWED_EACH
 from tui.bus.line import Line
 from tui.bus.program import Program
+from tui.safety import LEASE_RENEWED_EVERY
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, reply
@@ -92,7 +92,7 @@ async def test_a_stop_ends_it_for_every_program(share: Share) -> None:
 async def test_it_ends_with_its_time_unless_it_is_renewed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         _, program = pair(share, peer)
-        program.facts.leases.arm(1, -RENEWED_EACH - 0.01, CARE)
+        program.facts.leases.arm(1, -LEASE_RENEWED_EVERY - 0.01, CARE)
         assert await refusal(program) == "Not sent: drive 1 is not armed any more."
         program.facts.leases.stay_armed(1, 60.0)
         await program.write(1, 1, [RUN])

@@ -9,10 +9,11 @@ from tui.bus.model import LastMinute, Priority, Timing
 from tui.bus.requests import Read
 from tui.bus.result import ExchangeResult, Piece, ResultKind
 from tui.bus.schedule.outcomes import SHORT_SILENCE, Outcomes
-from tui.bus.schedule.patience import MISSES, Devices
+from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
+from tui.safety import MISSES
 from tui.wire.frames import frame
 
 from .conftest import WIDE, Share

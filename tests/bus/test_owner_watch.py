@@ -20,19 +20,16 @@ from tui.bus.share.messages import VERSION, Alive, Asking, Notified, StopGiven
 from tui.bus.share.owner_watch import (
     BY_HAND,
     DIES_WITHIN,
-    HEARD_WITHIN,
     OTHER_CONTAINER,
     OTHER_USER,
-    SILENT_OWNER,
     STAYS,
-    STOP_HEARD_WITHIN,
-    TAKEN_IN_WITHIN,
     WATCH_INTERVAL,
     KeeperProcess,
     OwnerWatch,
     is_stop,
 )
 from tui.bus.share.place import Owner, Peer
+from tui.safety import HEARD_WITHIN, SILENT_OWNER, STOP_HEARD_WITHIN, TAKEN_IN_WITHIN
 
 LISTENS = """
 import socket, sys

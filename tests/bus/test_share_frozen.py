@@ -13,7 +13,7 @@ import pytest
 from tui.bus.api import LineStatus
 from tui.bus.errors import LineError
 from tui.bus.share.client import STOOD_STILL
-from tui.bus.share.owner_watch import SILENT_OWNER
+from tui.safety import SILENT_OWNER
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest

@@ -14,9 +14,10 @@ from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineError, LineLost, NoAnswer, RequestRefused
 from tui.bus.line import Line
 from tui.bus.program import KEEPER
-from tui.bus.share.owner_watch import HEARD_WITHIN, OTHER_CONTAINER
+from tui.bus.share.owner_watch import OTHER_CONTAINER
 from tui.bus.share.place import owner_of
-from tui.bus.stop_counts import STOPS_KEPT, StopCounts
+from tui.bus.stop_counts import StopCounts
+from tui.safety import HEARD_WITHIN, STOPS_KEPT
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply

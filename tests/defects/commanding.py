@@ -297,9 +297,9 @@ DEFECTS = (
     ),
     Defect(
         "stop-tried-once",
-        "tui/session/command",
-        "STOP_TRIES = 5",
-        "STOP_TRIES = 1",
+        "tui/safety.py",
+        "STOP_TRIES: Final = 5",
+        "STOP_TRIES: Final = 1",
         "After one disturbed frame the motor keeps running.",
         ("tests/session/test_stop.py::test_a_dead_drive_is_tried_again_and_reported_of",),
     ),

@@ -138,7 +138,7 @@ DEFECTS = (
     Defect(
         "typed-on-into-a-question",
         "tui/screens/dialogs/question.py",
-        "return now - max(self._drawn, self._typed_at) < NOT_TYPING",
+        "return now - max(self._drawn, self._typed_at) < ANSWER_COUNTS_AFTER",
         "return now - self._drawn < self.SETTLED",
         "A typed word with a y in it confirms a question that has just appeared.",
         ("tests/ui/test_questions.py",),

@@ -281,7 +281,7 @@ DEFECTS = (
     Defect(
         "late-command-sent",
         "tui/bus/share/attached.py",
-        "if job.commands and late > TOO_LATE:",
+        "if job.commands and late > COMMAND_TOO_LATE:",
         "if False:",
         'A run command is sent long after its person got a "no answer" message.',
         (f"{ENDS}::test_a_command_that_lay_in_the_socket_for_long_is_not_sent",),
@@ -465,7 +465,7 @@ DEFECTS = (
     Defect(
         "running-motor-given-away-unasked",
         "tui/session/sharing/handover.py",
-        "session is not None and session.state(SEEN_WITHIN).motion in SURELY_STANDING",
+        "session is not None and session.state(STANDSTILL_SEEN_WITHIN).motion in SURELY_STANDING",
         "True",
         "Another program gets a drive with a running motor without an answer from a person.",
         ("tests/session/test_handover.py",),
@@ -685,7 +685,7 @@ DEFECTS = (
     Defect(
         "direct-stop-tried-once",
         "tui/session/command/under_way.py",
-        "                direct_at = now + AGAIN_AFTER\n",
+        "                direct_at = now + STOP_REPEATED_EVERY\n",
         "                direct_at = now + 1e9\n",
         "The keeper is busy for half a second: a motor keeps running while the panel hangs.",
         ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_requested_again",),

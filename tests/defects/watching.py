@@ -114,9 +114,9 @@ DEFECTS = (
     ),
     Defect(
         "stale-ten-times-later",
-        "tui/session/monitor",
-        "STALE_CYCLES = 3",
-        "STALE_CYCLES = 30",
+        "tui/safety.py",
+        "STALE_CYCLES: Final = 3",
+        "STALE_CYCLES: Final = 30",
         "Values from half a minute ago are shown as current.",
         ("tests/session/test_monitor_faults.py", "tests/session/test_owners.py"),
     ),
@@ -163,7 +163,7 @@ DEFECTS = (
     Defect(
         "timeout-warning-not-told",
         "tui/session/monitor",
-        "if silent > TOLD_SHARE * watch.timeout:",
+        "if silent > WARNED_AT_SHARE * watch.timeout:",
         "if silent > 1000 * watch.timeout:",
         "A drive that is about to trip is not reported.",
         ("tests/session/test_line_watch.py",),

@@ -9,7 +9,8 @@ import pytest
 
 from tests.programs import wait_until
 from tests.terminal.dialect_tables import DIALECTS
-from tui.terminal.dialects import APART, ESCAPE_DELAY
+from tui.safety import BURST_GAP
+from tui.terminal.dialects import ESCAPE_DELAY
 
 from .pty_panel import REFERENCE, SPLIT, STOP, PtyPanel, Write, panel_on_a_pty
 
@@ -48,7 +49,7 @@ def test_the_stop_keys_of_every_terminal_stop_and_do_nothing_else(
         before = len(panel.log.writes)
         panel.type(*pieces, apart=gap)
         wait_until(lambda b=before: panel.look() and panel.stops(b) > 0, f"{pieces} stop")  # type: ignore[misc]
-        panel.settle(2 * APART)
+        panel.settle(2 * BURST_GAP)
         panel.stops(before)
         assert "only drive" not in panel.text()
         if pieces[0] == "\x1b" and gap > ESCAPE_DELAY:
@@ -66,7 +67,7 @@ def test_the_other_function_keys_of_every_terminal_type_nothing(
     for sequence in (DIALECTS[dialect][n - 1] for n in (2, 3, 4, 5, 6, 7, 8, 10, 11)):
         for cut in range(len(sequence)):
             panel.type(*filter(None, (sequence[:cut], sequence[cut:])))
-            panel.settle(APART + 0.02)
+            panel.settle(BURST_GAP + 0.02)
     panel.shows("Output", "a arm")
     assert len(panel.log.writes) == before
     assert "only drive" not in panel.text()

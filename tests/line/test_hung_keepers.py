@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, Served, is_running, keepers, served, wait_until
-from tui.bus.share.keeper_share import ALARM_AFTER
-from tui.bus.share.owner_watch import HEARD_WITHIN, STOP_HEARD_WITHIN
+from tui.safety import ALARM_AFTER, HEARD_WITHIN, STOP_HEARD_WITHIN
 from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
 

@@ -25,9 +25,9 @@ from tests.programs import (
     served,
     wait_until,
 )
-from tui.bus.share.keeper_share import LINGERS
 from tui.bus.share.keeping import can_start
 from tui.drive.profile import library
+from tui.safety import LINGERS
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor

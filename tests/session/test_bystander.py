@@ -8,11 +8,11 @@ from typing import Any, cast
 
 import pytest
 
+from tui.safety import GRACE_SHARE
 from tui.session.drive import DriveSession
 from tui.session.sharing.observer_poller import (
     ACTED_AFTER,
     COMMANDER_SILENT,
-    GRACE_SHARE,
     UNKNOWN_TIMEOUT_ACTED,
     ObserverPoller,
 )

@@ -17,7 +17,7 @@ from tui.bus.limits import Limits
 from tui.bus.line import Line
 from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
-from tui.session.arming import ARMED_FOR
+from tui.safety import ARMED_FOR
 from tui.session.clock import Clock
 from tui.session.drive import DriveSession
 

@@ -18,7 +18,7 @@ from tui.bus.line import Line, Timing
 from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
-from tui.session.arming import ARMED_FOR
+from tui.safety import ARMED_FOR
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase

@@ -13,9 +13,9 @@ from tui.drive.errors import ValueRefused
 from tui.drive.settings.parameter_set import dump_set
 from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
+from tui.safety import WAS_OFF
 from tui.session.read.upload import Upload
 from tui.session.settings.editor import Editor
-from tui.session.settings.watched_values import WAS_OFF
 
 from .test_command import FAMILIES, Bench, bench
 

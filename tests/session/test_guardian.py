@@ -16,20 +16,13 @@ from tests.bus.peer import eventually
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink, label
 from tui.bus.program import Program
-from tui.bus.share.attached import SILENT_CLIENT
 from tui.drive.profile import library
+from tui.safety import LINE_BACK_WITHIN, LONGEST_GRACE, SILENT_CLIENT, TAKEN_OVER_WITHIN
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
 from tui.session.journal import Journal
-from tui.session.sharing.orphan_motors import (
-    ENDS_WITHIN,
-    LINE_BACK_WITHIN,
-    LINE_STAYS_LOST,
-    LONGEST_GRACE,
-    TAKEN_OVER_WITHIN,
-    OrphanMotorGuard,
-)
+from tui.session.sharing.orphan_motors import ENDS_WITHIN, LINE_STAYS_LOST, OrphanMotorGuard
 from tui.session.starts.processes import Processes
 from tui.session.starts.record import StartRecord
 from tui.session.starts.starts import Starts

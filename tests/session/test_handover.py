@@ -16,12 +16,13 @@ from tui.bus.program import Program
 from tui.bus.share.messages import AnyMessage, Armed, Claim, DriveRequested, RequestGranted
 from tui.bus.share.publishers import LinePublisher
 from tui.drive.profile import library
-from tui.session.arming import ARMED_FOR, CommandedElsewhere
+from tui.safety import ARMED_FOR, REQUEST_ANSWERED_WITHIN
+from tui.session.arming import CommandedElsewhere
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
 from tui.session.fleet import Fleet
 from tui.session.journal import Journal
-from tui.session.sharing.handover import ANSWER_WITHIN, TAKEN_LOOK, TAKEN_WITHIN, Handover
+from tui.session.sharing.handover import TAKEN_LOOK, TAKEN_WITHIN, Handover
 from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.starts import Starts
 
@@ -107,7 +108,7 @@ def commanded_there(bench: Bench) -> None:
 async def expires(bench: Bench) -> None:
     """Let the time for an answer go by."""
     await asyncio.sleep(0.05)
-    bench.clock.advance(ANSWER_WITHIN + 1)
+    bench.clock.advance(REQUEST_ANSWERED_WITHIN + 1)
     await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)
 
 
@@ -208,7 +209,7 @@ async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
     bench.session.arming.arm()
     bench.facts.hear_question(1, REMOTE)
     await asyncio.sleep(0.05)
-    bench.clock.advance(ANSWER_WITHIN + 1)
+    bench.clock.advance(REQUEST_ANSWERED_WITHIN + 1)
     if status is not None:
         bench.shows(status)
     await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)

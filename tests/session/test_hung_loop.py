@@ -11,6 +11,7 @@ import pytest
 from tui.bus.api import LineWorker
 from tui.bus.fake import FakeLine
 from tui.drive.profile import library
+from tui.safety import HANGS_AFTER
 from tui.session.command import under_way
 from tui.session.command.stop import Stopper
 from tui.session.drive import DriveSession
@@ -63,7 +64,7 @@ async def test_the_keeper_stops_drives_whose_stop_does_not_begin() -> None:
 async def test_a_keeper_that_does_not_answer_is_requested_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(under_way, "AGAIN_AFTER", 0.05)
+    monkeypatch.setattr(under_way, "STOP_REPEATED_EVERY", 0.05)
     tries: list[tuple[int, ...]] = []
 
     class Silent(Heard):
@@ -91,4 +92,4 @@ async def test_a_loop_that_works_needs_no_other_way(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_loop_counts_as_hung_before_a_person_presses_again() -> None:
-    assert under_way.HANGS_AFTER <= 0.3
+    assert HANGS_AFTER <= 0.3

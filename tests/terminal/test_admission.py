@@ -15,7 +15,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from tests.ui.test_flows import until
-from tui.terminal.admission import LATE, Admission
+from tui.safety import KEY_TOO_LATE
+from tui.terminal.admission import Admission
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.stroke import Stroke, attach
 from tui.terminal.type_ahead import TypeAhead
@@ -219,7 +220,7 @@ async def test_a_held_key_ends_with_the_key_however_slow_the_app_is() -> None:
 async def test_a_key_that_waited_long_does_no_more_than_one_of_a_piece() -> None:
     app = Panel()
     async with app.run_test() as pilot:
-        before = Stroke(time.monotonic() - LATE - 0.1, 0)
+        before = Stroke(time.monotonic() - KEY_TOO_LATE - 0.1, 0)
         app.send("r", "up", stroke=before)
         await until(pilot, lambda: app.not_taken == [1])
         assert app.late == 1

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tui.safety import BURST_GAP
 from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts, KeyInput
-from tui.terminal.dialects import APART
 from tui.terminal.tokens import KeyToken, Paste
 
-QUIET = APART + 0.01
+QUIET = BURST_GAP + 0.01
 CLOSE = 0.03
 STOPS = {"space", "f12", "f9"}
 
@@ -54,9 +54,9 @@ class Bench:
 def test_a_key_alone_is_held_back_until_that_is_known() -> None:
     bench = Bench()
     assert bench.read("r") == []
-    assert bench.bursts.deadline() == pytest.approx(bench.now + APART)
-    assert bench.bursts.given(bench.now + APART - 0.001) == []
-    (given,) = bench.bursts.given(bench.now + APART + 0.001)
+    assert bench.bursts.deadline() == pytest.approx(bench.now + BURST_GAP)
+    assert bench.bursts.given(bench.now + BURST_GAP - 0.001) == []
+    (given,) = bench.bursts.given(bench.now + BURST_GAP + 0.001)
     assert (given.alone, given.held, given.steps, given.piece) == (True, False, True, 1)
     assert bench.bursts.deadline() is None
 
@@ -254,7 +254,7 @@ def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> No
     for key_input in bench.found:
         key = key_input.what
         assert isinstance(key, KeyToken)
-        near = [name for name, at in typed if abs(at - key.at) <= APART - 1e-6]
+        near = [name for name, at in typed if abs(at - key.at) <= BURST_GAP - 1e-6]
         if key_input.alone:
             assert near == [key.name]
         if key_input.held:
@@ -264,7 +264,7 @@ def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> No
     # a key that no stop came after is given out, alone where nothing is near
     stops = [at for name, at in typed if name in STOPS]
     for name, at in typed:
-        near = [other for other, time in typed if abs(time - at) <= APART + 1e-6]
+        near = [other for other, time in typed if abs(time - at) <= BURST_GAP + 1e-6]
         if name not in STOPS and near == [name] and not [s for s in stops if s == at]:
             assert any(
                 isinstance(g.what, KeyToken) and g.what.at == at and g.alone for g in bench.found

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from textual._ansi_sequences import ANSI_SEQUENCES_KEYS, IGNORE_SEQUENCE
 from textual._xterm_parser import XTermParser
 
-from tui.terminal.dialects import APART, ESCAPE_DELAY, SEQUENCE_WITHIN, Tokenizer
+from tui.safety import BURST_GAP
+from tui.terminal.dialects import ESCAPE_DELAY, SEQUENCE_WITHIN, Tokenizer
 from tui.terminal.tokens import KeyToken, Paste, Report, Token
 
 from .dialect_tables import DIALECTS, REPLIES, REPORTS, SHIFTED_AND_MORE
 
 STOPS = {"f9", "f12"}
-GAPS = [0.0, 0.02, APART + 0.01, ESCAPE_DELAY + 0.01, 0.9]
+GAPS = [0.0, 0.02, BURST_GAP + 0.01, ESCAPE_DELAY + 0.01, 0.9]
 """Seconds between the two halves of a sequence."""
 AFTERWARDS = 10.0
 FUNCTION_KEYS = [
@@ -153,9 +154,9 @@ def test_a_space_stops_inside_of_any_sequence(begin: str, gap: float) -> None:
 @pytest.mark.parametrize("begin", ["\x1b[200~text", "\x1b]11;rgb:", "\x1bP>|"])
 def test_no_stop_key_is_lost_where_an_end_was_lost(begin: str) -> None:
     for key in (" ", "\x1b[24~", "\x1bO[", "\x1b[U"):
-        found = tokens([begin, key], APART + 0.01)
+        found = tokens([begin, key], BURST_GAP + 0.01)
         assert next(t.name for t in found if isinstance(t, KeyToken)) in STOPS | {"space"}, key
-    held_down = tokens([begin, *[" "] * 5], APART + 0.01)
+    held_down = tokens([begin, *[" "] * 5], BURST_GAP + 0.01)
     assert sum(isinstance(token, KeyToken) for token in held_down) == 5
 
 

@@ -23,7 +23,7 @@ def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
     `test_questions` and `test_run_line` look at the waiting.
     """
     monkeypatch.setattr(Question, "_is_early", lambda _: False)
-    monkeypatch.setattr("tui.screens.monitor.run_line.SETTLED", 0.0)
+    monkeypatch.setattr("tui.screens.monitor.run_line.ENTER_COUNTS_AFTER", 0.0)
 
 
 @pytest.fixture(autouse=True)

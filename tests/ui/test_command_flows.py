@@ -371,7 +371,7 @@ async def test_reference_by_steps_and_its_limit() -> None:
 async def test_input_typed_ahead_reaches_line_but_commands_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tui.screens.monitor.run_line.SETTLED", 60.0)
+    monkeypatch.setattr("tui.screens.monitor.run_line.ENTER_COUNTS_AFTER", 60.0)
     async with bench("atv71") as made:
         for key, character in [("a", "a"), ("f", "f"), ("3", "3"), ("0", "0"), ("enter", "\r")]:
             made.app.post_message(Key(key, character))

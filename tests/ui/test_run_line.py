@@ -12,6 +12,7 @@ import pytest
 
 from tests.sweeps import kept
 from tui.drive.profile import library
+from tui.safety import ENTER_COUNTS_AFTER
 from tui.screens.monitor import run_line
 from tui.screens.monitor.run_line import RunLine, proposed
 
@@ -21,7 +22,7 @@ from .test_flows import shown, until
 
 MOMENT = 0.3
 """Seconds before which Enter is no answer, by the rules of the panel's hands."""
-SETTLED = run_line.SETTLED
+SETTLED = ENTER_COUNTS_AFTER
 LINE = RunLine("forward", "30.0", "Hz", fakes.NOW, 0)
 ARROWS = ("up", "down", "pageup", "pagedown")
 CLOSING = ["escape", "q", "n", "y", "x", "r", "v", "f", "a", "3 a", "tab", "left", "delete", "f5"]
@@ -112,7 +113,7 @@ def open_lines(made: Bench) -> Callable[[], bool]:
 
 async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     async with ready() as made:
-        monkeypatch.setattr(run_line, "SETTLED", SETTLED)
+        monkeypatch.setattr(run_line, "ENTER_COUNTS_AFTER", SETTLED)
         clock = made.app.clock
         now = clock.monotonic()
         clock.monotonic = lambda: now  # type: ignore[method-assign]

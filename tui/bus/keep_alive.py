@@ -22,7 +22,6 @@ from .requests import Identify, Request, read_request
 if TYPE_CHECKING:
     from .share.messages import AnyMessage
 
-READS_PER_TIMEOUT = 4.0
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.08, 1e6
 """Seconds of a timeout that is kept; a line could not keep a shorter one."""
 MOST_WORDS = 125

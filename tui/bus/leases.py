@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from tui.safety import LEASE_RENEWED_EVERY
+
 from .bounds import MOST_CARE
 from .share.messages import AnyMessage, Armed
 from .stop_counts import StopCounts
 
 LEASE_ENDED = 0.0
 """The end of a lease that its program has ended."""
-RENEWED_EACH = 1.0
-"""Seconds after which the holder of a line hears that a device stays armed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class WriteLeases:
         `care` is how to stop the device, should this program end.
         """
         # the holder's lease ends a moment later: what is refused is refused here, with its reason
-        until = None if seconds is None else time.monotonic() + seconds + RENEWED_EACH
+        until = None if seconds is None else time.monotonic() + seconds + LEASE_RENEWED_EVERY
         known = care if len(care) <= MOST_CARE else b""
         if not known:
             self.disarm(device)
@@ -71,10 +71,10 @@ class WriteLeases:
         """Write on to a device that this program has armed, for so many seconds."""
         if seconds is None:
             return
-        until, mine = time.monotonic() + seconds + RENEWED_EACH, (self._me, device)
+        until, mine = time.monotonic() + seconds + LEASE_RENEWED_EVERY, (self._me, device)
         with self._lock:  # one that ended just now stays ended
             lease = self._leases.get(mine)
-            if lease is None or not lease.until or until - lease.until < RENEWED_EACH:
+            if lease is None or not lease.until or until - lease.until < LEASE_RENEWED_EVERY:
                 return
             self._leases = MappingProxyType({**self._leases, mine: replace(lease, until=until)})
         self._say(device, WriteLease(lease.stamp, until))

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+from tui.safety import LATE_REPLY
+
 from .errors import RequestRefused, WrongReply
 from .expectation import IDENTIFY
 from .identification import REFERENCE, Objects, own_words_of
@@ -63,10 +65,6 @@ __all__ = [
 # frames of the protocol library are traced here; its own log must not reach the terminal
 logging.getLogger("pymodbus").propagate = False
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
-
-
-LATE_REPLY = 2.0
-"""A reply may come so many times later than the timeout that a person has set."""
 
 
 class Line:

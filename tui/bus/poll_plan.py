@@ -16,9 +16,6 @@ MOST_TURNS, MOST_READS = 16, 250
 """Turns of a plan, and reads of one turn."""
 SHORTEST_PERIOD, LONGEST_PERIOD = 0.05, 60.0
 """Bounds of a plan's period in seconds; what is read less often needs no plan."""
-SHARED_AGE = 0.5
-"""Age up to which a poll takes what was read for another program, as a share of the cycle: two
-programs of one period then read each value once, however their cycles lie to each other."""
 USUAL_TURNAROUND = 0.005
 """Seconds that a device takes to answer, until it is measured."""
 

@@ -11,13 +11,13 @@ import time
 from collections.abc import Collection, Iterable, Mapping
 from types import MappingProxyType
 
+from tui.safety import STOPS_KEPT
+
 from .bounds import MOST_STOPPERS, STOPS_WRAP
 
 GivenStops = Mapping[int, Mapping[str, int]]
 """Counts of stops, by device and program."""
 
-STOPS_KEPT = 600.0
-"""Seconds for which the next owner of a line learns when a device was stopped."""
 GIVEN_BY_NOBODY = ""
 """Under which the stops of programs are counted that have left."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.style import Style
 
+from tui.safety import LOOK_IS_OLD
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
 from tui.widgets.strip import DriveNow, FrameView, Said, StripView
 
@@ -31,8 +32,6 @@ LOAD_OVER = 2.0
 """Seconds over which the load of the line is measured."""
 STOP_SHOWN = 10.0
 """Seconds for which a failed stop replaces the state, though that is known."""
-LOOK_IS_OLD = 10.0
-"""Seconds after which a look at a drive that no monitor watches is not its present any more."""
 STOP_WORDS = {"sending": "STOP WAITS", "stopping": "STOPPING"}
 """A stop on its way: its frame waits for the line, or was sent."""
 DIRECTION_WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}

@@ -7,11 +7,9 @@ from collections.abc import Callable
 
 from tui.bus.api import LineStatus, ModbusLine
 from tui.drive.orders import OrderRefused
+from tui.safety import ARMED_FOR
 
 from .clock import REAL_CLOCK, Clock
-
-ARMED_FOR = 60.0
-"""Seconds without a key after which a drive is no longer armed."""
 
 
 class NotArmed(OrderRefused):

@@ -17,9 +17,6 @@ from .reading import Quality, Reading
 Signed = TypeVar("Signed", float, Decimal)
 """A number with the sign of a direction."""
 
-STATE_FRESH = 1.0
-"""Seconds for which a state counts as present; an older one is read again."""
-
 
 @dataclass(frozen=True, slots=True)
 class DriveState:

@@ -8,6 +8,8 @@ from typing import Protocol
 from textual.app import App
 from textual.events import Key, Paste
 
+from tui.safety import KEY_TOO_LATE
+
 from .fields import takes_text
 from .stroke import Stroke, attach, stroke_of
 
@@ -21,9 +23,6 @@ EDITS = frozenset({"backspace", "delete"})
 TOLD_AFTER = 0.1
 """Seconds after which the keys of a piece are reported without waiting for more."""
 
-LATE: float = 3.0
-"""Seconds after which a key does what a key of a piece may: where the terminal took nothing, the
-panel stood still, and nobody expects its keys any more."""
 
 PASTE_IGNORED = "Pasted text ignored: it goes into a text field only."
 
@@ -61,7 +60,7 @@ class Admission:
             return True
         if stroke.stamp != self._stamps.stop_stamp():
             return False  # a stop was the last word
-        late = time.monotonic() - stroke.read_at > LATE
+        late = time.monotonic() - stroke.read_at > KEY_TOO_LATE
         if late:
             attach(event, stroke._replace(alone=False, held=False, steps=False))
         if (stroke.acts and not late) or self._harmless(event):

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from .dialects import APART
+from tui.safety import BURST_GAP
+
 from .tokens import KeyToken, Paste
 
 SHORTEST_REPEAT: Final = 0.005
@@ -80,7 +81,7 @@ class Bursts:
         """Return the known keys; `pending` is when a sequence began that may become a key."""
         self._give_repeats()
         if not self._hangs_on(pending):
-            if now - self._last > APART:
+            if now - self._last > BURST_GAP:
                 self._close()
             elif self._members > 1 and self._waiting and now - self._waiting[0].at > HELD_LONGEST:
                 self._give_parts()
@@ -89,14 +90,14 @@ class Bursts:
 
     def deadline(self, pending: float | None = None) -> float | None:
         """When it will be known whether what waits is alone; None if time shows nothing."""
-        return self._last + APART if self._waiting and not self._hangs_on(pending) else None
+        return self._last + BURST_GAP if self._waiting and not self._hangs_on(pending) else None
 
     def _hangs_on(self, pending: float | None) -> bool:
-        return pending is not None and pending - self._last <= APART
+        return pending is not None and pending - self._last <= BURST_GAP
 
     def _join(self, began: float, at: float) -> None:
         """One more member of the piece; a new piece where the last is over."""
-        if began - self._last > APART:
+        if began - self._last > BURST_GAP:
             self._close()
         self._members += 1
         self._last = at

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from tui.safety import BURST_GAP
+
 from . import sequences
 from .names import SPACE, SPACE_ALONE, STOP_KEYS, Named, character_name, sequence_name, with_alt
 from .sequences import ESC, PASTE_ENDS
@@ -20,9 +22,6 @@ ESCAPE_DELAY: Final = 0.1
 
 SEQUENCE_WITHIN: Final = 1.0
 """Seconds that a sequence which has begun may wait for its next character."""
-
-APART: Final = 0.05
-"""Seconds between two reads above which they are not one piece."""
 
 
 class Tokenizer:
@@ -270,7 +269,7 @@ class Tokenizer:
         A Space read alone, a while after the rest, was pressed: if the end of a paste or of a reply
         was lost, no stop may be lost with it.
         """
-        if self._state not in (self._paste, self._reply) or self._now - self._last <= APART:
+        if self._state not in (self._paste, self._reply) or self._now - self._last <= BURST_GAP:
             return False
         named = SPACE_ALONE if text == " " else sequence_name(text[: sequences.LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from time import monotonic
 
-STANDS_STILL = 2.0
-"""Seconds without a look after which a loop stood still: nobody expects a command that old."""
+from tui.safety import GATEWAY_SUSPENDED_AFTER
+
 LOOK_AWAKE = 0.5
 """Seconds between two looks."""
 CATCHES_UP = 1.0
@@ -37,12 +37,12 @@ class Awake:
         """True if what comes in now may have come while the loop stood still."""
         now = self._clock()
         # the bytes of a connection are taken in before the look that is due
-        return now - self._looked > STANDS_STILL or now < self._stale_until
+        return now - self._looked > GATEWAY_SUSPENDED_AFTER or now < self._stale_until
 
     def look(self) -> None:
         """The loop goes on."""
         now = self._clock()
-        if now - self._looked > STANDS_STILL:
+        if now - self._looked > GATEWAY_SUSPENDED_AFTER:
             self._stale_until = now + CATCHES_UP
         self._looked = now
 

@@ -6,6 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 
+from tui.safety import FROZEN_IN_SENDING
 from tui.wire.frames import MAX_FRAME, frame
 
 from ..errors import LineLost
@@ -27,8 +28,6 @@ TOLERANCE = 0.001
 """Seconds by which the end of a request is uncertain."""
 REMEMBERED, JUDGED, SELDOM = 64, 8, 0.15
 """Replies looked back at; how many are enough; the share of early ones on a line with a baud."""
-FROZEN_IN_SENDING = 0.2
-"""Seconds from the last look at the line to the end of sending, past which nothing is sure."""
 MUCH_TALK = 256
 """Bytes that came in while nothing was due, and no silence, after which they are looked at."""
 IDLE_LIMIT = 4096

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..keep_alive import READS_PER_TIMEOUT, KeepAlive
+from tui.safety import READS_PER_TIMEOUT
+
+from ..keep_alive import KeepAlive
 from ..master import MonotonicClock
 from ..model import Priority
 from ..shared_state import SharedState

@@ -7,6 +7,8 @@ import logging
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 
+from tui.safety import TURN_WITHIN
+
 from ..errors import LineLost
 from ..master import Master
 from ..prepared import PreparedWrite
@@ -14,8 +16,6 @@ from ..transport.base import Transport
 
 log = logging.getLogger(__name__)
 
-TURN_WITHIN = 0.3
-"""Seconds for which the exchange in flight is waited for; then the frames are sent anyway."""
 AFTER_OWN_PORT = 0.05
 """Seconds for which a port opened for one frame stays open, so that its bytes get out."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from tui.safety import MISSES
 from tui.wire.overheard import overheard_request
 
 from ..errors import (
@@ -21,7 +22,7 @@ from ..requests import BROADCAST
 from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_state import SharedState
 from ..tally import Tally
-from .patience import MISSES, Devices
+from .patience import Devices
 from .queue import Job
 from .shared_values import SharedValues
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from statistics import median
 
+from tui.safety import LATE_MARGIN, LONGEST_WAIT, MARGIN, MISSES, QUIET_SHARE
+
 from ..expectation import EXCEPTION, Expectation
 from ..limits import Limits
 from ..model import DeviceState, Priority, Timing
@@ -12,21 +14,12 @@ from ..result import Piece, StrayKind
 from .backoff import pause
 from .device_record import Device, Outstanding, note_turnaround, usual
 
-MARGIN = 4
-"""The timeout is so many times the worst recent turnaround."""
-LATE_MARGIN = 2.0
-"""Late replies are awaited so many times longer than the worst lateness seen."""
-LONGEST_WAIT = 10.0
-QUIET_SHARE = 0.3
-"""Longest that the whole line keeps quiet for one late device, as a share of the timeout."""
 FORGET = 0.99
 """Share of the worst lateness that remains after each timely reply."""
 SHORT_WAIT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
 """Seconds without a repeated reply after which a short wait is over, and a longer one is short."""
-MISSES = 3
-"""Replies in a row that a known device misses before polls of it pause."""
 KNOWN = 4
 """Turnarounds that must be known before one can be called unusual."""
 UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 2.0, 0.002

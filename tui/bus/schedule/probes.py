@@ -6,12 +6,14 @@ from collections import deque
 from collections.abc import Iterator
 from secrets import randbelow
 
+from tui.safety import MISSES
+
 from ..expectation import IDENTIFY, Expectation
 from ..master import MonotonicClock
 from ..model import Priority
 from ..requests import Diagnose, Identify, Read, Request
 from .forms import Forms, shorter
-from .patience import MISSES, Devices
+from .patience import Devices
 from .queue import Job
 
 ECHO = 0

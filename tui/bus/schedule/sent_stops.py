@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from tui.safety import JUST_SENT, MOST_UNACKNOWLEDGED
+
 from ..model import Priority
 from ..requests import BROADCAST
 
 if TYPE_CHECKING:
     from .queue import Job
-
-JUST_SENT = 3.0
-"""Seconds for which a stop that was sent makes one like it a repeat."""
-MOST_UNACKNOWLEDGED = 5
-"""Times that a stop may be sent without an acknowledgment before the next counts as a repeat."""
 
 
 class SentStop(NamedTuple):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tui.safety import STOP_KEPT_FOR
+
 from ..errors import LineError, NoAnswer
 from ..model import Priority
 from ..requests import Diagnose
@@ -10,9 +12,6 @@ from .outcomes import with_fate
 from .patience import Devices
 from .queue import Job
 from .shared_values import SharedValues
-
-STOP_KEPT_FOR = 600.0
-"""Seconds after which a stop is not sent any more once a line opens again."""
 
 
 def is_stop_word(job: Job) -> bool:

@@ -9,6 +9,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from tui.safety import COMMAND_TOO_LATE, SILENT_CLIENT, STOP_DUE
+
 from ..bounds import MOST_FRAMES
 from ..errors import RequestRefused
 from ..limits import CAUTIOUS, Limits
@@ -33,14 +35,8 @@ from .owner_watch import is_stop
 
 log = logging.getLogger(__name__)
 
-SILENT_CLIENT = 2.0
-"""Seconds without a sign of life after which a client is let go: nobody is to wait for it."""
-TOO_LATE = 2.0
-"""Seconds after which a command is not sent any more: nobody expects it now."""
 MOST_ASKED = 256
 """Requests of one client that may wait."""
-STOP_DUE = 10.0
-"""Seconds for which a stop is carried out for a program that is gone."""
 MOST_UNREAD = 1 << 23
 """Bytes that a client may leave unread; one that stalls is let go, and may come back."""
 
@@ -138,7 +134,7 @@ class Client:
         self.requested[message.number] = job
         job.answer.add_done_callback(partial(self._answered, message.number))
         late = inside.clock() - message.requested
-        if job.commands and late > TOO_LATE:
+        if job.commands and late > COMMAND_TOO_LATE:
             job.fail(RequestRefused(was_suspended(late)))
         else:
             inside.submit(job)

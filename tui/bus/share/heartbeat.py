@@ -10,33 +10,31 @@ from collections.abc import Awaitable, Callable, Collection
 from pathlib import Path
 from time import monotonic
 
+from tui.safety import (
+    BACK_AT_LATEST,
+    BACK_WITHIN,
+    BEAT_INTERVAL,
+    BEAT_WITHIN,
+    COMMAND_TOO_LATE,
+    LOOP_HANGS,
+    OWNER_BEAT_INTERVAL,
+    SENDS_WITHIN,
+    SILENT_CLIENT,
+)
+
 from ..schedule.inside import LineInside
-from .attached import SILENT_CLIENT, TOO_LATE, Client, was_suspended
+from .attached import Client, was_suspended
 from .messages import Alive, Pulse, packed
 from .place import reached
 
 log = logging.getLogger(__name__)
 
-NEWS_INTERVAL = 0.2
-"""Seconds between the owner's signs of life."""
-LOOKS_IN_VAIN = int(SILENT_CLIENT / NEWS_INTERVAL)
+LOOKS_IN_VAIN = int(SILENT_CLIENT / OWNER_BEAT_INTERVAL)
 """Looks at a client before it counts as frozen."""
-SENDS_WITHIN = 0.7
-"""Seconds without a sign of life after which nothing but stops is sent, until all are heard."""
 HEARD_TIME, HEARD_TURNS = 0.05, 20
 """Seconds, and turns of the loop, in which all that programs have said meanwhile is heard."""
-BACK_WITHIN = 2.0
-"""Seconds in which programs come back, unless they are gone, too; while this one can be reached."""
-BACK_AT_LATEST = 6.0
-"""Seconds after which they count as gone in any case."""
 BACK_LOOK = 0.1
 """Seconds between two looks. A late one counts as one: nobody was served in the meantime."""
-BEAT_INTERVAL = 0.4
-"""Seconds between two beats."""
-LOOP_HANGS = 3.0
-"""Seconds without a turn of the line's loop after which it counts as hung."""
-BEAT_WITHIN = 0.5
-"""Seconds that the holder has to take a beat."""
 _ALIVE = packed(Alive())
 
 
@@ -90,7 +88,7 @@ class HeartbeatSender:
 
     async def _work(self) -> None:
         while True:
-            await asyncio.sleep(NEWS_INTERVAL)
+            await asyncio.sleep(OWNER_BEAT_INTERVAL)
             beat = self._inside.clock()
             try:
                 self._let_silent_go()
@@ -115,8 +113,8 @@ class HeartbeatSender:
         """This program stood still: what waits in it may have been stopped meanwhile."""
         stood, why = self._stood, was_suspended(self._stood)
         log.warning("%s", why)
-        if stood > TOO_LATE:
-            self._inside.dispatcher.void_older(self._inside.clock() - TOO_LATE, why)
+        if stood > COMMAND_TOO_LATE:
+            self._inside.dispatcher.void_older(self._inside.clock() - COMMAND_TOO_LATE, why)
         for _ in range(HEARD_TURNS):
             await asyncio.sleep(HEARD_TIME / HEARD_TURNS)
 

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+from tui.safety import ALARM_AFTER, LINGERS
+
 from ..model import LineStatus
 from ..program import KEEPER, Program, pid_namespace
 from ..schedule.inside import LineInside, Say
@@ -16,11 +18,8 @@ from .messages import VERSION
 from .place import STARTING, Owner, SharePlace
 from .sharing import Sharing
 
-LINGERS = 10.0
-"""Seconds that a keeper waits for the next program, its port closed."""
-ALARM_AFTER, ALARM_RENEWED = 2.0, 0.25
-"""Seconds for which the loop of the line may hang before its process is ended, and seconds
-between two signs that it does not."""
+ALARM_RENEWED = 0.25
+"""Seconds between two renewals of the alarm that ends a keeper whose loop hangs."""
 PROCESS_ENDS_WITHIN = 20.0
 """Seconds that the process has to end once that loop has."""
 CARE_INTERVAL = 0.005

@@ -10,6 +10,8 @@ import socket
 from collections import deque
 from contextlib import suppress
 
+from tui.safety import AWAKE, HEARD_WITHIN, SILENT_OWNER, STOP_HEARD_WITHIN, TAKEN_IN_WITHIN
+
 from ..errors import OWNER_SILENT
 from ..master import MonotonicClock
 from ..model import Priority
@@ -85,16 +87,6 @@ class KeeperProcess:
 
 WATCH_INTERVAL = 0.1
 """Seconds between two looks at the owner."""
-AWAKE = 0.3
-"""Seconds between two looks in which this program was awake all the time."""
-SILENT_OWNER = 1.0
-"""Seconds without a sign of life after which an owner counts as frozen."""
-TAKEN_IN_WITHIN = 1.0
-"""Seconds that a keeper which lives takes for the answer to a greeting."""
-STOP_HEARD_WITHIN = 1.0
-"""Seconds in which a keeper that lives acknowledges a stop."""
-HEARD_WITHIN = 3.0
-"""Seconds in which a keeper that lives says anything; it does so several times a second."""
 DIES_WITHIN = 1.0
 """Seconds that a process has to end once it is killed."""
 

@@ -9,12 +9,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from tui.safety import SHARED_AGE
+
 from ..bounds import MOST_DEVICES, MOST_STRETCH
 from ..errors import DeviceException, LineError, RequestRefused
 from ..limits import CAUTIOUS, Limits, send_refusal
 from ..link import character_time, silence
 from ..model import Priority, Reply
-from ..poll_plan import SHARED_AGE, USUAL_TURNAROUND, PlannedRead, PolledTurn, PollPlan
+from ..poll_plan import USUAL_TURNAROUND, PlannedRead, PolledTurn, PollPlan
 from ..requests import read_request
 from ..schedule.inside import LineInside
 from ..schedule.pace import SHARE, greatest

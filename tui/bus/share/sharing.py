@@ -6,6 +6,8 @@ import asyncio
 import logging
 from collections.abc import Callable
 
+from tui.safety import STOP_DISK_WITHIN
+
 from ..errors import LineLost, NotShared
 from ..link import label
 from ..model import LineStatus
@@ -43,8 +45,6 @@ UNKEPT = (
 )
 DISK_WITHIN = 2.0
 """Seconds that the system has to lock a file: after them the line is used without a lock."""
-STOP_DISK_WITHIN = 1.0
-"""The same for a stop, which starts no keeper: it has waited for the disk before."""
 NO_DISK = "the system does not answer"
 DIED_OFTEN = f"has died {MOST_DEATHS} times within a minute"
 HOLDER_AWAY = "The process that held the line has ended; the next one starts."

@@ -19,6 +19,7 @@ from textual.screen import ModalScreen
 from textual.widget import Widget
 
 from tui.drive.plain import plain
+from tui.safety import ANSWER_COUNTS_AFTER
 from tui.widgets.palette import FAINT, KEY
 from tui.widgets.plain import Plain
 
@@ -38,8 +39,6 @@ DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
 """Of the screen's rows those of a dialog at most; of its border; columns of border and padding;
 rows that a list keeps."""
 
-NOT_TYPING = 1.0
-"""Seconds without a key after which an automatic question takes an answer."""
 TYPED_ON = "A question came meanwhile: after a second without a key it takes an answer."
 
 TOO_EARLY = "Key ignored: it came before this could be read. Press it again."
@@ -187,7 +186,7 @@ class Question(Framed, ModalScreen[T]):
             return True
         now = self.app.clock.monotonic()
         if self.by_itself:
-            return now - max(self._drawn, self._typed_at) < NOT_TYPING
+            return now - max(self._drawn, self._typed_at) < ANSWER_COUNTS_AFTER
         return now - self._drawn < self.SETTLED
 
     def _tell_now(self) -> None:

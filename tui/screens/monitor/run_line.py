@@ -14,6 +14,7 @@ from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 from tui.drive.shown import number_of
+from tui.safety import ENTER_COUNTS_AFTER
 from tui.session.command.reference import (
     parse_reference,
     reference_limits,
@@ -35,8 +36,6 @@ from tui.widgets.palette import (
 
 Purpose = Literal["forward", "reverse", "reference"]
 
-SETTLED = 0.3
-"""Seconds after which Enter counts: an earlier one was not meant for this line."""
 STEPS: Mapping[str, Decimal] = {
     "up": Decimal(1),
     "down": Decimal(-1),
@@ -113,7 +112,7 @@ class RunLine:
 
     def counts(self, now: float) -> bool:
         """Return True if Enter was meant for this line: it stood there long enough to be read."""
-        return now - self.opened >= SETTLED
+        return now - self.opened >= ENTER_COUNTS_AFTER
 
     @property
     def is_zero(self) -> bool:

@@ -8,9 +8,9 @@ from rich.text import Text
 from tui.bus.api import LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
+from tui.safety import WARNED_AT_SHARE
 from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
-from tui.session.monitor.timeout import TOLD_SHARE
 from tui.session.reading import Quality
 from tui.widgets.drawing import short, wrapped
 from tui.widgets.drive_signs import age_text
@@ -211,7 +211,7 @@ def _heard(view: View) -> tuple[str, Style]:
         return NOT_AVAILABLE, FAINT
     age = max(0.0, view.now - view.heard)
     text = f"{age:.1f} s ago" if age < 10 else f"{age_text(age)} ago"
-    hungry = _is_fed(view) and view.watch is not None and age > TOLD_SHARE * view.watch.timeout
+    hungry = _is_fed(view) and view.watch is not None and age > WARNED_AT_SHARE * view.watch.timeout
     return text, STALE if hungry or view.lost else PLAIN
 
 

@@ -9,7 +9,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.session.monitor.snapshot import STALE_CYCLES
+from tui.safety import STALE_CYCLES
 from tui.widgets.drawing import cut, short
 from tui.widgets.palette import BAR, BAR_REST, FAINT, KEY, LINE
 from tui.widgets.trend import WANTED, trend_rows

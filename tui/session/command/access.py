@@ -18,6 +18,7 @@ from tui.drive.orders import (
 )
 from tui.drive.profile.schema import Chart, Order, OrderId, State
 from tui.drive.values import from_words
+from tui.safety import STEP_TIME
 
 from ..drive import DriveSession
 from ..journal import Journal
@@ -29,8 +30,6 @@ from ..work import Permit
 from .command_history import CommandHistory
 from .unblock_hint import block_reason_text
 
-STEP_TIME = 2.0
-"""Seconds that a drive may take for one step of its chart."""
 STATE_POLL_INTERVAL = 0.05
 
 

@@ -14,10 +14,9 @@ from typing import Any
 
 from tui.drive.orders import OrderRefused, deciding_codes
 from tui.drive.profile.schema import CommandOption, ControlSource, OrderId
+from tui.safety import ARMED_FOR, STATE_FRESH
 
-from ..arming import ARMED_FOR
 from ..drive import DriveSession
-from ..drive_state import STATE_FRESH
 from ..journal import Journal
 from ..read.reader import Reader
 from ..starts.keeper import NothingToTakeOver

@@ -5,12 +5,10 @@ from __future__ import annotations
 from tui.drive.channel import command_channel
 from tui.drive.orders import OrderRefused, chart_in_force, choose, nearest_stop, stop_in_any
 from tui.drive.profile.schema import Chart, Order, OrderId
+from tui.safety import SEEN_RUNNING
 
 from ..drive import DriveSession
 
-SEEN_RUNNING = 10.0
-"""Seconds for which a motor that was seen to run counts as running: drives are looked at every 3
-to 5 s, and what decides between charts can be changed at rest only."""
 ENABLED = frozenset({"running", "stopping"})
 
 

@@ -24,10 +24,10 @@ from tui.drive.orders import (
 from tui.drive.profile.schema import Chart, Order, OrderId
 from tui.drive.profile.stop_profile import StopProfile
 from tui.drive.values import from_words
+from tui.safety import STATE_FRESH, STOP_FOLLOWED_FOR, TAKES_EFFECT
 
 from ..connect.limits import limits_of
 from ..drive import DriveSession
-from ..drive_state import STATE_FRESH
 from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..reading import Reading
@@ -42,11 +42,7 @@ log = logging.getLogger(__name__)
 STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
 """Kinds of state in which a motor at 0 Hz is stopped: nothing enables it."""
 
-SEEN_FOR = 60.0
-"""Seconds for which a stop is followed; a ramp may take that long."""
 STANDSTILL_POLL_INTERVAL = 0.15
-TAKES_EFFECT = 1.5
-"""Seconds within which a drive must show that it obeys."""
 
 SILENT_WAIT = 0.1
 """Seconds in which a drive that was silent before has to answer the first of several stops."""
@@ -232,7 +228,7 @@ class MotorStop:
             await check_byte_order(self.reader, Priority.OPERATOR_READ)
         progress, before = self.session.clock.monotonic(), None
         ending = last_word(chart, order)
-        while (now := self.session.clock.monotonic()) - self.ordered < SEEN_FOR:
+        while (now := self.session.clock.monotonic()) - self.ordered < STOP_FOLLOWED_FOR:
             kind, hertz = await self._motion(chart)
             if not hertz and kind in STANDING:
                 self._tell_standing()

@@ -34,6 +34,7 @@ from tui.drive.orders import (
 )
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
+from tui.safety import STOP_TRIES
 
 from ..carry_on import carried_on
 from ..connect.limits import limits_of
@@ -56,7 +57,6 @@ from .wave import FirstWave
 
 log = logging.getLogger(__name__)
 
-STOP_TRIES = 5
 NO_ANSWER_NOW = 2
 """The urgency of a drive that answers nothing."""
 

@@ -11,15 +11,12 @@ from functools import partial
 from tui.bus.api import LineStatus, LineWorker
 from tui.bus.model import Timing
 from tui.drive.profile.schema import OrderId
+from tui.safety import HANGS_AFTER, STOP_REPEATED_EVERY
 
 from ..carry_on import carried_on
 from ..drive import DriveSession
 from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
 
-AGAIN_AFTER = 1.0
-"""Seconds between two tries to stop drives around a loop that hangs."""
-HANGS_AFTER = 0.25
-"""Seconds in which a stop begins, unless the line's loop in this program hangs."""
 FIRST_FRAME_EACH = 0.3
 """Seconds that the first frame of each of several stops may take, on the slowest line."""
 SLOWEST_READS = 6
@@ -75,7 +72,7 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
             time.sleep(STANDSTILL_POLL_INTERVAL)
             now = time.monotonic()
             if now > direct_at:
-                direct_at = now + AGAIN_AFTER
+                direct_at = now + STOP_REPEATED_EVERY
                 hanging = [work for work in left if not work.stop.begun or now > begin_by]
                 carried_on(partial(_stop_directly, [o for o in hanging if o not in given], given))
             for work in [each for each in left if each.is_lost(now > begin_by, now > send_by)]:

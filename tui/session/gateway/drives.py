@@ -15,6 +15,7 @@ from tui.drive.foreign_write import WordKind, classify_words
 from tui.drive.orders import chart_codes
 from tui.drive.profile import library
 from tui.drive.values import from_words, word_count
+from tui.safety import CHART_AGE
 
 from ..connect.contradiction import own_words
 from ..connect.identify import DriveIdentity, identify_drive
@@ -37,8 +38,6 @@ READ_THROUGH = Limits(
 WHO_AGAIN_AFTER = 30.0
 """Seconds after which an unidentified drive is identified again."""
 
-CHART_AGE = 2.0
-"""Seconds up to which that word is taken from a read before; a write makes it unknown."""
 CHART_READ_EACH = 1.5
 """Seconds after which the word that decides between charts is read again for a client."""
 

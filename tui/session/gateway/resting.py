@@ -11,10 +11,10 @@ import logging
 
 from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import LineClosed, LineError
-from tui.bus.keep_alive import READS_PER_TIMEOUT
 from tui.drive.chart import read_chart
 from tui.drive.orders import chart_codes
 from tui.drive.settings.writable import AT_REST
+from tui.safety import JUST_SEEN, READS_PER_TIMEOUT
 
 from ..drive import DriveSession
 from ..monitor.line_watch import LEARN_AGAIN
@@ -24,8 +24,6 @@ from ..read.reader import Reader
 
 log = logging.getLogger(__name__)
 
-JUST_SEEN = 2.0
-"""Seconds up to which a state counts as seen just now."""
 LOOKS_PER_TIMEOUT = 2.0
 """Looks at a motor at rest in each timeout of its drive."""
 

@@ -36,6 +36,7 @@ from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, needs_standstill
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, word_count
+from tui.safety import CLIENT_WRITE_ARMED_FOR, JUST_READ
 
 from ..drive import DriveSession
 from ..journal_entries import parameter_entry
@@ -48,10 +49,6 @@ from .rules import GatewayRules
 log = logging.getLogger(__name__)
 
 ENDED_BEFORE_ANSWER = "serve ended: not known whether it was taken"
-ARMED_FOR_ONE = 10.0
-"""Seconds in which one write of a client may wait for the line."""
-JUST_READ = 2.0
-"""Seconds up to which a word counts as read just now."""
 
 
 class GatewayWrite:
@@ -249,7 +246,7 @@ class GatewayWrite:
         session, requested = self._session, self._requested
         forbidden = None if priority is Priority.STOP else self._voided
         if forbidden is not None:
-            session.line.facts.leases.arm(session.device, ARMED_FOR_ONE, session.care())
+            session.line.facts.leases.arm(session.device, CLIENT_WRITE_ARMED_FOR, session.care())
         for parameter in parameters:
             session.image.doubt(parameter.code)
         if requested.function == 23:

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 from tui.bus.api import Contact, LineWorker, ModbusLine, Priority, contact_of
 from tui.bus.errors import LineError, LineLost
-from tui.bus.keep_alive import READS_PER_TIMEOUT
 from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
+from tui.safety import READS_PER_TIMEOUT, WARNED_AT_SHARE
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
@@ -31,7 +31,7 @@ from .alarms import FaultOnsets
 from .load import unread_limit
 from .look import Look, last_that_brought
 from .monitor import Monitor
-from .timeout import TOLD_SHARE, TimeoutWarning, has_begun, read_timeout
+from .timeout import TimeoutWarning, has_begun, read_timeout
 
 log = logging.getLogger(__name__)
 
@@ -165,7 +165,7 @@ class LineWatch:
             if watch is None or not watch.active:
                 continue
             silent = kept.session.clock.monotonic() - self._heard(kept)
-            if silent > TOLD_SHARE * watch.timeout:
+            if silent > WARNED_AT_SHARE * watch.timeout:
                 found.append(TimeoutWarning(device, kept.session.profile, silent, watch))
         return found
 

@@ -14,9 +14,9 @@ from dataclasses import replace
 
 from tui.bus.api import Contact, LineWorker, Priority, contact_of
 from tui.bus.errors import LineClosed, LineError, LineLost
-from tui.bus.poll_plan import SHARED_AGE
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
+from tui.safety import SHARED_AGE
 
 from ..drive import DriveSession
 from ..drive_state import drive_state

@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.bus.api import Contact, LineState
+from tui.safety import STALE_CYCLES, STALE_LEAST
 
 from ..drive_state import DriveState
 from ..reading import Reading
 from .rates import SLOW_FACTOR
 
-STALE_CYCLES = 3
-"""Cycles after which a value is no longer taken for the present one."""
 TOO_SLOW = 1.2
 """A cycle takes too long from so many times the wished one."""
-STALE_LEAST = 1.5
-"""Seconds for which a snapshot counts however fast the cycles are."""
 
 
 def stale_after(cycle: float, *, often: bool = True) -> float:

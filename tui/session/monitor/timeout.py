@@ -16,9 +16,6 @@ from ..read.reader import Reader
 from ..reading import Reading
 from ..timeout_report import Timeout, TimeoutWatch
 
-TOLD_SHARE = 0.5
-"""Share of its timeout after which a silent drive is reported."""
-
 
 @dataclass(frozen=True, slots=True)
 class TimeoutWarning:

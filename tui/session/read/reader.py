@@ -14,6 +14,7 @@ from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import ReadPlan, ReadRequest
 from tui.drive.values import from_words, word_count
+from tui.safety import SOURCE_AGE
 
 from ..drive import DriveSession
 from ..reading import Origin, Reading
@@ -22,9 +23,6 @@ from .kept_plans import KeptPlans, planned_read, planned_reads
 from .presence import look_for_drive, meets_silence
 from .slots import Slots
 
-SOURCE_AGE = 5.0
-"""Seconds for which a poll trusts a word that others' values depend on; an operator's read
-never does."""
 ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 

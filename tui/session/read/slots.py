@@ -17,6 +17,7 @@ from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import DeviceException
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block
+from tui.safety import ASLEEP
 
 from ..clock import Clock
 from ..reading import Reading
@@ -28,8 +29,6 @@ ROUNDS = SURE + 1
 """Comparisons of each parameter, until they rest."""
 TRY_AGAIN = 15.0
 """Seconds after which a block that is not sure yet is compared again."""
-ASLEEP = 0.8
-"""Seconds without an answer in which a drive may have been switched off and on."""
 CALM = 1.0
 """Seconds without doubt about a reset before anything is proved."""
 

@@ -15,6 +15,7 @@ from tui.drive.profile.schema import Parameter, StateKind
 from tui.drive.settings.factory import factory_sources
 from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
+from tui.safety import WAS_OFF
 
 from ..drive import DriveSession
 from ..read.retrying_reader import RetryingReader, neighbors
@@ -25,8 +26,6 @@ IDLE_POLL_INTERVAL = 0.1
 REREAD_AFTER = 1.0
 """Seconds after which what is looked at is read again."""
 REREAD_AFTER_ERROR = 1.0
-WAS_OFF = 3.0
-"""Seconds of silence after which a drive that answers again was switched off, not disturbed."""
 
 
 @dataclass(slots=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
 from tui.drive.errors import DriveError
+from tui.safety import REQUEST_ANSWERED_WITHIN, STANDSTILL_SEEN_WITHIN
 
 from ..clock import REAL_CLOCK, Clock
 from ..events import EventLog
@@ -23,12 +24,8 @@ if TYPE_CHECKING:
     from ..drive import DriveSession
     from ..starts.keeper import StartKeeper
 
-ANSWER_WITHIN = 15.0
-"""Seconds after which an unanswered question means no, or yes if the motor is at standstill."""
 TAKEN_WITHIN, TAKEN_LOOK = 5.0, 0.1
 """Seconds in which a program puts a motor on record that it was given, and between two looks."""
-SEEN_WITHIN = 2.0
-"""Seconds in which a motor must have been seen at standstill."""
 SURELY_STANDING = ("stopped", "ready", "blocked")
 """States in which a motor surely is at standstill; a tripped one may coast."""
 
@@ -96,7 +93,7 @@ class Handover:
 
     async def _adopt(self, session: DriveSession, starts: StartKeeper) -> None:
         """A motor that runs is this program's from now on: its end stops it."""
-        state = session.state(SEEN_WITHIN)
+        state = session.state(STANDSTILL_SEEN_WITHIN)
         if state.motion in SURELY_STANDING:
             return
         order: Literal["forward", "reverse"] = (
@@ -120,7 +117,7 @@ class Handover:
         if not self.person:
             self._decide(device, program)
             return
-        request = DriveRequest(device, program, self._clock.monotonic() + ANSWER_WITHIN)
+        request = DriveRequest(device, program, self._clock.monotonic() + REQUEST_ANSWERED_WITHIN)
         self.requests = MappingProxyType({**self.requests, device: request})
         who = f"{program.text[0].upper()}{program.text[1:]}"
         self._say(device, f"{who} asks for this drive. G answers; unanswered it stays"
@@ -128,7 +125,7 @@ class Handover:
         self._spawn(partial(self._expire, request), f"question about {device}")
 
     async def _expire(self, request: DriveRequest) -> None:
-        await self._clock.sleep(ANSWER_WITHIN)
+        await self._clock.sleep(REQUEST_ANSWERED_WITHIN)
         if self.requests.get(request.device) is request:
             self._forget(request.device)
             self._decide(request.device, request.program)
@@ -144,7 +141,9 @@ class Handover:
     def _decide(self, device: int, program: Program) -> None:
         """Without an answer: no while the motor runs, or may run."""
         session = self._session_of(device)
-        stands = session is not None and session.state(SEEN_WITHIN).motion in SURELY_STANDING
+        stands = (
+            session is not None and session.state(STANDSTILL_SEEN_WITHIN).motion in SURELY_STANDING
+        )
         self._reply(device, program, yes=stands)
 
     def _reply(self, device: int, program: Program, *, yes: bool) -> None:

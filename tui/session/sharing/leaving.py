@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .orphan_motors import LONGEST_GRACE
+from tui.safety import LONGEST_GRACE
 
 if TYPE_CHECKING:
     from ..drive import DriveSession

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.drive.settings.writable import AT_REST
+from tui.safety import GRACE_SHARE
 
 from ..clock import REAL_CLOCK
 from ..drive import DriveSession
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 COMMANDER_SILENT = "Not polled: the program that started its motor gives no heartbeat."
 UNKNOWN_TIMEOUT_ACTED = 60.0
 """Seconds of silence after which a drive has reacted that does not report its timeout."""
-GRACE_SHARE = 0.25
-"""Share of its timeout for which a drive is kept polled after the last heartbeat of its
-commander."""
 ACTED_AFTER = 1.0
 """Seconds beyond its timeout after which a drive has begun to act."""
 

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.link import label
-from tui.bus.share.attached import SILENT_CLIENT
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
+from tui.safety import LINE_BACK_WITHIN, LONGEST_GRACE, SILENT_CLIENT, TAKEN_OVER_WITHIN
 
 from ..clock import REAL_CLOCK, Clock
 from ..command.stop import Stopper
@@ -39,14 +39,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-TAKEN_OVER_WITHIN = 2.0
-"""Seconds in which a person may take a motor over, where the drive's own timeout is not known."""
-LONGEST_GRACE = 10.0
 GONE, ABSENT = "is gone", "is not on the line any more"
 """Texts on a program that has ended, and on one that lives: frozen, or detached."""
 BY_KEYS = "a and T take it over here"
-LINE_BACK_WITHIN = 600.0
-"""Seconds for which a motor on a lost line is still to be stopped once that is back."""
 LINE_STAYS_LOST = "NOT STOPPED: the line stays lost. Stop the motor at the machine."
 ENDS_WITHIN = 0.5
 """Seconds that a program takes to be gone from the list of processes."""

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tui.bus.program import pid_namespace
+from tui.safety import START_PATIENCE
 
 from ..clock import REAL_CLOCK, Clock
 from ..connect.known_lines import remembered_text
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
     from ..connect.identify import DriveIdentity
 
 log = logging.getLogger(__name__)
-
-START_PATIENCE = 5.0
-"""Seconds that begin() waits for the disk; a slow memory card flushes in two."""
 
 
 class Starts:
