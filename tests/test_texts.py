@@ -215,7 +215,7 @@ def all_texts() -> tuple[Text, ...]:
         found.append(Text("N", name, 0, path.stem))
     for path in modules(TESTS):
         found += texts_of(tree_of(path), path.relative_to(ROOT).as_posix(), "NT")
-    for folder in (ROOT / "docs", ROOT / "profiles", ROOT / "benchmarks"):
+    for folder in (ROOT / "docs", ROOT / "profiles", ROOT / "benchmarks", TESTS):
         for page in sorted(folder.rglob("*.md")):
             found += _paragraphs(page)
     for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"):

@@ -1,1 +1,1 @@
-"""Defects that the tests must notice, by the part of the panel that they are planted in."""
+"""Defects that the tests must notice, by area of the panel."""

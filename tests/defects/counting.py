@@ -18,7 +18,7 @@ DEFECTS = (
         COMPARED,
     ),
     Defect(
-        "counted-anew-not-seen",
+        "counter-reset-not-seen",
         "tui/session/counters/compare.py",
         "if frames is None or now.damaged < self.last.damaged:",
         "if frames is None:",

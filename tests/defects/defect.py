@@ -1,4 +1,4 @@
-"""What a defect to be planted is."""
+"""Fields of a planted defect."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ class Defect:
 
     name: str
     room: str
-    """The folder or file in which the old text stands exactly once."""
+    """The folder or file in which the old text appears exactly once."""
     old: str
     new: str
     suffers: str
-    """What a person would suffer, in a sentence."""
+    """The consequence for a person, in a sentence."""
     tests: tuple[str, ...]
-    """The tests that are run with it, as pytest names them."""
+    """The tests that run with it, as pytest names them."""

@@ -1,4 +1,4 @@
-"""Defects of why a drive does not answer: the wrong rung is told, or the drive is disturbed."""
+"""Defects of the diagnosis of a silent drive: a wrong cause, or a disturbed drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Defects of what is known of a drive: values, charts, read plans, settings."""
+"""Defects of the facts on a drive: values, charts, read plans, settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Defects of the search for drives: what it sends, whom it finds, and when it asks a person."""
+"""Defects of the search for drives: its frames, its results, and its questions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Defects of the line that programs of others reach by Modbus TCP."""
+"""Defects of the line that third-party programs reach by Modbus TCP."""
 
 from __future__ import annotations
 
@@ -349,7 +349,7 @@ DEFECTS = (
         ("tests/bus/test_gateway.py::test_requests_delayed_by_a_suspended_loop_are_recognized",),
     ),
     Defect(
-        "foreign-start-for-nobody",
+        "foreign-start-for-a-closed-connection",
         "tui/session/gateway/writes.py",
         "gone = self._commands and self._request.client.left",
         "gone = False",

@@ -1,4 +1,4 @@
-"""Defects of what a person sees before a key, and what the key then does."""
+"""Defects of keys: the texts before a key, and its effect."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ DEFECTS = (
         ("tests/ui/test_found.py",),
     ),
     Defect(
-        "stop-that-reaches-nobody-is-silent",
+        "unreached-stop-is-silent",
         "tui/screens/key_dispatcher.py",
         '            self.events.add("failed", text)\n            self.unreached = text,',
         "            _ = text,",
@@ -93,7 +93,7 @@ DEFECTS = (
         ("tests/session/test_command.py", ARMING_KEY),
     ),
     Defect(
-        "arming-key-not-asked-anew",
+        "arming-key-not-checked-again",
         "tui/screens/command/arming.py",
         "if stroke is not None and stroke.stamp != self.app.stop_stamp():",
         "if stroke is not None and stroke.stamp is None:",

@@ -1,4 +1,4 @@
-"""Defects of who a drive is taken for, of its stop before that is known, and of its timeout."""
+"""Defects of the identity of a drive, of its stop before identification, and of its timeout."""
 
 from __future__ import annotations
 

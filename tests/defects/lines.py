@@ -1,4 +1,4 @@
-"""Defects of what a line is called, and of whether it is the one that it was."""
+"""Defects of the name of a line, and of the check that it is still the same."""
 
 from __future__ import annotations
 

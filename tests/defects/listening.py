@@ -1,4 +1,4 @@
-"""Defects of listening: what others say is misheard, or disturbed."""
+"""Defects of listening: frames of other programs are misread, or disturbed."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ DEFECTS = (
         ),
     ),
     Defect(
-        "reply-of-whoever-was-asked",
+        "late-reply-of-another-device",
         "tui/wire/heard/pairing.py",
         "frame.device != requested.device or frame.function",
         "frame.function",

@@ -1,4 +1,4 @@
-"""Defects of what goes out to the plant: metrics, messages for a broker."""
+"""Defects of published data: metrics, messages for a broker."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ DEFECTS = (
         (METRICS,),
     ),
     Defect(
-        "broker-not-told-anew",
+        "broker-not-updated-after-a-restart",
         "tui/cli/plant/mqtt.py",
         "sent: dict[str, str] = {}",
         'sent: dict[str, str] = self.__dict__.setdefault("_sent", {})',

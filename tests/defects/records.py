@@ -1,4 +1,4 @@
-"""Defects of what is put on record, and of what files and drives of any content do."""
+"""Defects of records, and of the effect of damaged files and odd drives."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ DEFECTS = (
         ),
     ),
     Defect(
-        "log-of-a-full-disk-tells-tracebacks",
+        "full-disk-prints-tracebacks",
         "tui/session/logs.py",
         "[return-value]\n\n    def handleError(",
         "[return-value]\n\n    def handle_error(",

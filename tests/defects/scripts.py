@@ -1,4 +1,4 @@
-"""Defects of the command line, as a script meets it."""
+"""Defects of the command line for scripts."""
 
 from __future__ import annotations
 

@@ -343,7 +343,7 @@ DEFECTS = (
         ("tests/bus/test_share.py::test_a_drive_that_another_program_commands_takes_no_write",),
     ),
     Defect(
-        "write-asked-anew-of-the-next-owner",
+        "write-repeated-by-the-next-owner",
         "tui/bus/share/requested.py",
         "if not job.request.changes or job.priority is Priority.STOP:",
         "if True:",
@@ -691,7 +691,7 @@ DEFECTS = (
         ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_requested_again",),
     ),
     Defect(
-        "stop-that-nobody-took-counts",
+        "rejected-stop-counts",
         "tui/bus/share/beside.py",
         "        if connection.recv(len(GIVEN)) != GIVEN:",
         "        if connection.recv(len(GIVEN)) is None:",

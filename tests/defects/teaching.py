@@ -1,4 +1,4 @@
-"""Defects of what a drive's own display teaches: scales, what is kept of them, the reference."""
+"""Defects of learned scales: the lesson, its storage, the reference."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEFECTS = (
         LEARNT,
     ),
     Defect(
-        "sign-that-nobody-told-guessed",
+        "unknown-sign-guessed",
         "tui/drive/teaching.py",
         "        if self.signed is None:\n            return None\n",
         "",

@@ -1,4 +1,4 @@
-"""Defects of the way to the terminal: when a frame goes out, and how much of it."""
+"""Defects of output to the terminal: when a frame is sent, and how much of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Defects of what is known of a drive: reading, watching, blocks, who it is."""
+"""Defects of monitoring a drive: reading, watching, blocks, identity."""
 
 from __future__ import annotations
 
