@@ -1,4 +1,4 @@
-"""Serial adapters that are plugged in here and there: the folders that a system keeps of them."""
+"""Serial adapters in different sockets, as the system's folders list them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 
 class Adapters:
-    """Ports `ttyUSB0` ... with the system's links to them, all in a folder of the test."""
+    """Ports `ttyUSB0` ... with the system's links to them, in a folder of the test."""
 
     def __init__(self, folder: Path) -> None:
         self.dev, self.links, self.system = folder / "dev", folder / "serial", folder / "tty"
@@ -17,12 +17,12 @@ class Adapters:
         self._devices = folder / "devices"
 
     def use(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Let the project look here."""
+        """Make the project use these folders."""
         monkeypatch.setattr("tui.bus.transport.port_names.DEVICE_LINKS", self.links)
         monkeypatch.setattr("tui.bus.transport.port_names.SYSTEM_PORTS", self.system)
 
     def port(self, name: str) -> str:
-        """The path of a port."""
+        """Return the path of a port."""
         return str(self.dev / name)
 
     def plug(
@@ -34,9 +34,9 @@ class Adapters:
         product: str = "6001",
         leads_to: Path | None = None,
     ) -> str:
-        """Plug an adapter into a socket: it becomes the port `name`; the path of that.
+        """Plug an adapter into a socket; return the path of its port `name`.
 
-        With `leads_to` the port is a link to that, such as a pseudo-terminal.
+        With `leads_to` the port is a link to a pseudo-terminal, for example.
         """
         port = self.dev / name
         port.unlink(missing_ok=True)
@@ -61,7 +61,7 @@ class Adapters:
         return str(port)
 
     def unplug(self, name: str) -> None:
-        """Take the adapter of a port out: its links go with it."""
+        """Unplug the adapter of a port; its links are removed."""
         real = (self.dev / name).resolve()
         for folder in ("by-id", "by-path"):
             for link in (self.links / folder).iterdir():
@@ -72,14 +72,14 @@ class Adapters:
 
     @staticmethod
     def _link(link: Path, to: Path) -> None:
-        """As the system does it: the last that came has the name."""
+        """Link as the system does: the newest adapter gets the name."""
         link.unlink(missing_ok=True)
         link.symlink_to(to)
 
 
 @pytest.fixture
 def adapters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Adapters:
-    """No adapter yet; the project looks for them here."""
+    """No adapter yet; the project searches these folders."""
     found = Adapters(tmp_path / "machine")
     found.use(monkeypatch)
     return found

@@ -1,4 +1,4 @@
-"""What a terminal answers by itself: where its cursor stands, when a program asks."""
+"""Automatic reply of a terminal to a request for its cursor position."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ ASK, ANSWER = b"\x1b[6n", b"\x1b[1;1R"
 
 
 def read_answering(terminal: int, size: int = 65536) -> bytes:
-    """Read what a program writes to a terminal, and answer what it asks; raises OSError.
+    """Read a program's output on a terminal, and answer its requests; raises OSError.
 
-    A question that two reads cut in two is answered at once: it is in nothing else.
+    A request that two reads split is completed and answered at once.
     """
     data = os.read(terminal, size)
     for cut in range(1, len(ASK)):

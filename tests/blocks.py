@@ -1,4 +1,4 @@
-"""The block of a family that a test is about."""
+"""The block of a profile, for tests."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from tui.drive.profile.schema import Block
 
 
 def block_of(profile: Profile, direction: str) -> Block:
-    """The block that is read (`read`) or written (`write`)."""
+    """Return the block that is read (`read`) or written (`write`)."""
     return next(block for block in profile.data.blocks if block.direction == direction)

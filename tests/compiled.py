@@ -1,7 +1,7 @@
-"""The tests compiled once, before several workers begin: each would compile all of them itself.
+"""Compile the tests once, before the workers begin; else each worker compiles all of them.
 
-What pytest does to the asserts of a module costs more than to import it. On a fresh checkout ten
-workers did that at the same time, each for all modules.
+Rewriting the asserts of a module takes longer than its import. On a fresh checkout ten workers
+did that at the same time, each for all modules.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
 FEW = 20
-"""Modules that are not compiled yet and may as well be by each worker."""
+"""Number of modules that each worker may compile itself."""
 COLLECT = (sys.executable, "-m", "pytest", "--collect-only", "-qq", "-p", "no:cacheprovider")
 AT_ONCE = 2
 
 
 def compile_tests() -> None:
-    """Have the modules of tests compiled, unless most of them are; what fails, workers tell."""
+    """Compile the test modules, unless most of them are; workers report errors."""
     missing = [path for path in TESTS.rglob("test_*.py") if not is_compiled(path)]
     if len(missing) > FEW:
         halves = [part for part in dealt(missing, AT_ONCE) if part]
@@ -35,13 +35,13 @@ def compile_tests() -> None:
 
 
 def is_compiled(path: Path) -> bool:
-    """Whether pytest has kept what it made of a module."""
+    """True if pytest has stored the bytecode of a module."""
     kept = path.parent / "__pycache__"
     return any(kept.glob(f"{path.stem}.{sys.implementation.cache_tag}-pytest-*.pyc"))
 
 
 def dealt(paths: Sequence[Path], parts: int) -> list[list[Path]]:
-    """The modules in so many parts that are about as long."""
+    """Split the modules into parts of about the same size."""
     made: list[list[Path]] = [[] for _ in range(parts)]
     length = [0] * parts
     for path in sorted(paths, key=lambda item: item.stat().st_size, reverse=True):

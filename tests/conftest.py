@@ -1,4 +1,4 @@
-"""What every test starts from: folders of its own, one locale, no peers unless they are there."""
+"""Fixtures of all tests: separate folders, one locale, peers if installed."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 COSTLY_FIRST = {"tests": 0, "ui": 1, "session": 2, "cli": 3, "bus": 4}
-"""Rooms whose tests take long; all others come after them.
+"""Packages with long tests, in order; all others follow.
 
-First of all what looks at the source: late, it is shared out, and each worker parses all of it.
+Tests of the source are first: later they would be spread, and each worker would parse all of it.
 """
 FOLDERS = count()
 
@@ -49,7 +49,7 @@ def pytest_xdist_setupnodes() -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deal the modules to the workers, the costly first: no long test is left for the end."""
+    """Distribute the modules to the workers, long ones first, so that no long test is last."""
     workers: int = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
         modules = [list(module) for _, module in groupby(items, _dealt_with)]
@@ -59,12 +59,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _dealt_with(item: pytest.Item) -> Path:
-    """What goes to one worker: a module; all that look at the source, which is parsed once."""
+    """Return the unit for one worker: a module, or all tests of the source (parsed once)."""
     return item.path.parent if item.path.parent == Path(__file__).parent else item.path
 
 
 def pytest_collection_finish() -> None:
-    """What was imported stays: a third of the time of a panel went into looking for garbage."""
+    """Freeze imported objects: garbage collection took a third of the time of a panel."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 10)
@@ -72,10 +72,9 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Look for garbage once more: pytest's five looks at the end find all that lives put aside.
+    """Collect and freeze once more, so that pytest's five collections at the end are short.
 
-    No worker lists the pictures that it did not compare: that took seconds of each, and nobody
-    reads it.
+    No worker lists the pictures that it did not compare: that took seconds, for no reader.
     """
     plugins = session.config.pluginmanager
     if hasattr(session.config, "workerinput") and plugins.has_plugin("syrupy"):
@@ -86,7 +85,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.fixture
 def tmp_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of the test's own. Pytest's own one reads the whole list of folders for each."""
+    """Make a folder for the test. Pytest's own fixture lists all folders each time."""
     folder = tmp_path_factory.getbasetemp() / str(next(FOLDERS))
     folder.mkdir(mode=0o700)
     return folder
@@ -94,7 +93,7 @@ def tmp_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Folders of the test's own for home, configuration and state; no keeper; the log closed."""
+    """Set separate folders for home, configuration and state; no keeper; the log closed."""
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "config"))
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
     monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(tmp_path / "group"))
@@ -112,10 +111,10 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
 
 @pytest.fixture
 def patient_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lines wait a whole second for every answer, unless a test gives them a timing of its own.
+    """Make lines wait a whole second for every answer, unless a test sets its own timing.
 
-    A line learns how fast its devices are and waits 0.15 s at least; a simulated drive takes
-    longer where the machine has something else to do.
+    A line learns the speed of its devices and waits at least 0.15 s; a simulated drive takes
+    longer on a busy machine.
     """
 
     def patient(link: Link) -> Timing:
@@ -127,22 +126,22 @@ def patient_lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def peer() -> Callable[[str, str], str]:
-    """Finds a program that the project did not write.
+    """Return a function that finds a third-party program.
 
-    Skips with a plain reason where it is missing; fails where `DRIVEPANEL_PEERS` is `required`.
+    It skips with a reason if the program is missing, or fails if `DRIVEPANEL_PEERS` is `required`.
     """
 
     def find(program: str, package: str) -> str:
         if found := shutil.which(program):
             return found
-        need_peer(f"{program} is not here; it comes with the package {package}.")
+        need_peer(f"{program} is not installed; install the package {package}.")
         raise AssertionError  # need_peer never returns
 
     return find
 
 
 def need_peer(reason: str) -> None:
-    """Skip the test for want of a peer, or fail where peers are required."""
+    """Skip the test for lack of a peer, or fail if peers are required."""
     if os.environ.get("DRIVEPANEL_PEERS") == "required":
         pytest.fail(reason)
     pytest.skip(reason)

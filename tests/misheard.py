@@ -1,7 +1,7 @@
-"""What a receiver makes of bytes that were sent at another baud, or with another parity.
+"""Bytes as a receiver at another baud or parity decodes them.
 
-A port samples each bit in its middle, counted from the falling edge of a start bit; it looks for
-the next start bit as soon as the stop bit is over, in whatever is on the wire then.
+A port samples each bit in its middle, counted from the falling edge of a start bit. It searches
+for the next start bit as soon as the stop bit is over, at any level on the wire.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Misheard:
-    """The bytes that a port hands over, and what it counts."""
+    """The bytes that a port delivers, and its error counts."""
 
     data: bytes
     framing: int
@@ -20,7 +20,7 @@ class Misheard:
 
 
 def levels(data: bytes, format_: str) -> list[int]:
-    """The bits on the wire, one after another without a pause."""
+    """Return the bits on the wire, without a pause between characters."""
     bits: list[int] = []
     for byte in data:
         character = [byte >> n & 1 for n in range(8)]
@@ -32,7 +32,7 @@ def levels(data: bytes, format_: str) -> list[int]:
 
 
 def misheard(data: bytes, sent: tuple[int, str], heard: tuple[int, str]) -> Misheard:
-    """What a port set to `heard` receives of bytes `sent` so; each is baud and format."""
+    """Return what a port set to `heard` receives of bytes `sent` so; each is baud and format."""
     wire, (rate, format_) = levels(data, sent[1]), heard
     end = len(wire) / sent[0]
 

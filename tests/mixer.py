@@ -1,4 +1,4 @@
-"""An invented drive whose reference is whatever a test needs: its profile as text, and installed.
+"""An invented drive whose reference each test defines: its profile as text, and installed.
 
 Status 100, output frequency 101, command 200, reference REF 201, key switch 202, scale source MODE
 203, what 100 % is FULL 204, limits LOW 205 and HIGH 206, motor plate 207 and 208.
@@ -73,7 +73,7 @@ values = [{ parameter = "FREQ", low = "0", high = "60" }, { parameter = "STAT" }
 
 
 def mixer_text(reference: str = HERTZ) -> str:
-    """The profile with these lines of its reference."""
+    """Return the profile with these lines of its reference."""
     quantity = "" if "quantity" in reference else '\nquantity = "command_frequency"'
     hertz, rpm = HERTZ, 'unit = "rpm"'
     rows = [
@@ -111,7 +111,7 @@ confidence = "manual"
 
 
 def installed_mixer(reference: str = HERTZ) -> Profile:
-    """The drive among a person's own profiles."""
+    """Install the drive among the user profiles."""
     folder = library.user_folder()
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "mixer.toml").write_text(mixer_text(reference), encoding="utf-8")

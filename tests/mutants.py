@@ -1,11 +1,11 @@
-"""Plants defects one at a time in a copy of the panel, and tells which of them no test notices.
+"""Plant defects one at a time in a copy of the panel, and report those that no test notices.
 
     python -m tests.mutants [NAME...] [--list] [--jobs N] [--table]
     python -m tests.mutants --random N [--seed S] [--stop-path] [--package NAME] | --again
     python -m tests.mutants --coverage
 
-The defects stand in `tests/defects/`; random ones are made by `tests/mutator.py`. The checkout is
-never touched: each worker has a copy of its own in a temporary folder. Exit status 1 if a defect
+The defects are in `tests/defects/`; random ones are made by `tests/mutator.py`. The checkout is
+never changed: each worker has a copy of its own in a temporary folder. Exit status 1 if a defect
 survives or no longer fits the code.
 """
 
@@ -74,10 +74,10 @@ DEFECTS: tuple[Defect, ...] = (
     *counting.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
-"""What became of each defect when it was planted last; `--table` tells it."""
+"""Latest result of each defect; `--table` shows it."""
 PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60", "-m", "")
 LONGEST = 300.0
-"""Seconds for the tests of one defect; what hangs for longer is noticed, too."""
+"""Seconds for the tests of one defect; a longer hang counts as noticed, too."""
 T = TypeVar("T")
 R = TypeVar("R")
 SURVIVED, STALE = "SURVIVED", "STALE"
@@ -90,21 +90,21 @@ class Stale(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Planted:
-    """What became of one defect."""
+    """Result of one defect."""
 
     name: str
     noticed_by: str
-    """The test that failed first, or why there is none: SURVIVED, STALE and the reason."""
+    """The test that failed first, else SURVIVED, or STALE with the reason."""
     seconds: float
 
     @property
     def noticed(self) -> bool:
-        """Whether a test failed because of it."""
+        """True if a test failed because of it."""
         return not self.noticed_by.startswith((SURVIVED, STALE))
 
 
 def place_of(defect: Defect, root: Path) -> Path:
-    """The one file in which the defect's old text stands once; raises Stale."""
+    """Return the only file with the defect's old text, which it has once; raises Stale."""
     room = root / defect.room
     files = sorted(room.rglob("*.py")) if room.is_dir() else [room]
     found = [
@@ -114,25 +114,25 @@ def place_of(defect: Defect, root: Path) -> Path:
         for _ in range(path.read_text("utf-8").count(defect.old))
     ]
     if len(found) != 1:
-        raise Stale(f"its text stands {len(found)} times in {defect.room}")
+        raise Stale(f"its text appears {len(found)} times in {defect.room}")
     return found[0]
 
 
 def _forget_compiled(path: Path) -> None:
-    """A file that is as long and as old as the one before would be taken for it."""
+    """Remove the bytecode: Python would reuse it for a new file of the same size and age."""
     for compiled in path.parent.glob(f"__pycache__/{path.stem}.*.pyc"):
         compiled.unlink()
 
 
 def planted(defect: Defect, copy: Path) -> AbstractContextManager[None]:
-    """The copy with a defect in it; whole again afterwards. Raises Stale."""
+    """Plant the defect in the copy for the block, then restore it. Raises Stale."""
     path = place_of(defect, copy)
     return replaced(path, path.read_text("utf-8").replace(defect.old, defect.new))
 
 
 @contextmanager
 def replaced(path: Path, text: str) -> Iterator[None]:
-    """A file with another text; whole again afterwards."""
+    """Replace the text of a file for the block, then restore it."""
     whole = path.read_text("utf-8")
     try:
         path.write_text(text, "utf-8")
@@ -144,7 +144,7 @@ def replaced(path: Path, text: str) -> Iterator[None]:
 
 
 def run_tests(tests: Iterable[str], copy: Path, *more: str) -> tuple[int, str]:
-    """Exit status and output of pytest in a copy; -1 where it hung."""
+    """Return exit status and output of pytest in a copy; -1 if it hung."""
     command = (sys.executable, *PYTEST, *more, *tests)
     # the copy's own packages, whatever is installed
     surroundings = {**os.environ, "PYTHONPATH": str(copy)}
@@ -158,14 +158,14 @@ def run_tests(tests: Iterable[str], copy: Path, *more: str) -> tuple[int, str]:
 
 
 def judge(status: int, output: str) -> str:
-    """By what a defect was noticed: only a test that ran and failed counts."""
+    """Name the test that noticed a defect; only a test that ran and failed counts."""
     if status == 0:
         return SURVIVED
     if status == -1:
         return f"a hang of more than {LONGEST:g} s"
     first = _FAILED.search(output)
     if status != 1 or first is None:
-        lines = [line for line in output.splitlines() if line.strip()] or ["nothing was said"]
+        lines = [line for line in output.splitlines() if line.strip()] or ["no output"]
         return f"{STALE}: no test ran ({lines[-1][:100]})"
     return first[1].rstrip(":")
 
@@ -183,7 +183,7 @@ def plant(defect: Defect, copy: Path) -> Planted:
 
 @contextmanager
 def copies(count: int) -> Iterator[list[Path]]:
-    """So many copies of the checkout as it is now, gone afterwards."""
+    """Make copies of the current checkout and delete them after the block."""
     with tempfile.TemporaryDirectory(prefix="drivepanel-mutants-") as folder:
         made = [Path(folder) / str(number) for number in range(count)]
         for copy in made:
@@ -199,7 +199,7 @@ def copies(count: int) -> Iterator[list[Path]]:
 
 
 def fit_to_judge(defects: Sequence[Defect], copy: Path) -> str:
-    """Why the tests prove nothing: they must pass while nothing is planted; else empty."""
+    """Return why the tests cannot judge, or an empty text; they must pass with nothing planted."""
     shown = subprocess.run(
         (sys.executable, "-c", "import tui; print(tui.__file__)"),
         cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True,
@@ -214,7 +214,7 @@ def fit_to_judge(defects: Sequence[Defect], copy: Path) -> str:
 
 
 def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
-    """Plant them one after another in each of `jobs` copies, telling each as it ends."""
+    """Plant them one after another in each of `jobs` copies; print each result at once."""
     with copies(jobs) as made:
         if why := fit_to_judge(defects, made[0]):
             raise SystemExit(f"The tests cannot judge: {why}")
@@ -232,7 +232,7 @@ def dealt(
     made: Sequence[Path],
     show: Callable[[R], None],
 ) -> list[R]:
-    """Do the work for each item in the next free copy; show each result as it comes."""
+    """Do the work for each item in the next free copy; show each result at once."""
     free: SimpleQueue[Path] = SimpleQueue()
     showing = Lock()
     for copy in made:
@@ -253,7 +253,7 @@ def dealt(
 
 
 def last_run() -> dict[str, Planted]:
-    """What became of each defect when it was planted last, by name."""
+    """Return the latest result of each defect, by name."""
     try:
         reported = json.loads(LAST_RUN.read_text("utf-8"))
     except (OSError, ValueError):
@@ -262,7 +262,7 @@ def last_run() -> dict[str, Planted]:
 
 
 def remember(result: Planted) -> None:
-    """Keep a result beside those of the defects that were planted before."""
+    """Store a result with those of earlier defects."""
     names = {defect.name for defect in DEFECTS}
     kept = {**last_run(), result.name: result}
     reported = {name: asdict(planted) for name, planted in kept.items() if name in names}
@@ -270,8 +270,8 @@ def remember(result: Planted) -> None:
 
 
 def table(results: dict[str, Planted]) -> str:
-    """All defects with what became of them, as Markdown."""
-    lines = ["| defect | what a person would suffer | noticed by | s |", "|---|---|---|---:|"]
+    """Return all defects with their results, as Markdown."""
+    lines = ["| defect | consequence for a person | noticed by | s |", "|---|---|---|---:|"]
     for defect in DEFECTS:
         planted = results.get(defect.name)
         by, seconds = (
@@ -293,7 +293,7 @@ def _chosen(names: Sequence[str]) -> list[Defect]:
 
 
 def _listed(defects: Iterable[Defect]) -> int:
-    """Name defects, with why those that no longer fit the code do not; 1 where there are any."""
+    """Print the defects, and the reason for each stale one; return 1 if there are any."""
     stale = 0
     for defect in defects:
         print(f"{defect.name:42} {defect.room:32} {defect.suffers}")

@@ -1,4 +1,4 @@
-"""Running `drivepanel` and other programs as processes of their own, ended by their own id."""
+"""Run `drivepanel` and other programs as processes, and end them by their id."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tui.session.connect.share_place import group_folder
 from tui.simulator import Simulation
 
 PATIENCE = 60.0
-"""Seconds after which a program that hangs ends its test; never a measure of anything."""
+"""Seconds after which a program that hangs ends its test; not a measurement."""
 
 DRIVEPANEL = (sys.executable, "-m", "tui")
 
@@ -43,13 +43,13 @@ def drivepanel(*arguments: str, timeout: float = PATIENCE) -> subprocess.Complet
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A program that runs, and the line with which it said that it is ready."""
+    """A running program, and the line with which it reported that it is ready."""
 
     process: subprocess.Popen[str]
     ready: str
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> tuple[int, str]:
-        """Send it a signal; its exit status and what it still had to say on standard error."""
+        """Send it a signal; return its exit status and the rest of standard error."""
         self.process.send_signal(number)
         _, output = self.process.communicate(timeout=PATIENCE)
         return self.process.returncode, output
@@ -59,7 +59,7 @@ class Served:
 def served(
     command: Sequence[str], *, ready: str = "", stdin: int = subprocess.DEVNULL
 ) -> Iterator[Served]:
-    """A program that serves until the block ends; begins once it printed a line with `ready`."""
+    """Run a program until the block ends; enter once it printed a line with `ready`."""
     process = subprocess.Popen(
         command,
         stdin=stdin,
@@ -78,14 +78,14 @@ def served(
 
 @contextmanager
 def simulated(*arguments: str, stdin: int = subprocess.DEVNULL) -> Iterator[Served]:
-    """`drivepanel simulate` at work."""
+    """Run `drivepanel simulate` for the block."""
     command = [*DRIVEPANEL, "simulate", *arguments]
     with served(command, ready="Ready:", stdin=stdin) as program:
         yield program
 
 
 def keepers(*folders: Path) -> list[int]:
-    """Process ids of the keepers whose locks lie in these folders, or in those of the test."""
+    """Return process ids of the keepers with locks in these folders, or in those of the test."""
     places = folders or (Path(os.environ["DRIVEPANEL_STATE"], "lines"), group_folder())
     found = []
     for lock in chain.from_iterable(place.glob("*.lock") for place in places):
@@ -96,21 +96,21 @@ def keepers(*folders: Path) -> list[int]:
 
 
 def end_keepers(*folders: Path) -> None:
-    """End them; each would wait some seconds for the next program."""
+    """End the keepers, each of which would wait some seconds for the next program."""
     for pid in (ended := keepers(*folders)):
         os.kill(pid, signal.SIGTERM)
     wait_until(lambda: not any(map(is_running, ended)), "the keepers end")
 
 
 def kill_keepers(*folders: Path) -> None:
-    """Leave none behind: their drives are gone, and some would wait for them."""
+    """End all keepers: their drives no longer exist, and some would wait for them."""
     for pid in keepers(*folders):
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
 
 
 def is_running(pid: int) -> bool:
-    """True for a process that has not ended; a zombie has."""
+    """True if a process has not ended; a zombie counts as ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (OSError, IndexError):
@@ -118,7 +118,7 @@ def is_running(pid: int) -> bool:
 
 
 def own_interrupts() -> None:
-    """Let signals work in the program even where the test run itself ignores them, as by nohup."""
+    """Let signals work in the program even if the test run ignores them, as with nohup."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
@@ -140,7 +140,7 @@ def _ready_line(process: subprocess.Popen[str], wanted: str) -> str:
 
 
 def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
-    """Wait for something that will come; fails with `what` where it does not."""
+    """Wait for a result; fail with `what` if there is none."""
     deadline = time.monotonic() + patience
     while not condition():
         if time.monotonic() > deadline:
@@ -156,14 +156,14 @@ def port_of(ready: str) -> int:
 
 
 def free_port() -> int:
-    """A TCP port of loopback that nobody uses, for programs that cannot choose one themselves."""
+    """Return a free TCP port of loopback, for programs that cannot choose one themselves."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port: int = probe.getsockname()[1]
     return port
 
 
 def rtu_tcp(simulation: Simulation) -> str:
-    """The LINE to simulated drives of this process: RTU frames, and no pseudo-terminal to time."""
+    """Return the LINE to simulated drives of this process: RTU over TCP, without baud timing."""
     host, port = simulation.serve_rtu_tcp()
     return f"rtu-tcp:{host}:{port}"
 

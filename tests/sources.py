@@ -1,4 +1,4 @@
-"""The source of the project, parsed once in a process for all tests that look at it."""
+"""The source of the project, parsed once per process for all tests that check it."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ PACKAGE = ROOT / "tui"
 
 @cache
 def modules(folder: Path = PACKAGE) -> tuple[Path, ...]:
-    """The modules below a folder, in the order of their names."""
+    """Return the modules under a folder, by name."""
     return tuple(sorted(folder.rglob("*.py")))
 
 
 @cache
 def tree_of(path: Path) -> ast.Module:
-    """What a module says, parsed."""
+    """Parse a module."""
     return ast.parse(path.read_text("utf-8"))
 
 
 @cache
 def nodes_of(path: Path) -> tuple[ast.AST, ...]:
-    """All that a module says, from the outside in."""
+    """Return all nodes of a module, from the outside in."""
     return tuple(ast.walk(tree_of(path)))
 
 
 def calls_of(name: str, folder: Path = PACKAGE) -> Iterator[tuple[Path, ast.Call]]:
-    """Where something is called, by its name alone or as a part of something."""
+    """Yield the calls of a name, alone or as an attribute, each with its module."""
     for path in modules(folder):
         if f"{name}(" in path.read_text("utf-8"):
             for node in nodes_of(path):

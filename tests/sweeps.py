@@ -1,4 +1,4 @@
-"""Which values of a parametrised test are left to the sweeps: those alike to one that is kept."""
+"""Parameters of a test that only the sweeps run, because the main layer has similar ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 
 def kept(values: Iterable[Any], *main: Any) -> list[Any]:
-    """The values, all but those of the main layer marked as a sweep."""
+    """Mark all values except those of the main layer as a sweep."""
     return [
         pytest.param(value, marks=() if value in main else pytest.mark.sweep) for value in values
     ]

@@ -1,4 +1,4 @@
-"""What holds of the whole project: imports, start-up, what is packed, what README promises."""
+"""Rules of the whole project: imports, start-up, package contents, promises of README."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_the_installed_wheel_works_in_another_folder(tmp_path: Path) -> None:
 
 
 def commands() -> list[str]:
-    """The commands of README that a fresh clone is given, each one line."""
+    """Return the commands of README for a fresh clone, each one line."""
     return [line for line in README.splitlines() if line.startswith("python3 -m venv ")]
 
 
@@ -268,7 +268,7 @@ def test_every_package_that_the_project_needs_is_pinned() -> None:
 
 
 def test_values_become_text_in_one_place() -> None:
-    """Screen, journal and command line go through tui.drive.shown, which knows of scales."""
+    """Screen, journal and command line use tui.drive.shown, which applies scales."""
     found = set()
     for path in modules():
         for node in nodes_of(path):

@@ -1,4 +1,4 @@
-"""What the documents name exists: rooms, classes with their parts, functions, links."""
+"""Names in the documents exist: packages, classes with their members, functions, links."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .sources import ROOT, modules, nodes_of
 TREES = ("tui", "tests", "benchmarks", "screenshots")
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "CONTRIBUTING.md"])
 FOREIGN = frozenset({"DataTable", "Digits", "Sparkline", "Text", "TYPE_CHECKING"})
-"""Names of other people's code that documents write like a class of ours."""
+"""Third-party names that documents write like a class of the project."""
 
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"`([^`\n]+)`")
@@ -31,10 +31,10 @@ SUFFIXES = (".py", ".md", ".toml", ".txt", ".tcss")
 
 
 class Tree(NamedTuple):
-    """What the code defines, by name."""
+    """Definitions of the code, by name."""
 
     classes: dict[str, set[str]]
-    """The parts of each class: methods, fields, what it sets on itself, and its bases."""
+    """Members of each class: methods, fields, attributes set on `self`, and its bases."""
     bases: dict[str, set[str]]
     functions: set[str]
     constants: set[str]
@@ -42,7 +42,7 @@ class Tree(NamedTuple):
 
 @lru_cache(maxsize=1)
 def tree() -> Tree:
-    """All that the modules of the project define."""
+    """Collect all definitions of the project's modules."""
     found = Tree(defaultdict(set), defaultdict(set), set(), set())
     for folder in TREES:
         for path in modules(ROOT / folder):
@@ -80,7 +80,7 @@ def _parts(of: ast.ClassDef) -> Iterator[str]:
 
 
 def has_part(name: str, part: str) -> bool:
-    """Whether a class, or one that it is made from, has a method or field of that name."""
+    """True if a class, or one of its bases, has a method or field of that name."""
     known, seen, waiting = tree(), {""}, [name]
     while waiting:
         if (text := waiting.pop()) in seen:
@@ -93,7 +93,7 @@ def has_part(name: str, part: str) -> bool:
 
 
 def is_module(dotted: str) -> bool:
-    """Whether a dotted name is a package, a module, or something that a module defines."""
+    """True if a dotted name is a package, a module, or a definition in a module."""
     place = ROOT.joinpath(*dotted.split("."))
     if place.is_dir() or place.with_suffix(".py").is_file():
         return True
@@ -104,7 +104,7 @@ def is_module(dotted: str) -> bool:
 
 
 def faults(text: str) -> Iterator[str]:
-    """What a document names that is not there, or that the next move would break."""
+    """Yield names in a document that do not exist, or that the next move would break."""
     for span in SPAN.findall(FENCE.sub("", text)):
         if fault := _fault(span):
             yield f"{span}: {fault}"
@@ -144,13 +144,13 @@ def _fault_of_path(span: str) -> str:
 
 
 def anchors(path: Path) -> set[str]:
-    """The places in a document that a link may lead to."""
+    """Return the anchors of a document."""
     heads = HEADING.findall(FENCE.sub("", path.read_text("utf-8")))
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
 def lost_links(path: Path, text: str) -> Iterator[str]:
-    """Links of a document that lead nowhere."""
+    """Yield links of a document without a target."""
     for target in LINK.findall(FENCE.sub("", text)):
         place, _, anchor = target.partition("#")
         if "://" in target or target.startswith("mailto:"):
@@ -167,7 +167,7 @@ def test_there_are_documents() -> None:
 
 
 def test_the_documents_name_what_is_there() -> None:
-    """One test for all: who looks for names parses the whole source first."""
+    """One test for all documents, as the search for names parses the whole source first."""
     found = {}
     for path in DOCUMENTS:
         text = path.read_text("utf-8")
@@ -219,7 +219,7 @@ HOLDS_FAMILIES = "Where Python still knows a family"
 
 
 def rooms_that_know_a_family(package: Path) -> set[str]:
-    """Folders in which a module names a family; the simulator plays them and may."""
+    """Return folders with a module that names a family; the simulator is exempt."""
     return {
         path.parent.relative_to(package.parent).as_posix()
         for path in package.rglob("*.py")

@@ -1,4 +1,4 @@
-"""A part of the benchmark `hostile`: what files, state and drives bring, broken at random."""
+"""A part of the benchmark `hostile`: files, state and replies with random damage."""
 
 from __future__ import annotations
 

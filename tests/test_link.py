@@ -1,4 +1,4 @@
-"""The slow link of the benchmarks: when bytes are carried and arrive, and that all do."""
+"""The slow link of the benchmarks: delay and completeness of bytes."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_picture_owes_the_place_of_its_cursor_to_who_asks() -> None:
 
 @contextmanager
 def echo() -> Iterator[int]:
-    """A server that sends back what it gets, to one connection; gives its port."""
+    """Run an echo server for one connection; return its port."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         thread = threading.Thread(target=_send_back, args=(listener,), daemon=True)
         thread.start()

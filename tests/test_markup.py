@@ -1,4 +1,4 @@
-"""No text of a person, a drive, a file or a profile is ever markup: held for the whole code."""
+"""No text of a person, a drive, a file or a profile is ever markup: checked in the whole code."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 from .sources import PACKAGE, modules, nodes_of
 
 TEXTS = PACKAGE / "widgets" / "plain.py"
-"""The one module that makes labels and entries of lists, with markup off."""
+"""The only module that makes labels and list entries, with markup off."""
 FIELDS = PACKAGE / "widgets" / "fields.py"
 PRINTS = {PACKAGE / "cli" / "shared" / "say.py", PACKAGE / "cli" / "shared" / "output.py"}
-"""The modules that print for the commands, control characters as signs."""
+"""The modules that print for the commands and replace control characters."""
 MADE_ELSEWHERE = {
     "Label": "Plain",
     "Static": "Plain",
@@ -29,7 +29,7 @@ MADE_ELSEWHERE = {
     "DataTable": "Lines",
     "Content": "Text",
 }
-"""What Textual would read as markup or send as it is, and what to take instead."""
+"""Calls that Textual would read as markup or send unchanged, and their replacement."""
 READ_AS_MARKUP = {"border_title", "border_subtitle", "tooltip"}
 PRINTING = {
     "print", "echo", "secho", "click.echo", "click.secho",
@@ -40,16 +40,16 @@ PRINTS_THEMSELVES = (
     PACKAGE / "cli" / "documents" / "json_schema.py",
     PACKAGE / "cli" / "man_page.py",
 )
-"""Print what they have made themselves, for a redirection."""
+"""Modules that print only their own text, for a redirection."""
 READS_ITSELF = {
     PACKAGE / "terminal" / "abilities.py",
     PACKAGE / "session" / "starts" / "processes.py",
 }
-"""Read files of the system's own, in /proc."""
+"""Modules that read the system's own files, in /proc."""
 
 
 def faults(nodes: Iterable[ast.AST], path: Path) -> Iterator[str]:
-    """What in a module could take a text for markup, or print it as it is."""
+    """Yield calls in a module that could take a text for markup, or print it unchanged."""
     for node in nodes:
         if isinstance(node, ast.Call):
             yield from _call_texts(node, path)
@@ -85,7 +85,7 @@ def _call_texts(call: ast.Call, path: Path) -> Iterator[str]:
 
 
 def _name(node: ast.expr) -> str:
-    """The last name of what is called, or of what calls it: `Text` of `Text.assemble(x)`."""
+    """Return the last name of the called object, or of its owner: `Text` of `Text.assemble(x)`."""
     if isinstance(node, ast.Call):
         node = node.func
     if isinstance(node, ast.Attribute):
@@ -94,7 +94,7 @@ def _name(node: ast.expr) -> str:
 
 
 def _dotted(node: ast.expr) -> str:
-    """The name of what is called: `sys.stdout.write`; empty where it is more than a name."""
+    """Return the dotted name of a call: `sys.stdout.write`; empty if it is more than a name."""
     if isinstance(node, ast.Attribute):
         return f"{before}.{node.attr}" if (before := _dotted(node.value)) else ""
     return node.id if isinstance(node, ast.Name) else ""

@@ -1,4 +1,4 @@
-"""Planting defects: one at a time, in a copy, and never taken for noticed by mistake."""
+"""Planted defects: one at a time, in a copy, and never counted as noticed by mistake."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def defect(old: str, new: str = "", room: str = "room") -> Defect:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """A copy with one room of two files."""
+    """Make a copy with one folder of two files."""
     (tmp_path / "room" / "deep").mkdir(parents=True)
     (tmp_path / "room" / "one.py").write_text(WHOLE)
     (tmp_path / "room" / "deep" / "two.py").write_text("x = 1\n")

@@ -1,4 +1,4 @@
-"""One public name, one thing: what a person greps for is found once."""
+"""Each public name has one meaning, so that a search finds it once."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from .sources import ROOT, modules, tree_of
 
 LIKE_A_COMMAND = {"compare", "identify", "main", "report", "restore"}
-"""Functions of the command line are called as the commands that a person types."""
+"""Functions of the command line have the names of the typed commands."""
 
 
 def public(tree: ast.Module) -> Iterator[str]:
-    """The names that a module gives to others: classes, functions, constants, types."""
+    """Return the public names of a module: classes, functions, constants, types."""
     for node in tree.body:
         match node:
             case ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():

@@ -26,17 +26,17 @@ NAMES = re.compile(
 )
 CODES = {parameter.code.casefold() for profile in PROFILES for parameter in profile.parameters}
 TITLES = {"Faults", "Monitoring", "Identification"}
-"""Groups that are titles of screens or tables of the language as well."""
+"""Groups that are also titles of screens or tables of the profile language."""
 GROUPS = {parameter.group for profile in PROFILES for parameter in profile.parameters} - TITLES
 WORDS = {"add", "cos", "cod", "inr", "in", "os", "typ", "fan", "pro", "dis", "bit", "no", "if",
          "run", "time", "int", "f1", "f2", "day"}  # fmt: skip
-"""Codes that are words of English or of programs as well."""
+"""Codes that are also English words or program words."""
 SPOKEN = re.compile(r"\b(HSP|LSP|TFR|FRH|RFR|ETA|CMD|LFRD?|CMI|CHCF|DOTD|FA\d\d|F\d{3})\b")
-"""Codes that would be said to a person."""
+"""Codes that a person would see."""
 
 
 def texts(nodes: Sequence[ast.AST]) -> Iterator[tuple[int, str]]:
-    """Line and text of every string that is no docstring."""
+    """Yield line and text of every string except docstrings."""
     alone = {
         id(node.value)
         for node in nodes
@@ -48,7 +48,7 @@ def texts(nodes: Sequence[ast.AST]) -> Iterator[tuple[int, str]]:
 
 
 def known_families(path: Path) -> list[str]:
-    """What a module knows of a family, each with its line."""
+    """Return references to a family in a module, each with its line."""
     found = []
     nodes = nodes_of(path)
     for line, text in texts(nodes):

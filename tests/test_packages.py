@@ -1,4 +1,4 @@
-"""What is packed: all of it, told truly, and as a package page can show it."""
+"""Packages: complete, described correctly, and readable on a package page."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PAGE = ROOT / "docs" / "drivepanel.1"
 
 
 def build(what: str, where: Path, root: Path = ROOT) -> Path:
-    """Build with the project's own backend; what it has made."""
+    """Build with the project's own backend; return the package."""
     call = f"import sys; from hatchling.build import {what} as b; print(b(sys.argv[1]))"
     done = subprocess.run(
         [sys.executable, "-c", call, str(where)],
@@ -39,7 +39,7 @@ def build(what: str, where: Path, root: Path = ROOT) -> Path:
 
 
 def metadata(folder: Path, address: str = "") -> Message:
-    """What a package of the project tells, with this address in its configuration."""
+    """Return the metadata of a package, with this address in its configuration."""
     root = folder / "root"
     root.mkdir()
     (root / "tui").mkdir()
@@ -102,7 +102,7 @@ def test_nothing_is_named_as_supported_that_was_never_proved() -> None:
 
 @pytest.fixture(scope="module")
 def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The source package of the project, unpacked."""
+    """Return the unpacked source package of the project."""
     folder = tmp_path_factory.mktemp("source")
     with tarfile.open(build("build_sdist", folder)) as packed:
         packed.extractall(folder, filter="data")

@@ -1,4 +1,4 @@
-"""No module and no class grows past what one head holds, unless a reason stands here."""
+"""No module or class exceeds the size limit, unless its reason is listed here."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .sources import PACKAGE, ROOT, modules, tree_of
 
 MOST_LINES = 400
 MOST_METHODS = 15
-"""Public methods and properties of one class; those of its bases count there."""
+"""Most public methods and properties of a class; those of its bases count there."""
 
 EXCEPTIONS: dict[str, tuple[int, str]] = {
     "bus/api.py:ModbusLine": (21, "the complete interface of a line; the fake has the same"),
@@ -25,11 +25,11 @@ EXCEPTIONS: dict[str, tuple[int, str]] = {
         "lists, form, search, named for the keys",
     ),
 }
-"""By module, or module and class: the size that is let pass, and why."""
+"""Exceptions by module, or module and class: the size and the reason."""
 
 
 def sizes(source: str, tree: ast.Module, module: str) -> Iterator[tuple[str, int, int]]:
-    """What a module and each of its classes come to, and the most of it."""
+    """Yield the sizes of a module and its classes, with their limits."""
     yield module, len(source.splitlines()), MOST_LINES
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef):
@@ -53,7 +53,7 @@ def project_sizes() -> list[tuple[str, int, int]]:
 
 
 def too_large(found: list[tuple[str, int, int]]) -> list[str]:
-    """What is past the most, and past its exception where it has one."""
+    """Return sizes above the limit, or above their exception."""
     return [
         f"{name}: {size}, and {EXCEPTIONS.get(name, (most, ''))[0]} at most"
         for name, size, most in found

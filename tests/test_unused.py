@@ -1,4 +1,4 @@
-"""What nothing in the package uses is not kept: no function, class or constant for nobody."""
+"""The package has no function, class or constant that nothing in it uses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FOR_OTHERS = {
     "cli/commands": {"*"},
     "cli/documents/json_schema.py": {"document_of"},
 }
-"""By the beginning of a module's path: names for tests, scripts, or whoever calls by name."""
+"""By prefix of a module's path: names for tests, scripts, or callers by name."""
 HOOKS = {
     "compose", "render_line", "get_default_screen", "get_driver_class", "get_theme",
     "connection_made", "data_received", "connection_lost", "feed_data", "format_commands",
@@ -30,11 +30,11 @@ HOOKS = {
     "run_input_thread", "WithMouse", "Drawing", "restarts", "redrawn", "watchdog",
     "panic", "_fatal_error", "_sigcont_application", "createLock",
 }  # fmt: skip
-"""Names by which libraries call what is here, and what is kept for tests to look at."""
+"""Names that libraries call, and names kept for tests."""
 
 
 def defined(tree: ast.Module) -> Iterator[str]:
-    """Functions, classes, methods and constants, wherever they stand."""
+    """Yield functions, classes, methods and constants at any level."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.name
@@ -45,7 +45,7 @@ def defined(tree: ast.Module) -> Iterator[str]:
 
 
 def used(tree: ast.Module) -> Iterator[str]:
-    """Names that are looked at, and words of texts: tables name what they call."""
+    """Yield names that are read, and words of texts: tables name what they call."""
     for node in ast.walk(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Load()) | ast.Attribute(attr=name):
@@ -59,7 +59,7 @@ def used(tree: ast.Module) -> Iterator[str]:
 
 
 def unused(trees: dict[str, ast.Module]) -> list[str]:
-    """By module: what is defined there and named nowhere."""
+    """Return unused definitions, by module."""
     names = {name for tree in trees.values() for name in used(tree)}
     return [
         f"{module}: {name}"

@@ -1,4 +1,4 @@
-"""Lines that are closed again, and limits wide enough for every function."""
+"""Lines that are closed after the test, and limits that allow every function."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def open_line() -> Iterator[OpenLine]:
 
 
 def sent(line: Line) -> list[float]:
-    """When each request went out, by the line itself: a busy machine lets a peer see them late."""
+    """Times at which the line sent each request: on a busy machine a peer sees them late."""
     return [frame.time for frame in line.trace if frame.direction == "out"]
 
 

@@ -1,4 +1,4 @@
-"""Scripted other ends of a line: they answer late, twice, damaged, not at all, or go away."""
+"""Scripted peers of a line: they answer late, twice, damaged or not at all, or disconnect."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tui.wire.frames import frame
 Step = bytes | float
 """Bytes to send, or seconds to wait before the next step."""
 Script = Callable[[bytes, int], Sequence[Step]]
-"""What to do about a request, given its bytes and how many came before it."""
+"""Reaction to a request, given its bytes and the number of earlier requests."""
 
 
 def honest_pdu(pdu: bytes) -> bytes:
@@ -45,7 +45,7 @@ def reply(request: bytes) -> bytes:
 
 
 def honest(request: bytes, _count: int) -> Sequence[Step]:
-    """Answer every request at once and rightly, but no broadcast."""
+    """Answer every request at once and correctly, except broadcasts."""
     return [reply(request)] if request[0] else []
 
 
@@ -55,7 +55,7 @@ def silent(_request: bytes, _count: int) -> Sequence[Step]:
 
 
 def request_length(data: bytes) -> int:
-    """Length of the RTU request that begins with these bytes, 0 if too few are there."""
+    """Length of the RTU request that begins with these bytes, 0 if there are too few."""
     fixed = {3: 8, 4: 8, 6: 8, 8: 8, 17: 4, 43: 7}
     counted = {16: 6, 23: 10}
     if len(data) < 2:
@@ -72,14 +72,14 @@ def tcp_request_length(data: bytes) -> int:
 
 
 def tcp_reply(request: bytes, pdu: bytes | None = None, *, transaction: int | None = None) -> bytes:
-    """An answer to a Modbus TCP request; the right one unless told otherwise."""
+    """An answer to a Modbus TCP request (default: the correct one)."""
     pdu = honest_pdu(request[7:]) if pdu is None else pdu
     head = request[:2] if transaction is None else transaction.to_bytes(2, "big")
     return head + b"\0\0" + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
 
 
 def eventually(condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait until something is so; fails when it does not become so."""
+    """Wait until a condition is true; fail if it stays false."""
     limit = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < limit, "what was waited for did not happen"
@@ -96,11 +96,11 @@ class Peer:
         self.echo = echo
         self.requests: list[bytes] = []
         self.arrivals: list[float] = []
-        """When each request was whole."""
+        """Time at which each request was complete."""
         self.departures: list[float] = []
         """Just before each sending."""
         self.bursts: list[bytes] = []
-        """What each reading found, to see requests that run into each other."""
+        """Bytes of each read, to detect requests that collide."""
         self._length = length
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
@@ -126,7 +126,7 @@ class Peer:
         return [request for request in self.requests if request[0] == device]
 
     def await_requests(self, count: int, seconds: float = 5.0) -> None:
-        """Wait until so many requests have come."""
+        """Wait until this many requests have arrived."""
         eventually(lambda: len(self.requests) >= count, seconds)
 
     def _read(self) -> bytes | None:
@@ -167,10 +167,10 @@ class Peer:
 
 
 class PtyPeer(Peer):
-    """A peer on a pseudo-terminal, reached by a symbolic link that goes with it.
+    """A peer on a pseudo-terminal, with a symbolic link that is removed with it.
 
-    The number of a pseudo-terminal is given away again as soon as it is closed: a line that looks
-    for its lost port by number would open that of another test. `link` can be moved to a next peer.
+    The number of a pseudo-terminal is reused as soon as it is closed. A line that searches for its
+    lost port by number would open that of another test. `link` can be moved to a next peer.
     """
 
     def __init__(self, script: Script, *, echo: bool = False, link: Path | None = None) -> None:
@@ -186,11 +186,11 @@ class PtyPeer(Peer):
         self.path = str(self._link)
 
     def send(self, data: bytes) -> None:
-        """Say something that nobody asked for."""
+        """Send bytes without a request."""
         self._write(data)
 
     def unplug(self) -> None:
-        """Take the port away, as a pulled adapter does."""
+        """Remove the port, like an unplugged adapter."""
         self._stop.set()
         self._close()
 
@@ -255,7 +255,7 @@ class TcpPeer(Peer):
                 self._client.sendall(data)
 
     def hang_up(self) -> None:
-        """Close the connection; the next one is taken."""
+        """Close the connection; the next one is accepted."""
         client, self._client = self._client, None
         if client is not None:
             client.close()

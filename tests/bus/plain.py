@@ -37,7 +37,7 @@ async def plain_tcp(port: int, *, timeout: float = 0.3) -> AsyncIterator[AsyncMo
 
 
 async def outcome(call: Awaitable[ModbusPDU]) -> list[int] | None:
-    """Registers that a plain client takes for the answer, None if it takes none."""
+    """Registers that a plain client accepts as the answer, None if it accepts none."""
     try:
         answer = await call
     except ModbusException:

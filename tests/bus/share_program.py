@@ -1,7 +1,7 @@
-"""A program on a shared line that does what it is told on standard input, until it is killed.
+"""A program on a shared line that takes commands on standard input, until it is killed.
 
 `python -m tests.bus.share_program PORT FOLDER NAME LATE`; prints `ready`, then a line for each
-line it was told: `read REGISTER`, `ask REGISTER`, `write REGISTER VALUE`, `claim DEVICE`; does not
+command: `read REGISTER`, `ask REGISTER`, `write REGISTER VALUE`, `claim DEVICE`. It does not
 wait for the answer of `ask`, nor for the end of a write.
 """
 

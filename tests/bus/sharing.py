@@ -1,4 +1,4 @@
-"""Several programs on one line, as lines of one process that meet at one place."""
+"""Several programs on one line, as lines of one process with a common meeting place."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ ROOT = Path(__file__).parent.parent.parent
 QUICK = Timing(
     first_timeout=1.5, min_timeout=1.5, late_reply=0.2, reconnect_first=0.05, probes=False
 )
-"""Patient with answers, quick to take a line over."""
+"""Timing that waits long for answers and takes a line over quickly."""
 
 
 def place_in(folder: Path, key: str = "serial:line") -> SharePlace:
-    """Where the programs of a test meet."""
+    """The meeting place of a test's programs."""
     return SharePlace(key, folder / "lines", (folder / "run",))
 
 
 @dataclass(slots=True)
 class SharedLines:
-    """Opens programs on one line, the first of which owns it, and closes them."""
+    """Open programs on one line, the first of which owns it, and close them."""
 
     folder: Path
     link: Link
@@ -51,7 +51,7 @@ class SharedLines:
         space: str = "",
         gated: bool = False,
     ) -> Line:
-        """A program of this name, on the line."""
+        """Open a program of this name on the line."""
         program = Program(name, name, pid or os.getpid(), space=space)
         place = place or place_in(self.folder)
         line = Line(self.link, timing=timing, place=place, program=program, gated=gated)
@@ -66,7 +66,7 @@ class SharedLines:
 
     @property
     def left_behind(self) -> list[str]:
-        """What lies in the folders of the meeting place, but for the lock."""
+        """Files in the folders of the meeting place, except the lock."""
         return [path.name for path in self.folder.rglob("*.s*")]
 
     def close(self) -> None:
@@ -76,13 +76,13 @@ class SharedLines:
 
 
 def knows(line: Line, name: str) -> bool:
-    """Whether a program was told that another one is on the line."""
+    """True if a program was notified that another one is on the line."""
     return line.facts.program(name) is not None
 
 
 @contextmanager
 def frozen(line: Line) -> Iterator[None]:
-    """The line's thread stands still meanwhile, as that of a program under SIGSTOP."""
+    """Block the line's thread for the block, as SIGSTOP does."""
     thaw, stands = threading.Event(), threading.Event()
 
     def stand() -> None:
@@ -98,7 +98,7 @@ def frozen(line: Line) -> Iterator[None]:
 
 
 def in_loop(line: Line, call: Callable[[], object]) -> None:
-    """Have something done in the thread of a line."""
+    """Run a function in the thread of a line."""
     loop = line._engine._loop
     assert loop is not None
     loop.call_soon_threadsafe(call)
@@ -106,7 +106,7 @@ def in_loop(line: Line, call: Callable[[], object]) -> None:
 
 @contextmanager
 def other_program(path: str, folder: Path, name: str, late: float = 0.2) -> Iterator[OtherProgram]:
-    """A process of its own on the line; killed at the end at the latest."""
+    """Start a separate process on the line; it is killed at the end at the latest."""
     command = [sys.executable, "-m", "tests.bus.share_program", path, str(folder), name, str(late)]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
@@ -121,7 +121,7 @@ def other_program(path: str, folder: Path, name: str, late: float = 0.2) -> Iter
 
 @dataclass(slots=True)
 class OtherProgram:
-    """A process on the line, told what to do."""
+    """A process on the line that takes commands."""
 
     process: subprocess.Popen[str]
 
@@ -132,13 +132,13 @@ class OtherProgram:
         assert output.startswith(wanted), output
 
     def tell(self, text: str) -> None:
-        """Have it do something, and wait until it did, or for a write began to."""
+        """Send a command and wait until it is done, or until its write begins."""
         assert self.process.stdin is not None
         print(text, file=self.process.stdin, flush=True)
         self.hear("did")
 
     def kill(self) -> float:
-        """End it as nothing can be caught; returns when."""
+        """Kill it; return the time."""
         self.process.kill()
         killed = time.monotonic()
         self.process.communicate()

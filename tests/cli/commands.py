@@ -17,7 +17,7 @@ from tui.cli.main import main
 
 @contextmanager
 def tcp_line(*arguments: str) -> Iterator[str]:
-    """What `drivepanel simulate` serves with these arguments, in this process; the LINE to it."""
+    """Serve simulated drives as `drivepanel simulate` does, in this process; return the LINE."""
     # a command keeps the names of its help from its first context
     names = main.context_settings["help_option_names"]
     made = simulate.make_context("simulate", [*arguments], help_option_names=names)
@@ -30,7 +30,7 @@ def tcp_line(*arguments: str) -> Iterator[str]:
 
 
 def invoked(*arguments: str | Path) -> Result:
-    """A command run in this process, as the program itself would run it."""
+    """Run a command in this process, as the program itself would."""
     return CliRunner().invoke(main, [str(a) for a in arguments], prog_name="drivepanel")
 
 
@@ -43,19 +43,19 @@ def ended(status: int, *arguments: str | Path) -> Result:
 
 
 def run(status: int, *arguments: str | Path) -> str:
-    """Run a command to this exit status; what it prints on standard output."""
+    """Run a command and expect this exit status; return standard output."""
     return ended(status, *arguments).stdout
 
 
 def refused(status: int, *arguments: str | Path) -> str:
-    """What a command says on standard error, from its first word, when it ends with this status."""
+    """Run a command and expect this exit status; return standard error from its first word."""
     output = ended(status, *arguments).stderr
     assert output.startswith("drivepanel: ")
     return output
 
 
 def put(line: str, address: int, word: int) -> None:
-    """What somebody else writes, as a person at the keypad would set it."""
+    """Write a word as another source, such as the keypad."""
     pdu = struct.pack(">BHH", 6, address, word)
     assert requested(line, pdu) == pdu
 
@@ -74,7 +74,7 @@ def requested(line: str, pdu: bytes) -> bytes:
 
 
 def motor(status: int, *arguments: str) -> str:
-    """`drivepanel run`, which wants a standard output of its own; what it says, on which stream."""
+    """Run `drivepanel run`; return standard error after a failure, else standard output."""
     done = drivepanel("run", *arguments)
     assert done.returncode == status, done.stderr
     return done.stderr if status else done.stdout

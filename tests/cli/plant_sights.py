@@ -1,4 +1,4 @@
-"""Lines and drives as the plant is told of them, without a wire."""
+"""Lines and drives as published to the plant, without a wire."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def drive_of(seen: Snapshot, profile: Profile | None = None, now: float = NOW) -
 
 
 def failed(seen: Snapshot, error: str) -> Snapshot:
-    """The values of before, as a cycle that failed has them."""
+    """Earlier values, as in a failed cycle."""
     readings = {c: replace(r, quality=Quality.STALE) for c, r in seen.readings.items()}
     state = drive_state(small_drive(), readings)
     return replace(seen, readings=readings, state=state, error=error, contact="silent")

@@ -23,7 +23,7 @@ Peer = Callable[[str, str], str]
 
 
 def _built(source: str, folder: Path) -> Path | str:
-    """A server on libmodbus, compiled; or the reason why it could not be."""
+    """A compiled server on libmodbus, or the reason why it is missing."""
     target = folder / Path(source).stem
     try:
         flags = subprocess.run(
@@ -48,7 +48,7 @@ def _built(source: str, folder: Path) -> Path | str:
 
 @pytest.fixture(params=["keeper", "inside"])
 def holder(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The line is held by a keeper, or by the program that opens it first."""
+    """A keeper holds the line, or the program that opens it first."""
     if request.param == "inside":
         monkeypatch.setenv(NO_KEEPER, "1")
     return str(request.param)
@@ -56,7 +56,7 @@ def holder(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
 
 @pytest.fixture
 def held_inside(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The program that opens a line first holds it, as where no keeper can be started."""
+    """The program that opens a line first holds it, as if no keeper can be started."""
     monkeypatch.setenv(NO_KEEPER, "1")
 
 
@@ -68,19 +68,19 @@ def with_keepers(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def built_server(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
-    """The server on libmodbus, or why it is not here."""
+    """The server on libmodbus, or why it is missing."""
     return _built("modbus_server.c", tmp_path_factory.mktemp("libmodbus"))
 
 
 @pytest.fixture(scope="session")
 def built_drive(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
-    """The drive with awkward habits, or why it is not here."""
+    """The drive with unusual behavior, or why it is missing."""
     return _built("awkward_drive.c", tmp_path_factory.mktemp("libmodbus"))
 
 
 @pytest.fixture
 def libmodbus_server(built_server: Path | str) -> Path:
-    """The server on libmodbus; skips where it cannot be built here."""
+    """The server on libmodbus; skips if it cannot be built."""
     if isinstance(built_server, str):
         need_peer(built_server)
     return Path(built_server)
@@ -88,7 +88,7 @@ def libmodbus_server(built_server: Path | str) -> Path:
 
 @pytest.fixture
 def awkward_drive(built_drive: Path | str) -> Path:
-    """The drive with awkward habits; skips where it cannot be built here."""
+    """The drive with unusual behavior; skips if it cannot be built."""
     if isinstance(built_drive, str):
         need_peer(built_drive)
     return Path(built_drive)
@@ -96,7 +96,7 @@ def awkward_drive(built_drive: Path | str) -> Path:
 
 @pytest.fixture
 def node(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Node.js with modbus-serial, found where `DRIVEPANEL_NODE_MODULES` says."""
+    """Node.js with modbus-serial from `DRIVEPANEL_NODE_MODULES`."""
     program = peer("node", "nodejs")
     modules = os.environ.get("DRIVEPANEL_NODE_MODULES", "")
     if not modules or not Path(modules, "modbus-serial").is_dir():
@@ -110,7 +110,7 @@ def node(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.fixture(scope="module")
 def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PtyPanel]:
-    """A panel on Monitor, for several tests; each leaves it there, its motor at rest."""
+    """A panel on Monitor for several tests; each leaves it on Monitor, its motor at rest."""
     with pytest.MonkeyPatch.context() as patch:
         for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
             patch.setenv(name, str(tmp_path_factory.mktemp(name.lower())))

@@ -2,7 +2,7 @@
 
     python -m tests.line.failing_panel PLANTS ARGUMENT...
 
-PLANTS is a JSON list of plants; each raises its error once its file is there.
+PLANTS is a JSON list of plants; each raises its error once its file exists.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TEXT = "a screw is loose"
 
 
 class Unspeakable(Exception):
-    """An error whose text cannot be had."""
+    """An error whose text raises."""
 
     def __str__(self) -> str:
         raise RuntimeError(TEXT)
@@ -73,7 +73,7 @@ class Plant:
     file: str
     error: str = "RuntimeError"
     dialog: str = ""
-    """A dialog that is opened by a method of the app instead, once."""
+    """A dialog that a method of the app opens instead, once."""
 
     def put(self) -> None:
         """Plant it."""

@@ -29,12 +29,12 @@ CONTROL = re.compile(r"\x1b\[(?P<arguments>[0-9;?<>=]*)[$]?(?P<final>[A-Za-z])|\
 WRITES = {5, 6, 15, 16, 22, 23}
 """Functions of Modbus that write."""
 SPLIT = 0.02
-"""Seconds between two writes that are to be read apart, as a network cuts them."""
+"""Seconds between two writes that must be read separately, as a network splits them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """A write on the line: what was written where."""
+    """A write on the line: register and words."""
 
     device: int
     register: int
@@ -48,13 +48,13 @@ REFERENCE = 8502
 """Register of its reference, LFR, in 0.1 Hz."""
 
 RUN = Write(1, COMMAND, (15,))
-"""What runs its first drive forward."""
+"""Word that runs its first drive forward."""
 
 STOP = Write(1, COMMAND, (7,))
-"""What stops its first drive in the Drivecom chart, at rest too."""
+"""Word that stops its first drive in the Drivecom chart, at rest too."""
 
 LINE_SETTLED = 0.4
-"""Seconds, more than those in which a question or the run line takes no Enter yet."""
+"""Seconds, longer than a question or the run line ignores Enter."""
 
 
 class WriteLog:
@@ -67,7 +67,7 @@ class WriteLog:
         self.port: int = self._listener.getsockname()[1]
         self.writes: list[Write] = []
         self.times: list[float] = []
-        """When each write passed, in seconds of the monotonic clock."""
+        """Time of each write, in seconds of the monotonic clock."""
         self.connections = 0
         """Connections so far."""
 
@@ -103,7 +103,7 @@ class WriteLog:
                 sink.sendall(data)
 
     def _note(self, data: bytes) -> bytes:
-        """Keep the writes among the whole requests; what is left."""
+        """Keep the writes among the complete requests; return the rest."""
         while (length := tcp_request_length(data)) and len(data) >= length:
             request, data = data[:length], data[length:]
             if request[7] in WRITES:
@@ -124,14 +124,14 @@ def _write_of(request: bytes) -> Write:
 
 @dataclass
 class PtyPanel:
-    """A panel that runs, its terminal, and its line."""
+    """A running panel, its terminal, and its line."""
 
     pid: int
     terminal: int
     simulation: Simulation
     log: WriteLog
     sent: bytes = b""
-    """All that the panel has sent to its terminal."""
+    """All output of the panel on its terminal."""
     cells: dict[tuple[int, int], str] = field(default_factory=dict)
     _at: tuple[int, int] = (0, 0)
     _rest: str = ""
@@ -144,7 +144,7 @@ class PtyPanel:
             os.write(self.terminal, piece.encode() if isinstance(piece, str) else piece)
 
     def look(self, seconds: float = 0.05) -> bool:
-        """Take what the panel sends; False once it has ended."""
+        """Read the panel's output; False once it has ended."""
         while select.select([self.terminal], [], [], seconds)[0]:
             try:
                 data = read_answering(self.terminal)
@@ -179,14 +179,14 @@ class PtyPanel:
         self._at = (row, column)
 
     def text(self) -> str:
-        """What stands on the terminal."""
+        """Text on the terminal."""
         rows = range(ROWS)
         return "\n".join(
             "".join(self.cells.get((row, column), " ") for column in range(COLUMNS)) for row in rows
         )
 
     def shows(self, *words: str) -> None:
-        """Wait until all these words stand on the terminal."""
+        """Wait until all these words are on the terminal."""
 
         def there() -> bool:
             self.look()
@@ -198,7 +198,7 @@ class PtyPanel:
             raise AssertionError(f"{late}:\n{self.text()}") from None
 
     def settle(self, seconds: float = 0.6) -> None:
-        """Let whatever was typed have its effect; nothing tells that nothing comes any more.
+        """Wait for the effect of typed keys; no sign marks its end.
 
         On a busy computer the panel may not even have read it yet.
         """
@@ -210,7 +210,7 @@ class PtyPanel:
             self.look()
 
     def unread(self) -> int:
-        """How many bytes of what was typed the panel has not taken yet; 0 once it has ended."""
+        """Typed bytes that the panel has not read yet; 0 once it has ended."""
         try:
             side = os.open(f"/proc/{self.pid}/fd/0", os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
@@ -223,7 +223,7 @@ class PtyPanel:
 
     @property
     def armed(self) -> bool:
-        """Whether the terminal says so."""
+        """True if the terminal shows the drive as armed."""
         self.look()
         return " ARMED" in self.text().replace("NOT ARMED", "")
 
@@ -251,14 +251,14 @@ class PtyPanel:
         self.shows("FORWARD")
 
     def stopped(self, since: int, seconds: float = 0.6) -> None:
-        """Stops have gone out since so many writes, and nothing else; the drive is not armed."""
+        """Check that only stops were sent since this many writes, and the drive is not armed."""
         wait_until(lambda: self.look() and self.stops(since) > 0, "the stop")
         self.settle(seconds)
         self.stops(since)
         wait_until(lambda: not self.armed, "not armed")
 
     def stops(self, since: int) -> int:
-        """How many stops went out after so many writes; fails where something else did."""
+        """Count the stops sent after this many writes; fail if other frames were sent."""
         later = self.log.writes[since:]
         assert later == [STOP] * len(later), self.text()
         return len(later)
@@ -289,7 +289,7 @@ def panel_on_a_pty(
 
 @contextmanager
 def panel_beside(panel: PtyPanel) -> Iterator[PtyPanel]:
-    """Another panel on the line of that one, with its first drive on Monitor."""
+    """Another panel on the same line, with its first drive on Monitor."""
     line = (f"tcp:127.0.0.1:{panel.log.port}", "-d", "1")
     started = start_panel([*line])
     with _until_the_end(PtyPanel(*started, panel.simulation, panel.log)) as other:
@@ -298,7 +298,7 @@ def panel_beside(panel: PtyPanel) -> Iterator[PtyPanel]:
 
 @contextmanager
 def _until_the_end(panel: PtyPanel) -> Iterator[PtyPanel]:
-    """A panel that was started, once its drive is shown; it is killed at the end."""
+    """Start a panel, wait until its drive is shown, and kill it at the end."""
     try:
         panel.shows("STANDBY")
         yield panel

@@ -1,4 +1,4 @@
-"""A terminal of its own for a program: a private tmux."""
+"""A separate terminal for a program: a private tmux."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from tests.programs import PATIENCE, wait_until
 
 A_MOMENT = 0.4
-"""Seconds, more than those in which a question takes no answer yet."""
+"""Seconds, longer than a question ignores answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Terminal:
     tmux: tuple[str, ...]
 
     def run(self, *arguments: str) -> str:
-        """A tmux command on it; what it printed."""
+        """Run a tmux command on it; return its output."""
         done = subprocess.run(
             [*self.tmux, *arguments],
             capture_output=True,
@@ -32,7 +32,7 @@ class Terminal:
         return done.stdout
 
     def text(self) -> str:
-        """What stands on it."""
+        """Text on the terminal."""
         return self.run("capture-pane", "-p")
 
     def press(self, *keys: str) -> None:
@@ -40,12 +40,12 @@ class Terminal:
         self.run("send-keys", *keys)
 
     def answer(self, key: str) -> None:
-        """Press a key that answers a question which is seen: too early it would not count."""
+        """Press a key that answers a visible question, late enough to count."""
         time.sleep(A_MOMENT)
         self.press(key)
 
     def wait_for(self, *words: str) -> None:
-        """Wait until all the words stand on it."""
+        """Wait until all the words are on it."""
         try:
             wait_until(lambda: all(word in self.text() for word in words), f"{words} on screen")
         except AssertionError as late:
@@ -57,7 +57,7 @@ class Terminal:
 
 
 def runs(pid: int) -> bool:
-    """Whether a process is still at work; one that only waits to be noticed is not."""
+    """True if a process runs; a zombie does not."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False

@@ -1,4 +1,4 @@
-"""What the tests of a session start from."""
+"""Fixtures of the tests of sessions."""
 
 from __future__ import annotations
 
@@ -7,4 +7,4 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def patience(patient_lines: None) -> None:
-    """How long a line waits is looked at in tests/bus; here a busy machine must not matter."""
+    """Make lines wait long, so that a busy machine does not matter; tests/bus tests the timing."""

@@ -1,4 +1,4 @@
-"""A clock that a test moves on, so that nobody waits for what takes its time."""
+"""A clock that a test advances, so that no test waits for slow steps."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from collections.abc import Callable
 from tui.session.clock import Clock
 
 TURN = 0.005
-"""Real seconds after which a sleeper looks whether the clock was moved on."""
+"""Real seconds after which a sleeper checks if the clock was advanced."""
 
 MOMENT = 0.04
-"""Real seconds that a step of `let_go_until` leaves to the line."""
+"""Real seconds that a step of `let_go_until` gives the line."""
 
 
 class FakeClock(Clock):
-    """The real clock, ahead of it by all that a test has advanced it; for any thread.
+    """The real clock plus the time that a test has advanced it. Thread-safe.
 
     Given to a session and to the simulated drives it moves both; the line's wires stay real.
     """
@@ -27,7 +27,7 @@ class FakeClock(Clock):
         self._ahead: tuple[float, ...] = (0.0,)
 
     def advance(self, seconds: float) -> None:
-        """Let so many seconds go by at once."""
+        """Advance by these seconds at once."""
         ahead = self._ahead[-1] + seconds
         # the longer one first: another thread may look between the two
         self._ahead = (*self._ahead, ahead)
@@ -42,21 +42,21 @@ class FakeClock(Clock):
         return time.time() + self._ahead[-1]
 
     async def sleep(self, seconds: float) -> None:
-        """Until so many seconds have gone by, or were let go by."""
+        """Sleep until these seconds have passed or were advanced."""
         end = self.monotonic() + seconds
         await asyncio.sleep(0)
         while (left := end - self.monotonic()) > 0:  # noqa: ASYNC110 - any thread advances it
             await asyncio.sleep(min(left, TURN))
 
     def line_time(self, reported: float) -> float:
-        """A real moment on this clock: what was advanced since then is not in it."""
+        """Convert a real time to this clock, without later advances."""
         return reported + self._ahead[bisect_right(self._since, reported) - 1]
 
 
 async def let_go_until(
     clock: FakeClock, holds: Callable[[], bool], step: float = 0.25, patience: float = 30.0
 ) -> None:
-    """Let time go by in steps, each with a real moment in which a line can carry something.
+    """Advance time in steps, each with a real moment for the line.
 
     `patience` is in real seconds.
     """

@@ -16,7 +16,7 @@ from tui.drive.profile.schema import ProfileData
 
 
 class BlockDrive(FakeDevice):
-    """A drive that puts a word of its own in the place of those that it lacks, in a block."""
+    """A drive that fills missing words of a block with a word of its own."""
 
     unknown_word = 0x8000
 
@@ -40,11 +40,11 @@ class OneDrive(FakeLine):
         return await super().read(device, address, count, **how)
 
     async def before_read(self, device: int, registers: range, priority: Priority) -> None:
-        """What a drive of a test does before it answers; what it raises is what comes."""
+        """Hook of a test before the drive answers; its exception becomes the result."""
 
     @property
     def registers(self) -> dict[int, int]:
-        """What the drive holds."""
+        """Values of the drive."""
         return self.devices[self.device].words
 
     @property
@@ -58,7 +58,7 @@ class OneDrive(FakeLine):
 
 
 def parameter(code: str, address: int, **more: object) -> dict[str, object]:
-    """One parameter table with the fields that a test does not care about filled in."""
+    """One parameter table with defaults for the fields that do not matter to a test."""
     return {
         "code": code,
         "name": code.lower(),

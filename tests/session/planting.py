@@ -1,4 +1,4 @@
-"""Which functions a piece of work passes through, and errors planted in them, one at a time."""
+"""Record the functions that an operation calls, and plant errors in them, one at a time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 class Passage:
-    """Notes each function of the product that is called while it is open, in any new thread."""
+    """Record each product function called while it is open, in any new thread."""
 
     def __init__(self, spared: Callable[[], bool] = lambda: False) -> None:
         self.places: set[Place] = set()
@@ -47,7 +47,7 @@ class Passage:
 
 @contextmanager
 def traced(passage: Passage) -> Iterator[None]:
-    """Trace this thread and those that begin meanwhile."""
+    """Trace this thread and those that start in the meantime."""
     threading.setprofile(passage.note)
     sys.setprofile(passage.note)
     try:
@@ -96,7 +96,7 @@ def plant(
 
 
 def _behind(raises: Callable[[], None], function: Any) -> Any:
-    """A function behind an error."""
+    """Wrap a function so that it raises first."""
 
     async def later(*given: Any, **named: Any) -> Any:
         raises()

@@ -1,4 +1,4 @@
-"""A simulated drive on a real line with what writes its settings, for tests of settings."""
+"""A simulated drive on a real line with a writer of its settings, for tests of settings."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class Bench:
         return self.session.profile
 
     def permit(self) -> Permit:
-        """The right to write: armed for as long as the test, where the line lets one arm."""
+        """The permit to write: armed for the whole test if the line allows it."""
         if not self.session.line.read_only:
             self.session.arming.arm(seconds=math.inf)
         return Permit(self.session.work, self.session.work.stops)
 
     async def stage(self, **typed: str) -> Edits:
-        """Edits as typed, against what the drive holds."""
+        """Edits as typed, compared with the drive's values."""
         retrying = RetryingReader(self.session)
         codes = [*typed, *(p.code for p in self.profile.parameters if p.quantity in SOURCES)]
         raws = await retrying.ask_raws(codes)
@@ -69,7 +69,7 @@ class Bench:
         return await apply_edits(self.session, self.journal, edits, permit=self.permit(), **how)
 
     def after_writes(self, count: int, then: Callable[[], None]) -> None:
-        """Do something as soon as the drive has answered so many writes from now on."""
+        """Run a function once the drive has answered this many more writes."""
         honest, left = self.session.line.write, [count]
 
         async def counted(*what: Any, **how: Any) -> float:
@@ -82,7 +82,7 @@ class Bench:
         self.session.line.write = counted  # type: ignore[method-assign]
 
     def refuse(self, code: str) -> None:
-        """From now on the drive refuses to take this parameter, as one that is busy does."""
+        """Make the drive refuse this parameter, like a busy one."""
         honest, refused = self.session.line.write, self.profile[code].address
 
         async def picky(device: int, address: int, *what: Any, **how: Any) -> float:
@@ -93,7 +93,7 @@ class Bench:
         self.session.line.write = picky  # type: ignore[method-assign]
 
     def lose_answer(self, code: str, error: LineError, *, taken: bool) -> list[int]:
-        """From now on no write of this parameter is answered; what was sent there."""
+        """Leave writes of this parameter unanswered; return the sent words."""
         honest, lost, sent = self.session.line.write, self.profile[code].address, list[int]()
 
         async def silent(device: int, address: int, words: Sequence[int], **how: Any) -> float:
@@ -114,7 +114,7 @@ class Bench:
         return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
 
     def lose_line(self) -> None:
-        """Pull the plug, and see that the line knows it."""
+        """Unplug the adapter, and wait until the line notices."""
         self.simulation.unplug()
         self._until(LineStatus.LOST)
 
@@ -134,7 +134,7 @@ SOURCES = {"ramp_increment", "high_speed", "low_speed", "max_frequency"}
 
 
 def state_known(monitor: Monitor) -> bool:
-    """Whether the drive may be armed; a first cycle may fail on a busy machine."""
+    """True if the drive may be armed; a first cycle may fail on a busy machine."""
     latest = monitor.latest
     return latest is not None and not latest.error and latest.state.kind != "unknown"
 
@@ -148,7 +148,7 @@ def bench(
     serial: bool = False,
     **spec: object,
 ) -> Iterator[Bench]:
-    """A simulated drive, RTU over TCP; on a serial port where the settings of one matter."""
+    """A simulated drive on RTU over TCP, or on a serial port if its settings matter."""
     drive = DriveSpec(family, 1, **spec)  # type: ignore[arg-type]
     simulation = Simulation([drive], faults=faults, seed=3)
     simulation.start()

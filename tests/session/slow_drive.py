@@ -1,4 +1,4 @@
-"""An Altivar 312 that takes its time, on a line without a wire, and what commands it."""
+"""A slow Altivar 312 on a line without a wire, with its commander."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ GOES_TO = {0x06: READY, 0x07: SWITCHED_ON, 0x0F: ENABLED}
 
 
 class SlowDrive(OneDrive):
-    """An Altivar 312 whose state follows a word only after it was looked at so many times."""
+    """An Altivar 312 whose state follows a word only after some reads."""
 
     def __init__(self, looks: int) -> None:
         super().__init__(dict.fromkeys(range(0x10000), 0))
@@ -36,10 +36,10 @@ class SlowDrive(OneDrive):
         self.registers.update({PROFILE[code].address: raw for code, raw in held.items()})
         self.registers[STATUS] = 0x0240
         self.looks = looks
-        """Looks at the status until a word has done its work."""
+        """Reads of the status until a word takes effect."""
         self.dead_to_writes = False
         self.words: list[tuple[int, int]] = []
-        """Each command word, and the state that the drive was in when it came."""
+        """Each command word, with the state of the drive at that time."""
         self.before_write: Callable[[int], None] = lambda _address: None
         self._coming: list[int] = []
 
@@ -63,7 +63,7 @@ class SlowDrive(OneDrive):
 
 
 class SlowBench:
-    """An armed drive with its commander; starts are put on record."""
+    """An armed drive with its commander; starts are recorded."""
 
     def __init__(self, folder: Path, looks: int = 3) -> None:
         self.line = SlowDrive(looks)
@@ -76,22 +76,22 @@ class SlowBench:
 
     @property
     def records(self) -> list[Path]:
-        """The starts on the disk."""
+        """The recorded starts on the disk."""
         return sorted(self.starts.folder.glob("*.json"))
 
     async def start(self) -> tuple[OutcomeKind, str]:
-        """What a run command comes to."""
+        """Result of a run command."""
         self.commander.order("forward")
         await until(lambda: not self.session.work.busy)
         assert self.session.work.outcome is not None
         return self.session.work.outcome.kind, self.session.work.outcome.text
 
     def rest(self) -> None:
-        """The motor stands."""
+        """Bring the motor to standstill."""
         self.line.registers[STATUS] = SWITCHED_ON
 
     def end(self) -> None:
-        """Nothing is left to be written."""
+        """Write all pending records."""
         self.starts.close(5.0)
         self.journal.close()
 

@@ -1,4 +1,4 @@
-"""A simulated drive on a bench: asked by its words, stepped by hand."""
+"""A simulated drive on a bench: read by its words, stepped by the test."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Bench:
         return self.ask(struct.pack(">BHH", 6, self.address(code), raw & 0xFFFF).hex())
 
     def taken(self, code: str, raw: int) -> None:
-        """Write one word that must be taken."""
+        """Write one word that must be accepted."""
         reply = self.write(code, raw)
         assert reply is not None, f"{code}: no reply"
         assert reply.startswith("06"), f"{code}: {reply}"

@@ -1,9 +1,9 @@
 """Raw exchanges as tests: frames in, frames out, inputs, faults and time between them.
 
-A script has one step a line: `> 02 03 0C81 0001` sends a frame, `< 02 03 02 0237` is what has to
-come back, `< -` that nothing may. Checksums are left out: they are added to what is sent and
-checked on what comes. `@ LI5=1` sets an input of the first drive, `! OCF` trips it, `. 3` lets
-3 s pass. What stands behind a `#` is for the reader.
+A script has one step a line: `> 02 03 0C81 0001` sends a frame, `< 02 03 02 0237` expects
+a reply, `< -` expects none. Checksums are omitted: they are added to sent frames and checked on
+replies. `@ LI5=1` sets an input of the first drive, `! OCF` trips it, `. 3` lets
+3 s pass. Text after a `#` is a comment.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ADDRESS = 2
 
 
 class Exchange:
-    """One drive at address 2 on a line of its own, in a time that only the script moves on."""
+    """One drive at address 2 on its own line, with a clock that only the script advances."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class Exchange:
         self._reply = ""
 
     def play(self, script: str) -> None:
-        """Go through a script; the line of it that fails is told."""
+        """Run a script; report the line that fails."""
         steps = [line.partition("#")[0].strip() for line in script.splitlines()]
         for number, step in enumerate(steps, 1):
             if step:
@@ -68,6 +68,6 @@ class Exchange:
 
 
 def _plain(frame: bytes) -> str:
-    """A frame without its checksum, which has to be right."""
+    """A frame without its checksum, which must be correct."""
     assert seal(frame[:-2]) == frame
     return frame[:-2].hex().upper()

@@ -1,4 +1,4 @@
-"""The example frames of the manuals, and how a drive has to be set up to give their answers."""
+"""The example frames of the manuals, and the setup of a drive that gives their answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tui.simulator import DriveSpec, SimulatedDrive
 
 @dataclass(frozen=True)
 class Frame:
-    """One example frame: as it must be, and as it is printed where that differs."""
+    """One example frame: the correct form, and the printed form if it differs."""
 
     number: int
     family: str
@@ -44,22 +44,22 @@ FRAMES = _frames()
 
 @dataclass(frozen=True)
 class Example:
-    """A request of a manual, the drive it is meant for, and the answer it gets."""
+    """A request of a manual, its drive, and the answer."""
 
     request: int
     response: int | None
-    """Number of the answering frame; None where no drive would answer as printed."""
+    """Number of the answering frame; None if no drive would answer as printed."""
     spec: DriveSpec
     busy: bool = False
     answer: str = ""
-    """What a drive answers instead, in hexadecimal, with the reason beside the example."""
+    """Actual answer of a drive, in hexadecimal; the reason is beside the example."""
 
     @property
     def name(self) -> str:
         return f"{self.spec.profile}-{self.request}-{self.response or self.answer}"
 
     def prepare(self, drive: SimulatedDrive) -> None:
-        """What a specification cannot say."""
+        """Setup that a specification cannot express."""
         drive.busy = self.busy
 
 

@@ -1,4 +1,4 @@
-"""What terminals send for F1 to F12, from their terminfo entries and PuTTY's documentation."""
+"""Sequences of terminals for F1 to F12, from terminfo entries and PuTTY's documentation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ REPORTS = {
     "a mode": "\x1b[?2026;2$y",
     "its size": "\x1b[48;24;80;480;800t",
 }
-"""What Textual wants to hear."""
+"""Sequences that Textual expects."""
 
 REPLIES = {
     "attributes": "\x1b[?62;22;52c",
@@ -55,4 +55,4 @@ REPLIES = {
     "no focus": "\x1b[O",
     "keyboard": "\x1b[?0u",
 }
-"""What nobody wants to hear."""
+"""Sequences that no program expects."""

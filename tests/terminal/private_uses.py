@@ -1,8 +1,8 @@
 """Finds where a module of the project uses private parts of Textual, by its source.
 
-A private part is a name with a leading underscore that a class or a module of Textual has. Where a
-class of the project stands on one of Textual's, each name that `self` already has from there is
-meant, be it on purpose or not; on anything else, a name that any class of an app has.
+A private part is a name with a leading underscore that a class or a module of Textual has. In a
+subclass of a Textual class, each private name that `self` inherits counts, on purpose or not. On
+other objects, a private name of any class of an app counts.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ import tui
 PACKAGE = Path(tui.__file__).parent
 ROOM = "terminal"
 DRAWN_BY = ("textual", "rich")
-"""Textual, and what it writes with."""
+"""Textual, and the library that it writes with."""
 BY_NAME = frozenset({"getattr", "setattr", "hasattr", "delattr"})
 
 Bases = Mapping[str, tuple[type, ...]]
-"""Textual's classes below each class of a module, by qualified name; those of whoever inherits it
-with another class of Textual are among them."""
+"""Textual's base classes of each class of a module, by qualified name. Those of subclasses that add
+another class of Textual are included."""
 
 
 class Use(NamedTuple):
@@ -38,7 +38,7 @@ class Use(NamedTuple):
 
 
 def is_private(name: str) -> bool:
-    """Whether a name is one that its owner promises nothing about."""
+    """True if a name is private, so that its owner may change it."""
     return name.startswith("_") and not name.endswith("__")
 
 
@@ -53,7 +53,7 @@ def private_names(kind: type) -> frozenset[str]:
 
 @cache
 def names_of_any() -> frozenset[str]:
-    """The private names of what an app is made of, from its screens to its drivers and events."""
+    """The private names of the classes of an app, from its screens to its drivers and events."""
     from rich.console import Console
     from textual import events, messages
     from textual._compositor import Compositor
@@ -74,7 +74,7 @@ def names_of_any() -> frozenset[str]:
 
 
 def textual_bases(kind: type) -> tuple[type, ...]:
-    """The classes of Textual and Rich that a class is, or stands on."""
+    """The classes of Textual and Rich that a class is or inherits."""
     return tuple(base for base in kind.__mro__ if base.__module__.partition(".")[0] in DRAWN_BY)
 
 
@@ -100,7 +100,7 @@ def _is_own(node: ast.AST) -> bool:
 
 
 def uses(source: str, bases: Bases) -> list[Use]:
-    """Every use of a private part of Textual in a module, whose classes stand on these."""
+    """Every use of a private part of Textual in a module with these base classes."""
     tree = ast.parse(source)
     nodes = list(ast.walk(tree))
     return sorted({*_imports(nodes), *_uses_on_others(nodes), *_uses_in_own_classes(tree, bases)})
@@ -121,7 +121,7 @@ def _imports(nodes: Sequence[ast.AST]) -> Iterator[Use]:
 
 
 def _uses_on_others(nodes: Sequence[ast.AST]) -> Iterator[Use]:
-    """Private attributes of anything but `self`, and what is set on a class of Textual."""
+    """Private attributes of objects except `self`, and attributes set on a class of Textual."""
     modules, theirs = _imported(nodes)
     for node in nodes:
         if isinstance(node, ast.Attribute) and not _is_own(node.value):
@@ -162,7 +162,7 @@ def _imported(nodes: Sequence[ast.AST]) -> tuple[set[str], set[str]]:
 
 
 def _uses_in_own_classes(tree: ast.Module, bases: Bases) -> Iterator[Use]:
-    """Private names that `self` has from Textual: read, set or defined anew."""
+    """Private names that `self` has from Textual: read, set or redefined."""
     for name, node in _classes(tree) if bases else ():
         known = frozenset().union(*(private_names(base) for base in bases.get(name, ())))
         for part in node.body:
@@ -176,7 +176,7 @@ def _uses_in_own_classes(tree: ast.Module, bases: Bases) -> Iterator[Use]:
 
 
 def _defined(part: ast.stmt) -> Iterator[tuple[str, int]]:
-    """What a statement in the body of a class calls by a name."""
+    """Names that a statement in the body of a class binds."""
     if isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef):
         yield part.name, part.lineno
     elif isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name):
@@ -199,7 +199,7 @@ def _classes(tree: ast.AST, outer: str = "") -> Iterator[tuple[str, ast.ClassDef
 
 @cache
 def bases_in_project() -> Mapping[str, Bases]:
-    """Textual's classes below each class of the project, module by module."""
+    """Textual's base classes of each class of the project, module by module."""
     found: dict[str, dict[str, tuple[type, ...]]] = {}
     for kind in _own_classes():
         for part in kind.__mro__:

@@ -1,9 +1,9 @@
-"""How many bytes a second the Monitor screen sends to its terminal, beside a plain panel.
+"""Bytes a second that the Monitor screen sends to its terminal, beside a plain panel.
 
     python -m tests.ui.bytes_per_second [SECONDS]
 
 Both watch the same simulated, running Altivar 71 in a pseudo-terminal of 80 x 24, at their
-default rates; what they write after their first full picture is counted.
+default rates. The bytes after their first full picture count.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PLAIN = ("-m", "tests.ui.plain_panel")
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Bytes that a program wrote to its terminal in so many seconds."""
+    """Bytes that a program wrote to its terminal, with the seconds."""
 
     size: int
     seconds: float
@@ -44,7 +44,7 @@ class Measured:
 
 
 def panel() -> None:
-    """The panel on one simulated, running drive; it opens Monitor by itself."""
+    """The panel on one simulated, running drive; it opens Monitor automatically."""
     from tui.app import DrivePanelApp
     from tui.session.connect.open_line import demo_line
 

@@ -1,4 +1,4 @@
-"""What the tests of the screens start from."""
+"""Fixtures of the tests of screens."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .quick import drawn_for_somebody, parse_once, wait_for_the_busy
 
 @pytest.fixture(autouse=True)
 def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Questions and the run line take Enter as soon as they stand.
+    """Let questions and the run line accept Enter at once.
 
-    `test_questions` and `test_run_line` look at the waiting.
+    `test_questions` and `test_run_line` test the delay.
     """
     monkeypatch.setattr(Question, "_is_early", lambda _: False)
     monkeypatch.setattr("tui.screens.monitor.run_line.ENTER_COUNTS_AFTER", 0.0)
@@ -28,18 +28,18 @@ def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def patience(patient_lines: None) -> None:
-    """How long a line waits is looked at in tests/bus; here a busy machine must not matter."""
+    """Make lines wait long, so that a busy machine does not matter; tests/bus tests the timing."""
 
 
 @pytest.fixture(autouse=True)
 def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No search listens for another master first; `test_other_settings` looks at that."""
+    """Let no search listen for another master first; `test_other_settings` tests that."""
     monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.0)
 
 
 @pytest.fixture(autouse=True)
 def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A fifth of the time of a test of the panel would go into the same style sheets."""
+    """Reuse parsed style sheets: they would take a fifth of the time of a test of the panel."""
     monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)
 
 
@@ -47,16 +47,16 @@ def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def only_the_busy_waited_for(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A tenth of the time went into waking widgets that wait. Pictures take the pilot's own way."""
+    """Leave waiting widgets asleep, to save a tenth of time. Pictures use the pilot's method."""
     if "snap_compare" not in request.fixturenames:
         monkeypatch.setattr(Pilot, "_wait_for_screen", wait_for_the_busy)
 
 
 @pytest.fixture(autouse=True)
 def drawn_when_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A quarter of the time went into drawing what nobody looks at.
+    """Do not draw screens that no test checks: that took a quarter of the time.
 
-    Pictures are drawn as a person comes to them, and so is all that is marked `drawn`.
+    Pictures are drawn as for a person, and so are tests marked `drawn`.
     """
     looked_at = "snap_compare" in request.fixturenames or request.node.get_closest_marker("drawn")
     if not looked_at:
@@ -65,13 +65,13 @@ def drawn_when_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.Mon
 
 @pytest.fixture(autouse=True)
 def still_cursor(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cursor of a field does not blink: on a busy machine a picture is taken after it went."""
+    """Stop the cursor of a field from blinking: on a busy machine a picture may miss it."""
     monkeypatch.setattr(Input, "_toggle_cursor", lambda _: None)
 
 
 @pytest.fixture(autouse=True)
 def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Times of day are those of one place, wherever the tests are run."""
+    """Use one time zone on every machine."""
     monkeypatch.setenv("TZ", "UTC")
     time.tzset()
     yield

@@ -1,4 +1,4 @@
-"""A drive, a line and a clock that stand still, for pictures that never change."""
+"""A drive, a line and a clock that never change, for constant pictures."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def snapshot_of(
     rate: float = 2.0,
     block: str = "",
 ) -> Snapshot:
-    """A snapshot whose values are so many seconds old."""
+    """A snapshot whose values have this age in seconds."""
     readings = readings_of(profile, raws, NOW - age)
     return Snapshot(
         cycle=120,
@@ -125,7 +125,7 @@ def snapshot_of(
 
 
 class StillMonitor(Monitor):
-    """A monitor that has brought one snapshot, or none, and brings no other."""
+    """A monitor with one snapshot or none, and no later one."""
 
     def __init__(
         self, session: DriveSession, latest: Snapshot | None, trend: Iterable[TrendPoint] = ()
@@ -145,7 +145,7 @@ class StillMonitor(Monitor):
 
 
 class StillArming(Arming):
-    """A drive that is armed for so many seconds, or not at all."""
+    """A drive that is armed for these seconds, or not at all."""
 
     def __init__(self, line: ModbusLine, seconds: float | None) -> None:
         super().__init__(line)
@@ -153,7 +153,7 @@ class StillArming(Arming):
 
     @property
     def armed_for(self) -> float | None:
-        """The countdown of a picture stands still."""
+        """The countdown of a picture is stopped."""
         return self._seconds
 
 
@@ -169,7 +169,7 @@ FRAMES = (
 
 
 class StillLine(FakeLine):
-    """A line in a given state, on which nothing works; every device was heard a moment ago."""
+    """A line in a given state without traffic; every device has just answered."""
 
     def __init__(self, state: LineState = CONNECTED, *, heard: float = NOW - 0.2) -> None:
         super().__init__(link=SerialLink("/dev/ttyUSB0"))
@@ -179,11 +179,11 @@ class StillLine(FakeLine):
         self._heard = heard
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
-        """No worker begins, and none ends."""
+        """No worker starts or ends."""
         return StillWorker()
 
     def device_state(self, device: int) -> DeviceState:
-        """Each answers, and was heard when the picture says."""
+        """Each device answers, last at the time of the picture."""
         return DeviceState(True, 0, None, None, 0.005, 0.005, self._heard)
 
 
@@ -200,7 +200,7 @@ class StillWorker:
 
 @dataclass
 class FakeLineWatch:
-    """A line watch that has seen what the test gives, and no more."""
+    """A line watch with the states of the test only."""
 
     given: TimeoutWatch | None = None
     alone: dict[int, TimeoutWatch] = field(default_factory=dict)
@@ -212,7 +212,7 @@ class FakeLineWatch:
 
     @property
     def onsets(self) -> FaultOnsets:
-        """Each fault was seen to come, a long time ago."""
+        """Each fault began a long time ago."""
         found = FaultOnsets()
         for device, state in self.states.items():
             found.note(device, replace(state, kind="ready"), self.tripped_at)
@@ -221,7 +221,7 @@ class FakeLineWatch:
 
     @property
     def states(self) -> dict[int, DriveState]:
-        """The states of the looks, and what else was seen."""
+        """The states of the status reads, and of other drives."""
         looks = {device: look.state for device, look in self.looks.items() if look.state}
         return {**looks, **self.seen}
 
@@ -234,7 +234,7 @@ class FakeLineWatch:
         return []
 
     def under_command(self) -> list[DriveSession]:
-        """The motors that run by an order from here."""
+        """The motors that run by a command of this panel."""
         return self.commanded
 
     def unread(self) -> list[DriveSession]:
@@ -265,7 +265,7 @@ def console_of(
     family: str = "atv71",
     armed: float | None = None,
 ) -> DriveConsole:
-    """A drive whose monitor has brought this snapshot, with a trend of a start and a run."""
+    """A drive whose monitor has this snapshot, with a trend of a start and a run."""
     identity = ATV71 if family == "atv71" else None
     session = DriveSession(StillLine(line), device, library.load(family), identity)
     session.arming = session.work.arming = StillArming(session.line, armed)
@@ -290,7 +290,7 @@ def console_of(
 
 
 def look_of(raws: Mapping[str, int], *, age: float = 0.0) -> Look:
-    """What a look at an Altivar 71 that holds this has brought, so many seconds ago."""
+    """A status read of an Altivar 71 with these values, from some seconds ago."""
     profile = library.load("atv71")
     readings = readings_of(profile, raws, NOW - age)
     reported = {code: readings[code] for code in ("RFR", "FRH", "LCR")}
@@ -298,7 +298,7 @@ def look_of(raws: Mapping[str, int], *, age: float = 0.0) -> Look:
 
 
 class StillFleet(Fleet):
-    """Drives that were found, looked after by a line watch that has seen what the test gives."""
+    """Found drives with a line watch that has the states of the test."""
 
     def __init__(
         self,
@@ -312,18 +312,18 @@ class StillFleet(Fleet):
             self.hold(drive)
 
     def hold(self, drive: FoundDrive) -> None:
-        """One more drive, or another in its place."""
+        """One more drive, or a replacement."""
         self._put(drive)
 
 
 def choose(app: DrivePanelApp, console: DriveConsole) -> None:
-    """The drive is the one that was opened, as after Enter on it; the only one where none is."""
+    """Open this drive, as after Enter on it; it is the only one of a new fleet."""
     app.fleet = app.fleet or StillFleet(FoundDrive(ATV71, console))
     app.chosen = console
 
 
 async def press(pilot: Pilot[None], *keys: str) -> None:
-    """Press keys; `(name)` is an action that has no key, done as the list of actions does it."""
+    """Press keys; `(name)` is an action without a key, run as the list of actions does."""
     for key in keys:
         if len(key) > 2 and key.startswith("("):
             await pilot.app.run_action(key[1:-1], pilot.app.screen)
@@ -333,10 +333,10 @@ async def press(pilot: Pilot[None], *keys: str) -> None:
 
 
 class Easel(DrivePanelApp):
-    """The panel for one picture: without Line below it, which would be drawn before and hidden."""
+    """The panel for one picture, without Line below it, which would be drawn and hidden."""
 
     def on_mount(self, event: Mount) -> None:  # type: ignore[override]
-        """Look around as ever, and leave the rest of the panel's beginning out."""
+        """Search for lines as usual, and skip the rest of the panel's start."""
         event.prevent_default()
         self.set_interval(FRAME_LOOK, self.look_around)
 
@@ -346,7 +346,7 @@ def app_of(
     abilities: Abilities = EVERYTHING,
     kind: type[DrivePanelApp] = DrivePanelApp,
 ) -> DrivePanelApp:
-    """The panel with a clock that stands still."""
+    """The panel with a stopped clock."""
 
     def closed(*_: Any, **__: Any) -> OpenLine:
         raise AssertionError("no line is opened in this picture")

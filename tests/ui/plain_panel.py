@@ -1,4 +1,4 @@
-"""The same drive in stock widgets: the peer that the panel's bytes are compared with.
+"""The same drive in stock widgets, as the peer for the panel's bytes.
 
 Run as a program it watches the simulated Altivar 71 that `drivepanel demo` has, with the same
 refresh: large digits, a sparkline, a table whose cells are updated one by one.
@@ -23,7 +23,7 @@ LARGE = ("RFR", "LCR", "RFRD", "OTR")
 
 
 class PlainPanel(App[None]):
-    """Stock widgets, set anew at every refresh."""
+    """Stock widgets, set again at every refresh."""
 
     BINDINGS: ClassVar = [("q", "quit", "Quit")]
     CSS = "Horizontal { height: 3; } Digits { width: 1fr; } Sparkline { height: 4; }"
@@ -74,7 +74,7 @@ class PlainPanel(App[None]):
 
 
 def main() -> None:
-    """Show the running drive until the terminal goes away."""
+    """Show the running drive until the terminal closes."""
     opened = demo_line({"atv71": 50.0})
     try:
         PlainPanel(opened, 1).run()

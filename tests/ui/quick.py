@@ -1,4 +1,4 @@
-"""What panels of tests need not do: parse style sheets again, draw for nobody, wake what waits."""
+"""Shortcuts for panels in tests: no repeated parsing, no unseen drawing, no needless waking."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _parsed: dict[object, Any] = {}
 
 
 def parse_once(sheet: Stylesheet, *source: Any, **how: Any) -> Any:
-    """The rules of a source; parsed once for each theme, whichever panel asks."""
+    """The rules of a source, parsed once for each theme and all panels."""
     key = (source, tuple(how.items()), tuple(sheet._variables.items()))
     if key not in _parsed:
         _parsed[key] = _parse(sheet, *source, **how)
@@ -32,7 +32,7 @@ def drawn_for_somebody(
     screen_stack: list[Screen[Any]] | None = None,
     simplify: bool = False,
 ) -> RenderableType | None:
-    """Draw where somebody looks: without a terminal Textual throws away all but whole pictures."""
+    """Draw whole pictures only: without a terminal Textual discards all others."""
     if full or not active_app.get().is_headless:
         return _draw(self, full, screen_stack, simplify)
     self._dirty_regions.clear()
@@ -40,10 +40,10 @@ def drawn_for_somebody(
 
 
 async def wait_for_the_busy(self: Pilot[Any], timeout: float = 30.0) -> bool:
-    """Wait until what is queued on the screen is done; false where an error came first.
+    """Wait until the queue of the screen is done; return False if an error comes first.
 
-    The pilot's own way wakes every widget for that, also those that wait for a message: a tenth
-    of what a panel did in a test.
+    The pilot's own method wakes every widget, also those that wait for a message. That is a tenth
+    of a panel's work in a test.
     """
     app = self.app
     if not app.screen_stack:
@@ -71,6 +71,6 @@ async def wait_for_the_busy(self: Pilot[Any], timeout: float = 30.0) -> bool:
 
 
 def is_busy(pump: MessagePump) -> bool:
-    """Whether it has a message, or is at one: it does not wait for the next."""
+    """True if it has or handles a message, so that it does not wait for one."""
     ready: asyncio.Event = pump._message_queue.ready_event
     return ready.is_set() or not ready._waiters

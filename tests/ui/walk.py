@@ -1,4 +1,4 @@
-"""A way through places that takes every step between two of them once, and no place needlessly."""
+"""A path that takes every step between two places once, with the fewest visits."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 def every_step(places: Iterable[str]) -> list[str]:
-    """Places in an order in which each is followed by each other one and by itself."""
+    """Places in an order in which each is followed by every place, itself included."""
     names = list(places)
     walk: list[str] = []
     for at, place in enumerate(names):
