@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
+from typing import cast
 
 import pytest
 
 from tui.bus.api import Priority
+from tui.bus.fake import FakeLine
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
@@ -218,6 +222,34 @@ async def test_a_stop_goes_before_all_that_waits(start: Start, journal: Journal)
     at = next(index for index, data in enumerate(sent) if data[1] == 6)
     assert at <= before + 1
     assert simulation.drive(1).raw("CMD") == 7
+
+
+def test_report_from_another_thread_is_kept(journal: Journal) -> None:
+    line, profile = FakeLine(), library.load("atv71")
+    stopper = Stopper(line, journal)
+    texts: list[str] = []
+    kept: list[str] = []
+
+    def report_other() -> int:
+        if texts:
+            kept.append(stopper.reports[2].text)
+        texts.append(f"report {len(texts)}")
+        other = DriveSession(line, 2, profile)
+        report = partial(stopper._report, other, Phase.FAILED, texts[-1], 2.0)
+        thread = threading.Thread(target=report)
+        thread.start()
+        thread.join()
+        return 1
+
+    class Overtaken:
+        """Whenever its device is read, another thread reports on drive 2."""
+
+        clock = DriveSession(line, 1, profile).clock
+        device = property(lambda session: report_other())
+
+    stopper._report(cast(DriveSession, Overtaken()), Phase.SENDING, "stop waits for the line", 1.0)
+    assert len(kept) > 2
+    assert kept == texts[:-1]
 
 
 def test_orders_that_no_state_allows_are_refused_in_words() -> None:

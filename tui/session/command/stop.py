@@ -97,7 +97,7 @@ class Stopper:
     @property
     def reports(self) -> Mapping[int, StopReport]:
         """The last report of each drive, by device."""
-        return self._reports
+        return dict(self._reports)
 
     def stop(
         self,
@@ -211,9 +211,7 @@ class Stopper:
         return summary if len(summary.reports) == len(devices) and summary.ended else None
 
     def _summary(self, devices: set[int]) -> StopSummary:
-        return StopSummary(
-            [report for device, report in self._reports.items() if device in devices]
-        )
+        return StopSummary([report for device, report in self.reports.items() if device in devices])
 
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
         """Report how far a stop has come; an error in doing so costs no stop."""
@@ -224,7 +222,7 @@ class Stopper:
         same = before is not None and (before.phase, before.time) == (phase, ordered)
         since = before.since if same and before is not None else _now(session)
         report = StopReport(session.device, phase, text, ordered, since)
-        self._reports = {**self._reports, session.device: report}
+        self._reports[session.device] = report  # two threads may report, of two drives
         if not same:
             if self._events is not None:
                 kind = "failed" if phase in NOT_STOPPING else "stop"
