@@ -38,6 +38,8 @@ MOST_SECONDS = 100.0
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
 IN_PROCESSES = {"tui/keeper/": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py")}
 """By the beginning of a path: tests of code that runs in processes that are not recorded."""
+BY_SOURCE = {"lock": ["tests/test_locks.py"]}
+"""By kind of defect: tests that read the source itself."""
 UNREACHED, EQUAL = "NOT REACHED", "EQUIVALENT"
 
 
@@ -171,7 +173,7 @@ class Chooser:
         for beginning, others in IN_PROCESSES.items():
             if mutant.path.startswith(beginning):
                 tests += others
-        return tests
+        return tests + BY_SOURCE.get(mutant.change.kind, [])
 
     def _reaching(self, mutant: Mutant) -> set[str]:
         lines = self._record.lines(mutant.path)
@@ -242,7 +244,7 @@ class Judge:
         if mutant.identity in EQUIVALENT:
             by = EQUAL
         else:
-            by = self._noticed_by(mutant, list(tests), copy) if tests else UNREACHED
+            by = self._noticed_by(mutant, tests.copy(), copy) if tests else UNREACHED
         package = mutant.path.split("/")[1]
         seconds = time.monotonic() - begun
         first_line = (
