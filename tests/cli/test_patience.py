@@ -9,9 +9,9 @@ import pytest
 
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.cli.commands.orders import watch_of
-from tui.cli.shared.patience import patience
 from tui.drive.profile import library
 from tui.session.fleet import Fleet
+from tui.session.patience import patience
 from tui.session.timeout_report import TimeoutWatch
 
 

@@ -265,9 +265,9 @@ DEFECTS = (
     ),
     Defect(
         "only-two-signals-stop-a-motor",
-        "tui/cli/shared/signals.py",
+        "tui/session/signals.py",
         "for number in ending_signals() - kept}",
-        'for number in _numbers(("SIGHUP", "SIGTERM", *OF_KEYS[:1])) - kept}',
+        'for number in signal_numbers(("SIGHUP", "SIGTERM", *OF_KEYS[:1])) - kept}',
         "Ctrl-\\ or SIGUSR1 ends the program, and its motor keeps running.",
         ("tests/line/test_signals.py",),
     ),

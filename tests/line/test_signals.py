@@ -16,13 +16,7 @@ from typing import Any
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, served, wait_until
-from tui.cli.shared.signals import (
-    OF_ERRORS,
-    SUSPENDING,
-    UNTOUCHED,
-    ending_signals,
-    signal_name,
-)
+from tui.session.signals import OF_ERRORS, SUSPENDING, UNTOUCHED, ending_signals, signal_name
 from tui.simulator import DriveSpec, Simulation
 
 from .pty_panel import PtyPanel, panel_on_a_pty, start_panel
@@ -227,7 +221,8 @@ def test_keys_of_a_terminal_in_its_usual_mode_stop_and_never_suspend_a_run() -> 
 
 REAL_ERROR = """
 import ctypes
-from tui.cli.shared.signals import handled, never_suspended
+from tui.session.signals import handled
+from tui.cli.shared.signals import never_suspended
 with never_suspended(), handled(lambda *_: print("handled")):
     ctypes.string_at(0)
 """

@@ -8,7 +8,9 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from .shared.signals import BY_SIGNAL, ending_by_signal, never_suspended
+from tui.session.signals import BY_SIGNAL
+
+from .shared.signals import ending_by_signal, never_suspended
 
 if TYPE_CHECKING:
     from tui.session.bundle.subject import DriveDocuments

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.session.signals import BY_SIGNAL, signal_name
+
 from ..shared.completion import complete_line, complete_profile
 from ..shared.errors import INTERRUPTED, USAGE, Failure, reported
 from ..shared.line_argument import LineArgument
 from ..shared.numbers import seconds
 from ..shared.options import json_option
 from ..shared.say import say
-from ..shared.signals import BY_SIGNAL, interrupted_by_signal, never_suspended, signal_name
+from ..shared.signals import interrupted_by_signal, never_suspended
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tui.drive.orders import OrderRefused
+from tui.session.patience import patience
 from tui.session.work import Outcome, OutcomeKind
 
 from ..shared.errors import LINE_TROUBLE, REFUSED_HERE, Failure, note_journal, status_of
@@ -18,7 +19,6 @@ from ..shared.options import (
     Target,
     connect_drive,
 )
-from ..shared.patience import patience
 from ..shared.say import say
 from ..shared.typed import refuse_if_stopped
 

@@ -12,6 +12,8 @@ from typing import Any
 
 import click
 
+from tui.session.signals import BY_SIGNAL
+
 from ..plant.broker import mqtt_password_option
 from ..plant.publish_options import (
     PublishOptions,
@@ -33,7 +35,7 @@ from ..shared.options import CONNECT_WITHIN, json_option, profile_of, usual_sett
 from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.served_lines import ServedLine, served_lines
-from ..shared.signals import BY_SIGNAL, never_suspended
+from ..shared.signals import never_suspended
 
 
 @click.command()

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.session.signals import handled
+
 from ..shared.completion import complete_profile
 from ..shared.errors import reported
 from ..shared.host_port import host_port, written_host_port
@@ -16,7 +18,7 @@ from ..shared.numbers import FiniteRange
 from ..shared.options import json_option
 from ..shared.output import document, json_text, print_json
 from ..shared.say import say, say_beside
-from ..shared.signals import handled, never_suspended
+from ..shared.signals import never_suspended
 from ..shared.standard_input import typed_lines
 
 if TYPE_CHECKING:

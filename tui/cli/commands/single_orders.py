@@ -12,6 +12,7 @@ import click
 from tui.bus.errors import LineError
 from tui.drive.fault_reset import not_in_command, reset_codes, reset_follows
 from tui.drive.reset_text import MAY_START
+from tui.session.patience import patience
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, reported
 from ..shared.messages import Messages
@@ -24,7 +25,6 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.patience import patience
 from .orders import (
     COMMAND_POLL_INTERVAL,
     arm_drive,

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.session.running.ending import Ending
+from tui.session.signals import BY_SIGNAL
+
 from ..commands.orders import complain
-from ..shared.signals import BY_SIGNAL
-from .ending import Ending
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from tui.bus.errors import LineError
 from tui.session.command.stop_report import Phase
 from tui.session.monitor.timeout import left_alone_text
+from tui.session.running.ending import Ending
 from tui.session.starts.keeper import StartKeeper
 
 from ..commands.orders import (
@@ -27,7 +28,6 @@ from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
 from ..shared.drive_status import fault_text
 from ..shared.errors import DRIVE_REFUSED, ENDED_AFTER_WRITING, REFUSED_HERE, Failure
 from ..shared.options import Target
-from .ending import Ending
 from .telling import RunTelling
 from .voice import BufferedOutput
 

@@ -8,6 +8,8 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from tui.session.running.ending import Ending
+
 from ..commands.orders import close_journal, journal_document
 from ..plant.publish_options import PublishOptions, is_loopback
 from ..shared.errors import LINE_TROUBLE, Failure
@@ -17,7 +19,6 @@ from ..shared.numbers import check_rate
 from ..shared.options import Target
 from ..shared.pending_timeouts import say_farewells
 from ..shared.say import say
-from .ending import Ending
 from .line_pulse import LinePulse
 from .service import Service
 

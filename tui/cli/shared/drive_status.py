@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tui.drive.values import NOT_AVAILABLE
+from tui.session.patience import patience
 
 from .control import control_json, control_row
 from .errors import DONE, LINE_TROUBLE, Failure
 from .fault_output import FaultFinding, alarm_json, fault_json, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
-from .patience import patience, read_until
+from .read_until import read_until
 from .watch_rows import watch_json, watch_text
 
 if TYPE_CHECKING:

@@ -20,8 +20,10 @@ async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any
     Raises Exit with 128 and the number of a signal that ended it; one that comes once the work is
     done ends only what is said of the drives.
     """
+    from tui.session.signals import BY_SIGNAL
+
     from .pending_timeouts import say_farewells
-    from .signals import BY_SIGNAL, cancelled_by_signal
+    from .signals import cancelled_by_signal
 
     task = asyncio.current_task()
     assert task is not None

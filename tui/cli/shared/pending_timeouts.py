@@ -9,7 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .patience import patience
+from tui.session.patience import patience
+
 from .say import say
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Signals: those that end a program, its motors first, and those that may not suspend it."""
+"""Signals to a program: one ends its motors first, and none suspends it."""
 
 from __future__ import annotations
 
@@ -6,30 +6,24 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Protocol
+
+from tui.session.signals import (
+    BY_SIGNAL,
+    OF_ERRORS,
+    SUSPENDING,
+    handled,
+    signal_name,
+    signal_numbers,
+)
 
 if TYPE_CHECKING:
     import asyncio
 
 log = logging.getLogger(__name__)
-
-BY_SIGNAL = 128
-"""The exit status of a program that a signal ended, less the signal's number."""
-
-UNTOUCHED = (
-    "SIGKILL", "SIGSTOP", "SIGCHLD", "SIGCONT", "SIGINFO", "SIGPIPE", "SIGURG", "SIGWINCH",
-)  # fmt: skip
-"""No program catches the first two. The others end no process, SIGPIPE not in Python."""
-SUSPENDING = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
-"""A suspended program still holds its line, and does not stop its motor."""
-OF_ERRORS = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
-"""A handler would return to the instruction that failed, forever: sent by another program they
-end this one in order, caused by an error of its own they end it immediately."""
-OF_KEYS = ("SIGINT", "SIGQUIT")
-"""Ctrl-C and Ctrl-\\: a script ignores them for what it starts in the background."""
 
 CLEANED_UP = 3.0
 """Seconds that the screen has to close; a terminal that is gone may keep it from that."""
@@ -40,55 +34,6 @@ SUSPENDED = (
 )
 PRESS_CTRL_C = "Press Ctrl-C to end it."
 
-_taken: set[int] = set()
-"""Signals that are handled here now."""
-
-Handler = Callable[[int, FrameType | None], object]
-
-
-def signal_name(number: int) -> str:
-    """The name of a signal; a real-time signal has none of its own."""
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"SIGRTMIN+{number - signal.SIGRTMIN}"
-
-
-def ending_signals() -> frozenset[int]:
-    """Every signal that ends a process by default and that a handler can take."""
-    others = _numbers((*UNTOUCHED, *SUSPENDING, *OF_ERRORS))
-    return frozenset(map(int, signal.valid_signals())) - others
-
-
-def _numbers(names: Collection[str]) -> frozenset[int]:
-    return frozenset(int(getattr(signal, name)) for name in names if hasattr(signal, name))
-
-
-@contextmanager
-def handled(handle: Handler, *, but: str = "", always: str = "") -> Iterator[None]:
-    """While inside, signals that would end the process go to a handler instead.
-
-    A signal that the person ignores on purpose (nohup) stays ignored, unless keys send it or it is
-    the one named by `always`. One that other code of this process handles stays with it, and the
-    one named by `but`. Outside the main thread nothing changes.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    kept, wanted = _numbers((but,)), _numbers((*OF_KEYS, always)) | _taken
-    before = {number: signal.getsignal(number) for number in ending_signals() - kept}
-    before = {n: h for n, h in before.items() if h == signal.SIG_DFL or (n in wanted and h)}
-    new = before.keys() - _taken
-    _taken.update(new)
-    for number in before:
-        signal.signal(number, handle)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        _taken.difference_update(new)
-
 
 @contextmanager
 def never_suspended(tell: Callable[[str], None] | None = None) -> Iterator[None]:
@@ -97,12 +42,12 @@ def never_suspended(tell: Callable[[str], None] | None = None) -> Iterator[None]
     To be entered before threads start that belong to the line: what the main thread holds back
     here, they hold back too. Signals of errors that another program sends become SIGTERM.
     """
-    held = _numbers((*SUSPENDING, *OF_ERRORS))
+    held = signal_numbers((*SUSPENDING, *OF_ERRORS))
     main = threading.current_thread() is threading.main_thread()
     if not main or not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    over, suspending = threading.Event(), _numbers(SUSPENDING)
+    over, suspending = threading.Event(), signal_numbers(SUSPENDING)
 
     def wait() -> None:
         while (number := signal.sigwait(held)) and not over.is_set():

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
 
-from ..shared.signals import handled, signal_name
+from ..signals import handled, signal_name
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""Waiting times of commands for drives on a shared line."""
+"""Reading what arrives in time from a drive on a shared line."""
 
 from __future__ import annotations
 
@@ -7,19 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tui.bus.api import ModbusLine
     from tui.session.console import DriveConsole
     from tui.session.reading import Reading
-
-SLOW_CHARACTERS = 1200
-"""Characters that others may say meanwhile: at 1200 baud 11 s, at 19200 0.7 s."""
-
-
-def patience(line: ModbusLine, seconds: float) -> float:
-    """So many seconds, and longer on a slow line: what takes ten exchanges takes seconds there."""
-    from tui.bus.link import character_time
-
-    return seconds + SLOW_CHARACTERS * character_time(line.link)
 
 
 async def read_until(

@@ -1,0 +1,74 @@
+"""Signals that end a program, and their handlers."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+BY_SIGNAL = 128
+"""The exit status of a program that a signal ended, less the signal's number."""
+
+UNTOUCHED = (
+    "SIGKILL", "SIGSTOP", "SIGCHLD", "SIGCONT", "SIGINFO", "SIGPIPE", "SIGURG", "SIGWINCH",
+)  # fmt: skip
+"""No program catches the first two. The others end no process, SIGPIPE not in Python."""
+SUSPENDING = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
+"""A suspended program still holds its line, and does not stop its motor."""
+OF_ERRORS = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
+"""A handler would return to the instruction that failed, forever: sent by another program they
+end this one in order, caused by an error of its own they end it immediately."""
+OF_KEYS = ("SIGINT", "SIGQUIT")
+"""Ctrl-C and Ctrl-\\: a script ignores them for what it starts in the background."""
+
+_taken: set[int] = set()
+"""Signals that are handled here now."""
+
+Handler = Callable[[int, FrameType | None], object]
+
+
+def signal_name(number: int) -> str:
+    """The name of a signal; a real-time signal has none of its own."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"SIGRTMIN+{number - signal.SIGRTMIN}"
+
+
+def ending_signals() -> frozenset[int]:
+    """Every signal that ends a process by default and that a handler can take."""
+    others = signal_numbers((*UNTOUCHED, *SUSPENDING, *OF_ERRORS))
+    return frozenset(map(int, signal.valid_signals())) - others
+
+
+def signal_numbers(names: Collection[str]) -> frozenset[int]:
+    """The numbers of those that this system has."""
+    return frozenset(int(getattr(signal, name)) for name in names if hasattr(signal, name))
+
+
+@contextmanager
+def handled(handle: Handler, *, but: str = "", always: str = "") -> Iterator[None]:
+    """While inside, signals that would end the process go to a handler instead.
+
+    A signal that the person ignores on purpose (nohup) stays ignored, unless keys send it or it is
+    the one named by `always`. One that other code of this process handles stays with it, and the
+    one named by `but`. Outside the main thread nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    kept, wanted = signal_numbers((but,)), signal_numbers((*OF_KEYS, always)) | _taken
+    before = {number: signal.getsignal(number) for number in ending_signals() - kept}
+    before = {n: h for n, h in before.items() if h == signal.SIG_DFL or (n in wanted and h)}
+    new = before.keys() - _taken
+    _taken.update(new)
+    for number in before:
+        signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        _taken.difference_update(new)
