@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from tui.bus.api import LineState, LineStatus, LineWorker, ModbusLine, Priority
+from tests.line_events import on_event
+from tui.bus.api import LineStatus, LineWorker, ModbusLine, Priority
 from tui.bus.errors import (
     DeviceException,
     LineClosed,
@@ -21,6 +22,7 @@ from tui.bus.errors import (
 from tui.bus.fake import FakeLine
 from tui.bus.limits import CAUTIOUS, Limits
 from tui.bus.line import Line, Timing
+from tui.bus.line_events import StateChanged
 from tui.bus.link import RtuTcpLink
 from tui.bus.requests import Identify, Read, WriteOne
 from tui.wire.frames import frame
@@ -259,12 +261,12 @@ async def test_a_closed_line_says_so_and_ends_what_works_on_it(end: Open) -> Non
         here.call_soon_threadsafe(begun.set)
         await asyncio.sleep(600)
 
-    def note(state: LineState) -> None:
-        states.append(state.status)
+    def note(event: StateChanged) -> None:
+        states.append(event.state.status)
 
-    made.line.on_state(note)
-    unheard: list[LineState] = []
-    made.line.on_state(unheard.append)()
+    on_event(made.line.facts, StateChanged, note)
+    unheard: list[StateChanged] = []
+    on_event(made.line.facts, StateChanged, unheard.append)()
     worker: LineWorker = made.line.spawn(work, "work")
     await begun.wait()
     assert not worker.done()

@@ -12,9 +12,11 @@ import pytest
 import serial
 from pymodbus.client import AsyncModbusSerialClient
 
+from tests.line_events import on_event
 from tui.bus.api import LineState, LineStatus, Priority
 from tui.bus.errors import LineClosed, LineLost, PortBusy, PortMissing
 from tui.bus.line import Line, Timing
+from tui.bus.line_events import StateChanged
 from tui.bus.link import RtuTcpLink, SerialLink, TcpLink
 
 from .conftest import OpenLine
@@ -73,7 +75,7 @@ async def test_unplug_fails_everything_at_once_and_replug_mends_it(
     seen: list[LineState] = []
     with PtyPeer(silent, link=port) as peer:
         line = open_line(str(port), QUICK)
-        unsubscribe = line.on_state(seen.append)
+        unsubscribe = on_event(line.facts, StateChanged, lambda event: seen.append(event.state))
         requests = [
             asyncio.create_task(line.read(1, n, priority=Priority.OPERATOR_READ)) for n in range(3)
         ]

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.line_events import on_event
+from tui.bus.line_events import ProgramLost
 from tui.bus.share.heartbeat import Heartbeat
 from tui.bus.share.messages import Alive, Pulse, packed
 from tui.bus.share.place import Peer, owner_of, short_path
@@ -31,7 +33,7 @@ async def test_program_whose_loop_is_busy_for_a_moment_stays(share: Share) -> No
         lines = share(peer.path)
         holder, program = lines.open("keeper"), lines.open("run")
         gone: list[str] = []
-        holder.facts.on_gone(lambda item: gone.append(item.name))
+        on_event(holder.facts, ProgramLost, lambda event: gone.append(event.program.name))
         with frozen(program):
             await asyncio.sleep(SILENT_CLIENT + 0.7)
         assert (await program.read(1, 5)).words == (5,)
@@ -43,7 +45,7 @@ async def test_program_whose_loop_hangs_counts_as_gone(share: Share) -> None:
         lines = share(peer.path)
         holder, program = lines.open("keeper"), lines.open("run")
         gone: list[str] = []
-        holder.facts.on_gone(lambda item: gone.append(item.name))
+        on_event(holder.facts, ProgramLost, lambda event: gone.append(event.program.name))
         with frozen(program):
             patience = LOOP_HANGS + SILENT_CLIENT + 10.0
             await asyncio.to_thread(eventually, lambda: gone == ["run"], patience)
@@ -67,7 +69,7 @@ async def test_heartbeat_goes_on_after_its_connection_is_lost(
         lines = share(peer.path)
         holder, _ = lines.open("keeper"), lines.open("run")
         gone: list[str] = []
-        holder.facts.on_gone(lambda program: gone.append(program.name))
+        on_event(holder.facts, ProgramLost, lambda event: gone.append(event.program.name))
         await asyncio.to_thread(eventually, lambda: len(made) == 1)
         made[0].shutdown(socket.SHUT_RDWR)
         await asyncio.sleep(2 * SILENT_CLIENT)

@@ -10,10 +10,12 @@ from collections.abc import Sequence
 
 import pytest
 
+from tests.line_events import on_event
 from tui.bus.api import Priority
 from tui.bus.bounds import MOST_CARE
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Line
+from tui.bus.line_events import StopDue, WriteAbandoned
 from tui.bus.program import Program
 from tui.safety import LEASE_RENEWED_EVERY
 
@@ -111,7 +113,7 @@ async def test_a_drive_that_the_holder_cannot_stop_is_not_written(share: Share) 
 
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        holder.facts.holder.on_care(take)
+        holder.facts.accepts_care = take
         for care in (b"", b"garbage", bytes(MOST_CARE + 1)):
             program.facts.leases.arm(1, 60.0, care)
             assert "does not know how to stop drive 1" in await refusal(program)
@@ -157,7 +159,7 @@ async def test_the_next_holder_learns_how_to_stop_what_was_armed_before(share: S
         second.facts.release(2)
         await asyncio.to_thread(eventually, lambda: first.facts.commander(2) is None)
         for line in (first, second):
-            line.facts.holder.on_care(hear)
+            line.facts.accepts_care = hear
         await asyncio.to_thread(holder.close)
         await asyncio.to_thread(eventually, lambda: _meet(lines, [first, second]))
         # whichever holds the line hears how to stop what the other one has armed, and arms nothing
@@ -175,7 +177,7 @@ async def test_stop_stays_due_if_arming_ends_with_it(share: Share) -> None:
     due: list[tuple[int, ...]] = []
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
-        holder.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        on_event(holder.facts, StopDue, lambda event: due.append(event.devices))
         program.facts.leases.arm(1, 60.0, CARE)
         program.facts.give_stop([1], "the stop key")
         program.facts.leases.disarm(1)
@@ -203,7 +205,7 @@ async def test_a_stop_without_a_word_is_due_once_its_program_is_gone(share: Shar
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
         holder = lines.open("keeper")
-        holder.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        on_event(holder.facts, StopDue, lambda event: due.append(event.devices))
         for name in ("done", "gone"):
             program = lines.open(name)
             program.facts.give_stop([1], "the stop key")
@@ -220,11 +222,13 @@ async def test_a_write_whose_program_is_gone_reaches_the_holder_with_its_result(
     left: list[tuple[Program, object, float]] = []
     with PtyPeer(slow) as peer:
         holder, program = pair(share, peer)
-        holder.facts.holder.on_left(
-            lambda who, what, answer: answer.add_done_callback(
-                lambda done: left.append((who, what, done.result().time))
+
+        def hear(event: WriteAbandoned) -> None:
+            event.answer.add_done_callback(
+                lambda done: left.append((event.program, event.request, done.result().time))
             )
-        )
+
+        on_event(holder.facts, WriteAbandoned, hear)
         program.facts.leases.arm(1, None, CARE)
         writes = [asyncio.create_task(program.write(1, 1, [word])) for word in (RUN, RUN + 1)]
         await asyncio.to_thread(peer.await_requests, 1)
@@ -244,7 +248,7 @@ async def test_a_stop_is_not_due_any_more_once_its_drive_was_armed_again(share: 
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
         holder = lines.open("keeper", gated=True)
-        holder.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        on_event(holder.facts, StopDue, lambda event: due.append(event.devices))
         panel, runner = lines.open("panel"), lines.open("run")
         panel.facts.give_stop([1, 2], "the stop key")
         await asyncio.to_thread(eventually, lambda: runner.facts.stops.stamp(1) == 1)

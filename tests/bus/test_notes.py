@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tests.line_events import on_event
+from tui.bus.line_events import NoteReceived
 from tui.bus.notes import MOST_NOTE, MOST_NOTES, NOTES_KEPT, LineNote, Notes
 
 from .conftest import Share
@@ -67,7 +69,7 @@ async def test_a_program_that_asks_finds_what_one_that_left_has_noted(share: Sha
         heard: list[bytes] = []
         following = lines.open("watch")
         await following.read(1, 100)
-        following.facts.notes.on_note(lambda note: heard.append(note.data))
+        on_event(following.facts, NoteReceived, lambda event: heard.append(event.note.data))
         following.facts.notes.ask(1, "trend")
         eventually(lambda: heard == [b"one", b"two"])
 
@@ -86,6 +88,6 @@ async def test_the_next_holder_of_the_line_has_the_notes_of_programs_that_stay(
         third = lines.open("backup")
         await third.read(1, 100)
         heard: list[bytes] = []
-        third.facts.notes.on_note(lambda note: heard.append(note.data))
+        on_event(third.facts, NoteReceived, lambda event: heard.append(event.note.data))
         third.facts.notes.ask(1, "trend")
         eventually(lambda: heard == [b"kept"])

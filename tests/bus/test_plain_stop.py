@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.line_events import on_event
 from tui.bus.bounds import MOST_STOPPERS
 from tui.bus.line import Line
+from tui.bus.line_events import DevicesStopped, StopDue
 from tui.bus.program import Program
 from tui.bus.share.beside import (
     GIVEN,
@@ -60,7 +62,11 @@ async def stop_of(data: bytes) -> tuple[int, ...]:
 def heard_by(line: Line) -> list[Stop]:
     """The stops of others that a program hears of from now on."""
     heard: list[Stop] = []
-    line.facts.on_stop(lambda *stop: heard.append(stop))
+    on_event(
+        line.facts,
+        DevicesStopped,
+        lambda event: heard.append((event.devices, event.by, event.program)),
+    )
     return heard
 
 
@@ -132,7 +138,7 @@ async def test_plain_stop_reaches_every_program_as_from_one_that_is_not_attached
         before = {line: line.facts.stops.stamp(3) for line in (owner, other)}
         heard = [heard_by(owner), heard_by(other)]
         due: list[tuple[tuple[int, ...], str]] = []
-        owner.facts.holder.on_stop_due(lambda *stop: due.append(stop))
+        on_event(owner.facts, StopDue, lambda event: due.append((event.devices, event.by)))
         assert await asyncio.to_thread(give, lines, b" 3 4\n") == GIVEN
         eventually(lambda: all(heard))
         for ((devices, by, program),) in heard:
@@ -211,7 +217,7 @@ async def test_a_client_stops_by_a_connection_of_its_own(share: Share) -> None:
         owner, client = lines.open("panel"), lines.open("run")
         await client.read(1, 100)
         due: list[tuple[int, ...]] = []
-        owner.facts.holder.on_stop_due(lambda devices, _: due.append(devices))
+        on_event(owner.facts, StopDue, lambda event: due.append(event.devices))
         heard = heard_by(client)
         assert client.facts.voice is not None
         await asyncio.to_thread(client.facts.voice.stop_directly, (1, 3))

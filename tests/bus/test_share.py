@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.line_events import on_event
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import DeviceException, LineBusy, NoAnswer, RequestRefused
+from tui.bus.line_events import ControlAnswered, ControlDenied, ControlRequested
 from tui.bus.share.place import SharePlace
 from tui.wire.frames import frame
 
@@ -28,7 +30,7 @@ def slow(request: bytes, _count: int) -> Sequence[Step]:
     return [0.1, reply(request)]
 
 
-def note_denied(denied: list[str], name: str, _device: int, _why: str) -> None:
+def note_denied(denied: list[str], name: str, _event: ControlDenied) -> None:
     denied.append(name)
 
 
@@ -235,7 +237,7 @@ async def test_of_two_that_claim_at_once_one_is_informed_no(share: Share) -> Non
         programs = [lines.open(name) for name in ("one", "two")]
         denied: list[str] = []
         for line in programs:
-            line.facts.on_denied(partial(note_denied, denied, line.facts.me.name))
+            on_event(line.facts, ControlDenied, partial(note_denied, denied, line.facts.me.name))
         # neither can hear of the other's claim before its own is on its way
         with frozen(programs[0]), frozen(programs[1]):
             assert [line.facts.claim(4) for line in programs] == ["", ""]
@@ -265,9 +267,13 @@ async def test_a_question_reaches_the_commander_and_its_yes_frees_the_drive(shar
         lines.open("panel")
         holder, asker = lines.open("run"), lines.open("remote")
         answers: list[tuple[int, bool, str]] = []
-        asker.facts.on_reply(lambda *answer: answers.append(answer))
+        on_event(
+            asker.facts,
+            ControlAnswered,
+            lambda event: answers.append((event.device, event.granted, event.why)),
+        )
         questions: list[str] = []
-        holder.facts.on_question(lambda _, program: questions.append(program.id))
+        on_event(holder.facts, ControlRequested, lambda event: questions.append(event.program.id))
         holder.facts.claim(1)
         eventually(lambda: asker.facts.commander(1) is not None)
         asker.facts.ask_for(1)

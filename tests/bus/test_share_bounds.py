@@ -14,10 +14,12 @@ import msgspec
 import pytest
 from msgspec import inspect
 
+from tests.line_events import on_event
 from tui.bus.api import Priority
 from tui.bus.bounds import MOST_STOPPERS, STOPS_WRAP
 from tui.bus.limits import CAUTIOUS, Limits, Window
 from tui.bus.line import Line
+from tui.bus.line_events import DevicesStopped, NoticeReceived
 from tui.bus.model import DeviceCounters, DeviceState, LineCounters, LineState, LineStatus
 from tui.bus.poll_plan import PlannedRead, PollPlan
 from tui.bus.program import Program
@@ -158,7 +160,7 @@ async def voided_and_stopped(lines: SharedLines, peer: PtyPeer, stopper: Line, o
     eventually(lambda: stopper.facts.stops.stamp(device) == other.facts.stops.stamp(device))
     heard: list[tuple[int, ...]] = []
     seen = len(peer.requests)
-    leave = other.facts.on_stop(lambda devices, _by, _who: heard.append(devices))
+    leave = on_event(other.facts, DevicesStopped, lambda event: heard.append(event.devices))
     stamp = other.facts.stops.stamp(device)
     stopper.facts.give_stop([device], "the stop key")
     await asyncio.wait_for(stopper.write(device, 1, [STOP], priority=Priority.STOP), timeout=20)
@@ -399,11 +401,11 @@ async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
 
 def test_texts_of_other_programs_are_shown_plain_and_not_endless() -> None:
     facts, heard = SharedState(), list[str]()
-    facts.on_text(lambda _, text: heard.append(text))
-    facts.on_stop(lambda _, by, program: heard.extend((by, program.text)))
+    on_event(facts, NoticeReceived, lambda event: heard.append(event.text))
+    on_event(facts, DevicesStopped, lambda event: heard.extend((event.by, event.program.text)))
     program = Program("x", "\x1b[31m" + "n" * 100, 7, "", "pts/\x07" + "3" * 100)
-    facts.hear_text(1, "stopped\x1b]0;title\x07\n" + "t" * 4000)
-    facts.hear_stop((1,), "\u202ekey\r" + "k" * 4000, program)
+    facts.events.emit(NoticeReceived(1, "stopped\x1b]0;title\x07\n" + "t" * 4000))
+    facts.events.emit(DevicesStopped((1,), "\u202ekey\r" + "k" * 4000, program))
     assert [len(item) for item in heard] == [500, 500, 40 + len(" on ") + 40 + len(" (pid 7)")]
     assert all(item.isprintable() for item in heard)
     assert heard[0].startswith("stopped?]0;title??ttt")

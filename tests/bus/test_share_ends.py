@@ -19,9 +19,11 @@ from typing import TypeVar
 import msgspec
 import pytest
 
+from tests.line_events import on_event
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineClosed, LineLost, NotShared
 from tui.bus.line import Line
+from tui.bus.line_events import ProgramLost, StateChanged
 from tui.bus.program import Program
 from tui.bus.share.messages import (
     VERSION,
@@ -130,7 +132,7 @@ async def test_a_killed_owner_is_followed_once_no_reply_to_it_may_come(
         line = lines.open("watch", timing=replace(QUICK, late_reply=1.0))
         line.describe(1, NO_ECHO)
         gone: list[str] = []
-        line.facts.on_gone(lambda program: gone.append(program.name))
+        on_event(line.facts, ProgramLost, lambda event: gone.append(event.program.name))
         owner.tell(f"write {SLOW_REGISTER} 5")
         await come(lambda: times_sent(peer, 6) == 1)
         killed = await asyncio.to_thread(owner.kill)
@@ -210,7 +212,7 @@ async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
         eventually(lambda: line.facts.commander(4) is not None)
         gone: list[str] = []
         for item in (line, third):
-            item.facts.on_gone(lambda program: gone.append(program.name))
+            on_event(item.facts, ProgramLost, lambda event: gone.append(event.program.name))
         os.kill(run.process.pid, number)
         os.kill(owner.process.pid, 9)
         eventually(lambda: sorted(gone) == ["panel", "run"])
@@ -579,7 +581,7 @@ async def test_a_full_disk_does_not_keep_a_line_closed(
         seen: list[LineStatus] = []
         line = Line(lines.link, timing=QUICK, place=place_in(lines.folder))
         lines.opened.append(line)
-        line.on_state(lambda state: seen.append(state.status))
+        on_event(line.facts, StateChanged, lambda event: seen.append(event.state.status))
         line.open(wait=30.0)
         assert (await line.read(1, 100)).words == (100,)
         assert LineStatus.LOST not in seen

@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 
+from tests.line_events import on_event
 from tui.bus.api import LineStatus
 from tui.bus.errors import LineError
+from tui.bus.line_events import ControlDenied, ProgramLost, StateChanged
 from tui.bus.share.client import STOOD_STILL
 from tui.safety import SILENT_OWNER
 
@@ -40,8 +42,10 @@ async def test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_m
         owner, other, third = (lines.open(name) for name in ("watch", "run", "panel"))
         gone: list[str] = []
         denied: list[str] = []
-        owner.facts.on_gone(lambda program: gone.append(program.name))
-        other.facts.on_denied(lambda device, why: denied.append(f"{device}: {why}"))
+        on_event(owner.facts, ProgramLost, lambda event: gone.append(event.program.name))
+        on_event(
+            other.facts, ControlDenied, lambda event: denied.append(f"{event.device}: {event.why}")
+        )
         assert other.facts.claim(1) == ""
         eventually(lambda: owner.facts.commander(1) is not None)
         with frozen(other):
@@ -65,7 +69,7 @@ async def test_clients_of_an_owner_that_stood_still_itself_are_kept(share: Share
         lines = share(peer.path)
         owner, other = lines.open("watch"), lines.open("run")
         gone: list[str] = []
-        owner.facts.on_gone(lambda program: gone.append(program.name))
+        on_event(owner.facts, ProgramLost, lambda event: gone.append(event.program.name))
         other.facts.claim(1)
         eventually(lambda: owner.facts.commander(1) is not None)
         with frozen(other):
@@ -84,7 +88,7 @@ async def test_a_client_that_has_nothing_to_say_is_kept(share: Share) -> None:
         lines = share(peer.path)
         owner, _ = lines.open("watch"), lines.open("panel")
         gone: list[str] = []
-        owner.facts.on_gone(lambda program: gone.append(program.name))
+        on_event(owner.facts, ProgramLost, lambda event: gone.append(event.program.name))
         await asyncio.sleep(2.8)
         assert gone == []
 
@@ -106,7 +110,7 @@ async def test_a_disk_that_hangs_holds_up_neither_the_line_nor_its_signs_of_life
         try:
             await come(hangs.is_set)
             reasons: list[str] = []
-            other.on_state(lambda state: reasons.append(state.reason))
+            on_event(other.facts, StateChanged, lambda event: reasons.append(event.state.reason))
             for count in range(1, 8):
                 assert (await other.read(1, 5, count)).words == tuple(range(5, 5 + count))
                 await asyncio.sleep(SILENT_OWNER / 4)

@@ -10,9 +10,11 @@ from functools import partial
 
 import pytest
 
+from tests.line_events import on_event
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineError, LineLost, NoAnswer, RequestRefused
 from tui.bus.line import Line
+from tui.bus.line_events import DevicesStopped, StateChanged
 from tui.bus.program import KEEPER
 from tui.bus.share.owner_watch import OTHER_CONTAINER
 from tui.bus.share.place import owner_of
@@ -97,10 +99,10 @@ async def test_each_is_reported_a_stop_once_and_by_which_program(share: Share) -
         for line in programs:
             me = line.facts.me.name
 
-            def hear(_devices: object, _by: str, program: object, me: str = me) -> None:
-                heard.append((me, getattr(program, "name", "")))
+            def hear(event: DevicesStopped, me: str = me) -> None:
+                heard.append((me, event.program.name))
 
-            line.facts.on_stop(hear)
+            on_event(line.facts, DevicesStopped, hear)
         for number, line in enumerate(programs, 1):
             line.facts.give_stop([1, 2], "a key")
             eventually(partial(all_know, programs, 2 * number))
@@ -151,7 +153,7 @@ async def test_a_stop_that_nobody_could_hear_is_heard_on_coming_back(share: Shar
         first, second = lines.open("one"), lines.open("two")
         heard: list[str] = []
         for line in (first, second):
-            line.facts.on_stop(lambda devices, _by, _program: heard.append(str(devices)))
+            on_event(line.facts, DevicesStopped, lambda event: heard.append(str(event.devices)))
         with frozen(first), frozen(second):
             owner.close()
             first.facts.give_stop([1], "its key")
@@ -315,7 +317,7 @@ async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share
         lines.open("run")
         other = lines.open("remote")
         output: list[str] = []
-        other.on_state(lambda state: output.append(state.reason))
+        on_event(other.facts, StateChanged, lambda event: output.append(event.state.reason))
         with frozen(other):
             await asyncio.sleep(1.3)
         await other.read(1, 1)

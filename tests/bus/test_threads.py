@@ -164,12 +164,12 @@ def test_worker_may_close_the_line_that_it_works_in(open_line: OpenLine) -> None
 def test_listener_that_fails_does_no_harm(
     open_line: OpenLine, caplog: pytest.LogCaptureFixture
 ) -> None:
-    def listen(_state: object) -> None:
+    def listen(_event: object) -> None:
         raise ValueError("on purpose")
 
     with PtyPeer(honest) as peer:
         line = Line(SerialLink(peer.path))
-        line.on_state(listen)
+        line.facts.events.subscribe(listen)
         line.open(wait=5.0)
         assert asyncio.run(line.read(1, 5)).words == (5,)
         line.close()

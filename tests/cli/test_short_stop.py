@@ -18,7 +18,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as some
 
+from tests.line_events import on_event
 from tui.bus.errors import LinkSyntaxError
+from tui.bus.line_events import DevicesStopped
 from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, label, parse_link
 from tui.bus.program import KEEPER, Program
 from tui.bus.share.messages import VERSION
@@ -386,7 +388,11 @@ def test_short_stop_is_heard_by_the_holder() -> None:
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         with closing(open_line(line, wait=10, program="panel")) as opened:
             heard: list[tuple[tuple[int, ...], str]] = []
-            opened.line.facts.on_stop(lambda devices, by, _program: heard.append((devices, by)))
+            on_event(
+                opened.line.facts,
+                DevicesStopped,
+                lambda event: heard.append((event.devices, event.by)),
+            )
             stop_at_once(["stop", line, "-d", "2", "-d", "3"])
             assert heard == [((2, 3), "drivepanel stop")]
 

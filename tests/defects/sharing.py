@@ -70,7 +70,7 @@ DEFECTS = (
     Defect(
         "care-that-is-of-no-use",
         "tui/bus/share/commanding.py",
-        "known = not care or other or facts.holder.hear_care(device, care)",
+        "known = not care or other or facts.accepts_care(device, care)",
         "known = True",
         "A motor starts that the keeper of the line cannot stop.",
         (LEASES,),
@@ -561,8 +561,8 @@ DEFECTS = (
     Defect(
         "trend-of-another-drive",
         "tui/session/monitor/trend_notes.py",
-        "if (note.device, note.kind) != (self._device, self._kind):",
-        "if note.device != self._device:",
+        "if (note.device, note.kind) == (self._device, self._kind):",
+        "if note.device == self._device:",
         "Monitor shows the trend of the drive that had the address before.",
         (
             "tests/session/test_trend_notes.py::test_a_trend_of_another_family_at_the_same_address"

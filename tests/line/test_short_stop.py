@@ -12,7 +12,9 @@ from functools import partial
 
 import pytest
 
+from tests.line_events import on_event
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, keepers, served, wait_until
+from tui.bus.line_events import DevicesStopped
 from tui.bus.program import Program
 from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
@@ -46,10 +48,10 @@ def stops_heard(facts: SharedState) -> list[tuple[tuple[int, ...], Program, bool
     """Stops of others from now on: of which devices, by whom, and True if that one is attached."""
     heard: list[tuple[tuple[int, ...], Program, bool]] = []
 
-    def hear(devices: tuple[int, ...], _by: str, program: Program) -> None:
-        heard.append((devices, program, program in facts.programs))
+    def hear(event: DevicesStopped) -> None:
+        heard.append((event.devices, event.program, event.program in facts.programs))
 
-    facts.on_stop(hear)
+    on_event(facts, DevicesStopped, hear)
     return heard
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import tui.session.api as api
+from tui.bus.line_events import DevicesStopped
 from tui.bus.program import Program
 from tui.session.api import (
     AsyncDrive,
@@ -221,11 +222,11 @@ def test_a_stop_of_another_program_voids_what_follows_inside_the_block_alone(
     """A script that lives on may arm again; one stop is told of more than once."""
     facts = line._calls.line.facts
     other = Program("another's id", "stop", 4711)
-    facts.hear_stop((1,), "drivepanel stop", other)
+    facts.events.emit(DevicesStopped((1,), "drivepanel stop", other))
     with drive.armed():
         assert "5" in drive.write({"ACC": 5})["ACC"]
         for _ in range(2):
-            facts.hear_stop((1,), "drivepanel stop", other)
+            facts.events.emit(DevicesStopped((1,), "drivepanel stop", other))
         with pytest.raises(NotArmed, match="Stopped: no longer armed"):
             drive.write({"ACC": 6})
         with pytest.raises(NotArmed, match="Stopped: no longer armed"):

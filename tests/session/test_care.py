@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from tui.bus.fake import FakeLine
+from tui.bus.line_events import StopDue, WriteAbandoned
 from tui.bus.model import Reply
 from tui.bus.requests import Diagnose, ReadWrite, Request, WriteMany, WriteOne
 from tui.drive.errors import ProfileError
@@ -44,7 +45,7 @@ def guard(bench: Bench) -> OrphanMotorGuard:
 def arm(bench: Bench, device: int, family: str) -> None:
     """A program arms a drive."""
     care = packed_care(library.load(family), None, guessed=False)
-    assert bench.line.facts.holder.hear_care(device, care)
+    assert bench.line.facts.accepts_care(device, care)
 
 
 @pytest.mark.parametrize("family", [listing.id for listing in library.listings()])
@@ -66,9 +67,9 @@ def test_care_that_stops_nothing_is_refused(
 ) -> None:
     care, line, _ = kept
     data = msgspec.msgpack.decode(CARE, type=CareData)
-    assert line.facts.holder.hear_care(1, CARE)
+    assert line.facts.accepts_care(1, CARE)
     for wrong in (b"", b"\xc1", CARE[:-20], msgspec.msgpack.encode(replace_profile(data, b"{}"))):
-        assert not line.facts.holder.hear_care(1, wrong)
+        assert not line.facts.accepts_care(1, wrong)
     session = care.session(1)
     assert session is not None
     assert session.profile.id == "atv71"
@@ -83,7 +84,7 @@ def test_a_guessed_family_stays_one(kept: tuple[DrivesInCare, FakeLine, Journal]
     care, line, _ = kept
     session = DriveSession(line, 1, library.load("varmeca"))
     session.guessed = True
-    assert line.facts.holder.hear_care(1, session.care())
+    assert line.facts.accepts_care(1, session.care())
     found = care.session(1)
     assert found is not None
     assert found.guessed
@@ -93,11 +94,11 @@ def test_writes_left_by_a_program_are_in_the_journal_with_their_answers(
     kept: tuple[DrivesInCare, FakeLine, Journal],
 ) -> None:
     _, line, journal = kept
-    line.facts.holder.hear_care(1, CARE)
+    line.facts.accepts_care(1, CARE)
 
     def left(request: Request) -> Future[Reply]:
         answer: Future[Reply] = Future()
-        line.facts.holder.hear_left(GONE, request, answer)
+        line.facts.events.emit(WriteAbandoned(GONE, request, answer))
         return answer
 
     left(WriteOne(1, 8501, 15)).set_result(Reply((), 0.0, b""))
@@ -122,7 +123,7 @@ async def test_a_stop_that_is_due_is_carried_out(bench: Bench) -> None:
     arm(bench, 1, "atv71")
     loop = bench.line._engine._loop
     assert loop is not None
-    loop.call_soon_threadsafe(bench.line.facts.holder.hear_stop_due, (1, 9), "drivepanel stop")
+    loop.call_soon_threadsafe(bench.line.facts.events.emit, StopDue((1, 9), "drivepanel stop"))
     await come(lambda: guardian.busy)
     await bench.stopped(1)
     await come(lambda: not guardian.busy)
@@ -154,7 +155,7 @@ async def test_a_drive_that_nobody_has_armed_is_not_stopped_by_a_start_on_record
     guardian = guard(bench)
     loop = bench.line._engine._loop
     assert loop is not None
-    loop.call_soon_threadsafe(bench.line.facts.holder.hear_stop_due, (1,), "drivepanel stop")
+    loop.call_soon_threadsafe(bench.line.facts.events.emit, StopDue((1,), "drivepanel stop"))
     await come(lambda: guardian._workers != [])
     await come(lambda: not guardian.busy)
     assert bench.turns(1)

@@ -13,10 +13,12 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
+from tests.line_events import on_event
 from tests.programs import wait_until
 from tui.bus.gateway.server import TcpRequest
 from tui.bus.gateway.talk import TcpClient
 from tui.bus.line import Line
+from tui.bus.line_events import DevicesStopped, NoticeReceived
 from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.gateway.gateway import Gateway
@@ -326,7 +328,7 @@ async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Ma
     made = bench(commands=True)
     assert await made.write(LFR, 300) == 0
     facts = made.line.facts
-    facts.hear_stop((1,), "the stop key", PANEL)
+    facts.events.emit(DevicesStopped((1,), "the stop key", PANEL))
     assert 1 not in facts.commanders
     sent = len(made.written())
     assert await made.write(CMD, 0x000F) == 6
@@ -338,7 +340,7 @@ async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Ma
 async def test_a_client_that_is_gone_commands_nothing_and_all_are_reported(bench: Make) -> None:
     made = bench(commands=True)
     output: list[str] = []
-    made.line.facts.on_text(lambda _, text: output.append(text))
+    on_event(made.line.facts, NoticeReceived, lambda event: output.append(event.text))
     assert await made.write(LFR, 300) == 0
     made.gateway.gone(made.client)
     assert 1 not in made.line.facts.commanders
@@ -392,7 +394,7 @@ async def test_requests_from_a_suspension_only_stop(bench: Make) -> None:
 async def test_a_second_client_that_commands_the_drive_is_reported(bench: Make) -> None:
     made = bench(commands=True)
     output: list[str] = []
-    made.line.facts.on_text(lambda _, text: output.append(text))
+    on_event(made.line.facts, NoticeReceived, lambda event: output.append(event.text))
     assert await made.write(LFR, 300) == 0
     assert await made.write(LFR, 310) == 0
     assert output == []

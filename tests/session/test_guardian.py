@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from tests.bus.peer import eventually
+from tests.line_events import on_event
 from tui.bus.line import Line
+from tui.bus.line_events import NoticeReceived, ProgramLost
 from tui.bus.link import RtuTcpLink, label
 from tui.bus.program import Program
 from tui.drive.profile import library
@@ -61,7 +63,11 @@ class Bench:
         self.journal = Journal()
         self.events = EventLog()
         self.reported: list[tuple[int, str]] = []
-        self.line.facts.on_text(lambda device, text: self.reported.append((device, text)))
+        on_event(
+            self.line.facts,
+            NoticeReceived,
+            lambda event: self.reported.append((event.device, event.text)),
+        )
 
     def guardian(self, *, person: bool = False) -> OrphanMotorGuard:
         """The guardian of this program, which is a panel if there is a `person`."""
@@ -368,9 +374,9 @@ async def test_a_drive_whose_profile_is_not_here_is_reported(bench: Bench) -> No
 
 async def test_after_the_line_was_closed_nothing_is_looked_after(bench: Bench) -> None:
     bench.started(1)
-    guardian = bench.guardian()
+    bench.guardian()
     await asyncio.to_thread(bench.line.close)
-    guardian.gone(GONE)
+    bench.line.facts.events.emit(ProgramLost(GONE))
     assert bench.reported == []
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
+from tui.bus.line_events import ControlDenied, ControlRequested, DevicesStopped
 from tui.bus.program import Program
 from tui.bus.share.messages import AnyMessage, Armed, Claim, DriveRequested, RequestGranted
 from tui.bus.share.publishers import LinePublisher
@@ -148,25 +149,25 @@ async def test_an_arming_that_ends_by_itself_gives_the_drive_back(bench: Bench) 
 async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Bench) -> None:
     bench.session.arming.arm()
     commanded_there(bench)
-    bench.facts.hear_denied(1, "Drive 1 is commanded by panel on pts/9 (pid 77).")
+    bench.facts.events.emit(ControlDenied(1, "Drive 1 is commanded by panel on pts/9 (pid 77)."))
     assert not bench.session.arming.armed
     assert "pts/9" in bench.session.arming.refusal()
     # another drive's is not this one's business
     bench.facts.note_commander(1, None)
     bench.session.arming.arm()
-    bench.facts.hear_denied(2, "no")
+    bench.facts.events.emit(ControlDenied(2, "no"))
     assert bench.session.arming.armed
 
 
 async def test_a_stop_of_another_program_ends_arming_and_work_and_is_reported(bench: Bench) -> None:
     bench.session.arming.arm()
     before = bench.session.work.stops
-    bench.facts.hear_stop((1,), "the stop key", REMOTE)
+    bench.facts.events.emit(DevicesStopped((1,), "the stop key", REMOTE))
     assert not bench.session.arming.armed
     assert bench.session.work.stops == before + 1
     assert any("Stop from panel on pts/9 (pid 77)" in text for text in bench.reported)
     bench.session.arming.arm()
-    bench.facts.hear_stop((2,), "the stop key", REMOTE)
+    bench.facts.events.emit(DevicesStopped((2,), "the stop key", REMOTE))
     assert bench.session.arming.armed
 
 
@@ -175,7 +176,7 @@ async def test_a_stop_of_another_program_ends_arming_and_work_and_is_reported(be
 
 async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> None:
     bench.session.arming.arm()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     request = bench.handover.requests[1]
     assert request.program == REMOTE
     assert any("asks for this drive. G answers" in text for text in bench.reported)
@@ -194,7 +195,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
 
 async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
     bench.session.arming.arm()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(bench.handover.requests[1], yes=False)
     assert bench.answers == [("reply", 1, REMOTE.id, False)]
     assert bench.session.arming.armed
@@ -207,7 +208,7 @@ async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
     bench: Bench, status: int | None, yes: bool
 ) -> None:
     bench.session.arming.arm()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     await asyncio.sleep(0.05)
     bench.clock.advance(REQUEST_ANSWERED_WITHIN + 1)
     if status is not None:
@@ -219,9 +220,9 @@ async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
 
 async def test_an_answered_question_does_not_expire_into_another_answer(bench: Bench) -> None:
     bench.session.arming.arm()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(bench.handover.requests[1], yes=False)
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     await expires(bench)
     await asyncio.sleep(0.05)
     assert [answer[3] for answer in bench.answers] == [False, False]
@@ -234,19 +235,19 @@ async def test_a_command_without_a_person_decides_at_once(
     bench.handover.person = False
     if status is not None:
         bench.shows(status)
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     assert bench.answers == [("reply", 1, REMOTE.id, yes)]
 
 
 async def test_a_question_about_a_drive_that_is_not_known_here_is_a_no(bench: Bench) -> None:
     bench.handover.person = False
-    bench.facts.hear_question(4, REMOTE)
+    bench.facts.events.emit(ControlRequested(4, REMOTE))
     assert bench.answers == [("reply", 4, REMOTE.id, False)]
 
 
 async def test_the_question_of_a_program_that_has_gone_is_over(bench: Bench) -> None:
     bench.session.arming.arm()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     request = bench.handover.requests[1]
     bench.facts.set_programs((bench.facts.me,))
     assert bench.handover.requests == {}
@@ -256,7 +257,7 @@ async def test_the_question_of_a_program_that_has_gone_is_over(bench: Bench) -> 
     assert bench.reported[-1].startswith("Not given: ")
     # the answer to it is none to the next question
     bench.facts.set_programs((bench.facts.me, REMOTE))
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(request, yes=True)
     assert bench.answers == []
 
@@ -266,7 +267,7 @@ async def given_while_it_runs(bench: Bench) -> None:
     bench.starts.sent(bench.session)
     bench.session.arming.arm()
     bench.session.note_command()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(bench.handover.requests[1], yes=True)
     assert not bench.session.arming.armed
 
@@ -312,7 +313,7 @@ async def test_drive_of_another_commander_does_not_run(
     commanded_there(bench)
     assert not bench.session.commanded
     bench.session.note_command()
-    bench.facts.hear_question(1, REMOTE)
+    bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(bench.handover.requests[1], yes=True)
     assert not bench.session.commanded
 

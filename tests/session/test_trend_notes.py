@@ -7,6 +7,7 @@ import math
 import msgspec
 import pytest
 
+from tui.bus.line_events import NoteReceived
 from tui.bus.notes import LineNote
 from tui.bus.program import Program
 from tui.bus.share.messages import LENGTH, AnyMessage, packed, unpacked
@@ -37,7 +38,7 @@ class LineHolder:
                 self.facts.notes.keep(message)
             else:
                 for note in self.facts.notes.of(message.device, message.kind):
-                    facts.notes.hear(note)
+                    facts.events.emit(NoteReceived(note))
 
         facts.voice = LinePublisher(send)
         return facts
@@ -49,7 +50,7 @@ class TrendOf:
     def __init__(self, holder: LineHolder, name: str, family: str = "atv71") -> None:
         self.trend = Trend(library.load(family))
         self.facts = holder.program(name)
-        self.notes = TrendNotes(self.facts.notes, 2, self.trend)
+        self.notes = TrendNotes(self.facts, 2, self.trend)
 
     def add(self, *times: float) -> None:
         """Points whose frequency is their time."""
@@ -98,7 +99,9 @@ def test_a_trend_of_another_family_at_the_same_address_is_not_taken() -> None:
     following = TrendOf(holder, "next", "atv31")
     following.notes.ask()
     for note in holder.facts.notes.all:
-        following.facts.notes.hear(note)  # another part of the same program asked for it
+        following.facts.events.emit(
+            NoteReceived(note)
+        )  # another part of the same program asked for it
     following.add(110.0)
     assert following.times == [110.0]
 
@@ -109,7 +112,7 @@ def test_notes_of_a_profile_with_long_names_are_messages_too() -> None:
     panel.trend = Trend(library.load("atv71"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Trend, "kind", "x" * 1000)
-        panel.notes = TrendNotes(panel.facts.notes, 2, panel.trend)
+        panel.notes = TrendNotes(panel.facts, 2, panel.trend)
     panel.add(100.0, 103.0)
     (note,) = holder.facts.notes.all
     assert unpacked(packed(note)[LENGTH:]) == note

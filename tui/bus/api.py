@@ -96,7 +96,7 @@ class ModbusLine(Protocol):
 
     @property
     def facts(self) -> SharedState:
-        """State shared by the programs on the line: commanders, stops."""
+        """State shared by the programs on the line: commanders, stops; and the line's events."""
 
     @property
     def state(self) -> LineState:
@@ -215,6 +215,3 @@ class ModbusLine(Protocol):
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         """Run a coroutine in the line's own loop; it ends with the line. Raises LineClosed."""
-
-    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
-        """Call `listener` in the line's thread at each new state; returns how to end that."""

@@ -27,6 +27,7 @@ from .errors import ExchangeError, LineClosed, LineError, LineLost, NoAnswer, Re
 from .expectation import IDENTIFY
 from .fake_device import FakeDevice, PlannedFailure
 from .limits import CAUTIOUS, Limits, send_refusal
+from .line_events import StateChanged
 from .link import Link, SerialLink
 from .model import (
     DeviceState,
@@ -90,7 +91,6 @@ class FakeLine:
         self.trace: tuple[Frame, ...] = ()
         """No frames are made; may be set."""
         self._clock = clock
-        self._listeners: list[Callable[[LineState], None]] = []
         self._workers: list[LineWorker] = []
 
     # What is to happen
@@ -135,10 +135,9 @@ class FakeLine:
         self.devices[device].silent = silent
 
     def become(self, status: LineStatus, reason: str = "") -> None:
-        """Lose the line, regain it; notifies the listeners."""
+        """Lose the line, or regain it."""
         self.state = LineState(status, reason, self._clock())
-        for listener in tuple(self._listeners):
-            listener(self.state)
+        self.facts.events.emit(StateChanged(self.state))
 
     # A line
 
@@ -276,11 +275,6 @@ class FakeLine:
         worker: LineWorker = asyncio.get_running_loop().create_task(work(), name=name)
         self._workers.append(worker)
         return worker
-
-    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
-        """Call `listener` at each new state."""
-        self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener)
 
     # One exchange
 

@@ -260,10 +260,6 @@ class Line:
         """
         return self._engine.spawn(work, name)
 
-    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
-        """Call `listener` in the line's thread at each new state; returns how to end that."""
-        return self._engine.on_state(listener)
-
     async def _ask(
         self,
         request: Request,

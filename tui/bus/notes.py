@@ -11,7 +11,6 @@ import msgspec
 from msgspec import Meta
 
 from .bounds import DeviceId
-from .state_listeners import LineListeners
 
 if TYPE_CHECKING:
     from .share.messages import AnyMessage
@@ -55,9 +54,6 @@ class Notes:
         self._kept: dict[LineNote, float] = {}
         """When each note came, the oldest first."""
         self._size = 0
-        self.on_note: LineListeners[[LineNote]] = LineListeners()
-        """A note that was asked for has come."""
-        self.hear = self.on_note.tell
 
     def leave(self, note: LineNote) -> None:
         """Leave a note from here."""
@@ -65,7 +61,7 @@ class Notes:
         self._tell(note)
 
     def ask(self, device: int, kind: str) -> None:
-        """Pass the notes of a device and kind to a listener; they come one by one."""
+        """Request the notes of a device and kind; a NoteReceived follows for each."""
         self._tell(LineNote(device, kind))
 
     def keep(self, note: LineNote) -> None:

@@ -7,12 +7,21 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
+from .line_events import (
+    ControlAnswered,
+    DevicesStopped,
+    EventHub,
+    LineEvent,
+    NoticeReceived,
+    ProgramLost,
+    ProgramsChanged,
+)
 from .notes import Notes
 from .program import KEEPER, Program
 from .share.messages import (
@@ -25,21 +34,16 @@ from .share.messages import (
     StopGiven,
 )
 from .share.publishers import LinePublisher
-from .state_listeners import HolderHeard, StateListeners
 from .stop_counts import GivenStops, StopCounts
 
 DEPARTED_KEPT = 16
 """Number of departed programs that are remembered."""
 
 
-class SharedState(StateListeners):
-    """The facts of one line. May be used from any thread; mappings are replaced, never changed.
-
-    Listeners are called in the line's thread.
-    """
+class SharedState:
+    """The facts of one line. May be used from any thread; mappings are replaced, never changed."""
 
     def __init__(self, me: Program | None = None) -> None:
-        super().__init__()
         self.me = me or Program("here", "drivepanel", os.getpid())
         self.programs: tuple[Program, ...] = (self.me,)
         """All on the line, the owner first."""
@@ -59,14 +63,19 @@ class SharedState(StateListeners):
         """Why this program holds the line in place of a keeper; empty where that is meant so."""
         self.gated = False
         """True on a line where nothing is written to a device that its program has not armed."""
-        self.holder = HolderHeard()
-        """Hears what only the holder of the line learns."""
+        self.events = EventHub()
+        """Passes on what happens on the line."""
+        self.accepts_care: Callable[[int, bytes], bool] = accepts_any_care
+        """True if this program can stop a device by the care for it, should it hold the line.
+
+        Called in the line's thread; set by what stops the motors of other programs.
+        """
         self.departed: tuple[Program, ...] = ()
         """Programs that have left the line, the last ones last."""
         self.voice: LinePublisher | None = None
         """None while nobody else hears of it."""
         self._lock = threading.RLock()
-        self.on_stop(lambda devices, _by, _program: self._leave_alone_no_more(devices))
+        self.events.subscribe(self._end_pauses)
 
     # Who is there
 
@@ -121,13 +130,13 @@ class SharedState(StateListeners):
             stay = [program for program in self.departed if program.id not in here]
             self.departed = (*stay, *left)[-DEPARTED_KEPT:]
             self.programs = programs
-        self.on_change.tell()
+        self.events.emit(ProgramsChanged())
 
     # What all are to read
 
     def tell_all(self, device: int, text: str) -> None:
         """Have every program on the line show its person a message about a device."""
-        self.hear_text(device, text)
+        self.events.emit(NoticeReceived(device, text))
         self._tell(Notified(device, text[:MOST_TEXT]))
 
     def _tell(self, message: AnyMessage) -> None:
@@ -153,10 +162,11 @@ class SharedState(StateListeners):
             rest = {d: pair for d, pair in self.paused.items() if d != device}
             self.paused = MappingProxyType({**rest, device: (program, why)} if why else rest)
 
-    def _leave_alone_no_more(self, devices: Iterable[int]) -> None:
+    def _end_pauses(self, event: LineEvent) -> None:
         """A stop ends a pause of polling: the device is read until it is at standstill."""
-        for device in devices:
-            self.note_pause(device, "", "")
+        if isinstance(event, DevicesStopped):
+            for device in event.devices:
+                self.note_pause(device, "", "")
 
     # Stops
 
@@ -165,7 +175,8 @@ class SharedState(StateListeners):
         stopped = tuple(devices)
         # counted before it is told: a program that attaches in between tells the counts
         self.stops.give(self.me.id, stopped, by)
-        self._leave_alone_no_more(stopped)
+        for device in stopped:
+            self.note_pause(device, "", "")
         when = max(self.stops.times.get(number, 0.0) for number in stopped) if stopped else None
         counts = self.stops.of(self.me.id, stopped)
         self._tell(StopGiven(stopped, counts, by[:MOST_TEXT], self.me, when))
@@ -203,7 +214,7 @@ class SharedState(StateListeners):
             if program is not None:
                 held[device] = program
             self.commanders = MappingProxyType(held)
-        self.on_change.tell()
+        self.events.emit(ProgramsChanged())
 
     # Taking over
 
@@ -221,7 +232,7 @@ class SharedState(StateListeners):
         """The program that commands a device has answered."""
         if yes:
             self.note_commander(device, None)
-        self.on_reply.tell(device, yes, why)
+        self.events.emit(ControlAnswered(device, yes, why))
 
     # Programs that went away
 
@@ -236,7 +247,7 @@ class SharedState(StateListeners):
         self.leases.end(program.id)
         self.keep_alives.end(program.id)
         self.set_programs(rest)
-        self.on_gone.tell(program)
+        self.events.emit(ProgramLost(program))
 
     # What may go out
 
@@ -256,6 +267,11 @@ class SharedState(StateListeners):
                 if other is not None:
                     return commanded_by(commander, other)
         return self.leases.refusal(program, device) if writes and self.gated else ""
+
+
+def accepts_any_care(_device: int, _care: bytes) -> bool:
+    """Accept any care, in a program that stops no motors of others."""
+    return True
 
 
 def commanded_by(device: int, other: Program) -> str:

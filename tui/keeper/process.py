@@ -14,6 +14,7 @@ from functools import partial
 import msgspec
 
 from tui.bus.line import Line, timing_of
+from tui.bus.line_events import LineEvent, NoticeReceived
 from tui.bus.link import parse_link
 from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER
@@ -63,16 +64,17 @@ class Keeper:
         self._guardian = OrphanMotorGuard(self._line, self._journal)
         self._events = EventLog()
         EventNotes(self._line.facts, self._events)
-        self._line.facts.on_text(self._note_text)
+        self._line.facts.events.subscribe(self._hear)
 
     def cares(self) -> bool:
         """True while a motor is still to be stopped."""
         return self._guardian.busy
 
-    def _note_text(self, device: int, text: str) -> None:
-        """Leave a text for the next program if none on the line keeps it."""
-        if not self._line.facts.others:
-            self._events.add("told", text, device or None)
+    def _hear(self, event: LineEvent) -> None:
+        """Leave a notice for the next program if none on the line keeps it."""
+        match event:
+            case NoticeReceived(device, text) if not self._line.facts.others:
+                self._events.add("told", text, device or None)
 
     def end(self) -> None:
         """End soon: the computer may be shut down, and programs that are attached end as well."""

@@ -16,7 +16,7 @@ from .app_port import Panel
 from .open_lines import LineEvents, PanelLine
 
 if TYPE_CHECKING:
-    from tui.bus.program import Program
+    from tui.bus.line_events import LineEvent
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
@@ -114,16 +114,18 @@ class LineOwner(Panel):
 
     def _look_after(self, fleet: Fleet) -> None:
         """Show who shares the line, and stop the motors of programs on it that have exited."""
+        from tui.bus.line_events import DevicesStopped
         from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
         def session_of(device: int) -> DriveSession | None:
             console = fleet.console(device)
             return console.session if console is not None else None
 
-        def stopped(devices: tuple[int, ...], _by: str, _program: Program) -> None:
-            soon_in_loop(self, self.stopped_elsewhere, list(devices))
+        def hear(event: LineEvent) -> None:
+            if isinstance(event, DevicesStopped):
+                soon_in_loop(self, self.stopped_elsewhere, list(event.devices))
 
-        fleet.line.facts.on_stop(stopped)
+        fleet.line.facts.events.subscribe(hear)
         fleet.handover.person = True
         OrphanMotorGuard(
             fleet.line, self.journal, session_of=session_of, events=fleet.events, clock=self.clock

@@ -7,8 +7,8 @@ import weakref
 from collections.abc import Mapping
 
 from tui.bus.api import ModbusLine
+from tui.bus.line_events import ControlDenied, DevicesStopped, LineEvent
 from tui.bus.link import label
-from tui.bus.program import Program
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 
@@ -100,22 +100,19 @@ class DriveSession:
         """
         held = weakref.ref(self)
 
-        def stopped(devices: tuple[int, ...], by: str, program: Program) -> None:
-            session = held()
-            if session is not None and session.device in devices:
-                session.work.stop(f"{by}, {program.text}")
-                if session.starts is not None:
-                    session.starts.withdraw(session)
-                session.request_full_read()
+        def hear(event: LineEvent) -> None:
+            if (session := held()) is None:
+                return
+            match event:
+                case DevicesStopped(devices, by, program) if session.device in devices:
+                    session.work.stop(f"{by}, {program.text}")
+                    if session.starts is not None:
+                        session.starts.withdraw(session)
+                    session.request_full_read()
+                case ControlDenied(device, why) if session.device == device:
+                    session.arming.disarm(why)
 
-        def denied(device: int, why: str) -> None:
-            session = held()
-            if session is not None and session.device == device:
-                session.arming.disarm(why)
-
-        facts = self.line.facts
-        for leave in (facts.on_stop(stopped), facts.on_denied(denied)):
-            weakref.finalize(self, leave)
+        weakref.finalize(self, self.line.facts.events.subscribe(hear))
 
     def care(self) -> bytes:
         """The care for the drive: how another process can stop it, should this one end."""

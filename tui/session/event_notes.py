@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from tui.bus.line_events import LineEvent, NoteReceived
 from tui.bus.notes import MOST_NOTE, LineNote
 from tui.bus.program import readable
 from tui.bus.shared_state import SharedState
@@ -31,7 +32,7 @@ class EventNotes:
         self._events = events
         self._heard: list[Event] = []
         events.left = self._leave
-        facts.notes.on_note(self._hear)
+        facts.events.subscribe(self._hear)
 
     def ask(self) -> None:
         """Ask for the events of other programs."""
@@ -41,10 +42,12 @@ class EventNotes:
         left = LeftEvent(self._facts.me.text, event._replace(text=event.text[:MOST_CHARACTERS]))
         self._facts.notes.leave(LineNote(0, EVENTS_OF_LINE, msgspec.msgpack.encode(left)))
 
-    def _hear(self, note: LineNote) -> None:
-        if (note.device, note.kind) != (0, EVENTS_OF_LINE):
-            return
-        left = msgspec.msgpack.decode(note.data, type=LeftEvent)
+    def _hear(self, event: LineEvent) -> None:
+        match event:
+            case NoteReceived(LineNote(0, kind, data)) if kind == EVENTS_OF_LINE:
+                self._join(msgspec.msgpack.decode(data, type=LeftEvent))
+
+    def _join(self, left: LeftEvent) -> None:
         if left.program != self._facts.me.text and not self._is_known(left.event):
             self._heard.append(left.event)
             text = readable(f"{left.event.text} ({left.program})")

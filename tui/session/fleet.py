@@ -16,6 +16,7 @@ from types import MappingProxyType
 
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
+from tui.bus.line_events import LineEvent, ProgramsChanged
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 
@@ -97,7 +98,7 @@ class Fleet:
         self.handover = Handover(line, self.events, self._session_of, clock)
         """Decides who commands a drive if two programs want to."""
         self._departed = line.facts.departed
-        line.facts.on_change(self._look_for_left)
+        line.facts.events.subscribe(self._look_for_left)
         self.search: Search | None = None
         """The search for drives that goes on, or the last one."""
 
@@ -198,8 +199,10 @@ class Fleet:
         console = self.console(device)
         return console.session if console is not None else None
 
-    def _look_for_left(self) -> None:
+    def _look_for_left(self, event: LineEvent) -> None:
         """Somebody may have left the line: perhaps a motor that runs; reads files."""
+        if not isinstance(event, ProgramsChanged):
+            return
         before, self._departed = self._departed, self.line.facts.departed
         if self.starts is None or set(self._departed) <= set(before):
             return

@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import TypeVar
 
 from ..errors import HOPELESS, LineBehind, LineClosed, LineError, LineLost
+from ..line_events import StateChanged
 from ..link import Link, SerialLink, TcpLink, label
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
@@ -62,7 +63,6 @@ class Engine:
         self._lock = threading.RLock()
         self._news = threading.Condition()
         self._error: LineError | None = None
-        self._listeners: list[Callable[[LineState], None]] = []
         self._thread: threading.Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._accepting = False
@@ -221,32 +221,14 @@ class Engine:
             self._workers.add(task)
             task.add_done_callback(self._workers.discard)
 
-    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
-        """Add a listener; returns how to take it away."""
-        with self._news:
-            self._listeners.append(listener)
-
-        def unsubscribe() -> None:
-            with self._news:
-                if listener in self._listeners:
-                    self._listeners.remove(listener)
-
-        return unsubscribe
-
     def _changed(self, state: LineState, error: LineError | None = None) -> None:
         with self._news:
             self.state = state
             self._error = error
-            listeners = list(self._listeners)
             self._news.notify_all()
         if self._shared is not None:
             self._shared.tell_state()
-        for listener in listeners:
-            try:
-                listener(state)
-            except Exception:
-                # a listener's fault is not the line's
-                log.exception("a listener of the line's state failed")
+        self.facts.events.emit(StateChanged(state))
 
     def _work(self, loop: asyncio.AbstractEventLoop) -> None:
         """The thread: run the loop until closed, then leave nothing behind."""

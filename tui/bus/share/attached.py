@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,9 +14,9 @@ from tui.safety import COMMAND_TOO_LATE, SILENT_CLIENT, STOP_DUE
 from ..bounds import MOST_FRAMES
 from ..errors import RequestRefused
 from ..limits import CAUTIOUS, Limits
+from ..line_events import EventHub, WriteAbandoned
 from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
-from ..requests import Request
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from .carried import failure_message, request_from
@@ -47,8 +47,7 @@ class Client:
 
     program: Program
     writer: asyncio.StreamWriter
-    left: Callable[[Program, Request, Future[Reply]], None]
-    """Told of each write that may be on the wire when it goes."""
+    events: EventHub
     shares: dict[int, float] = field(default_factory=dict)
     trace: bool = False
     frames: int = 0
@@ -110,7 +109,7 @@ class Client:
         requested, self.requested = self.requested, {}
         for job in requested.values():
             if job.request.changes and (job.begun or job.priority is Priority.STOP):
-                self.left(self.program, job.request, job.answer)
+                self.events.emit(WriteAbandoned(self.program, job.request, job.answer))
             if job.priority is Priority.STOP:
                 self.stops_left.append(job)
             else:

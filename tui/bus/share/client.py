@@ -11,10 +11,18 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OWNER_SILENT, NotShared
+from ..line_events import (
+    ControlDenied,
+    ControlRequested,
+    DevicesStopped,
+    NoteReceived,
+    NoticeReceived,
+)
 from ..link import label
 from ..model import LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
+from ..shared_state import commanded_by
 from .carried import Polled
 from .heartbeat import Heartbeat
 from .messages import (
@@ -243,19 +251,19 @@ class ShareClient:
             case Facts():
                 self._hear_facts(message)
             case Notified(device=device, text=text):
-                facts.hear_text(device, text)
+                facts.events.emit(NoticeReceived(device, text))
             case LineNote():
-                facts.notes.hear(message)
+                facts.events.emit(NoteReceived(message))
             case StopGiven(devices=devices, by=by, program=program) if program.id != facts.me.id:
                 counts, who = message.counts, f"{by}, {program.text}"
                 facts.stops.note(program.id, devices, counts, who, message.when)
-                facts.hear_stop(devices, by, program)
+                facts.events.emit(DevicesStopped(devices, by, program))
                 inside.dispatcher.void()
             case RequestDenied(device=device, holder=holder):
                 facts.note_commander(device, holder.id)
-                facts.hear_denied(device, f"Drive {device} is commanded by {holder.text}.")
+                facts.events.emit(ControlDenied(device, commanded_by(device, holder)))
             case DriveRequested(device=device, program=program):
-                facts.hear_question(device, program)
+                facts.events.emit(ControlRequested(device, program))
             case RequestGranted(device=device, yes=yes, why=why):
                 facts.hear_reply(device, why, yes=yes)
             case _:
@@ -272,7 +280,8 @@ class ShareClient:
             reported.departed,
         )
         if unheard and self.again:  # given while this program was with no owner
-            facts.hear_stop(unheard, STOP_UNHEARD[self._gone], self._owner.program)
+            by = STOP_UNHEARD[self._gone]
+            facts.events.emit(DevicesStopped(unheard, by, self._owner.program))
             self._inside.dispatcher.void()
 
     def _soon(self, message: AnyMessage) -> None:

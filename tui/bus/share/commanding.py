@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ..keep_alive import KeepAlive
 from ..leases import WriteLease
+from ..line_events import ControlRequested
 from ..program import Program
 from ..shared_state import SharedState, commanded_by
 from .attached import Client
@@ -68,7 +69,7 @@ class Commanding:
             return  # granted already
         # one that commands it now knows better how to stop it than one that armed it before
         other = lease.has_ended and facts.commanders.get(device) not in (None, program.id)
-        known = not care or other or facts.holder.hear_care(device, care)
+        known = not care or other or facts.accepts_care(device, care)
         if lease.has_ended or not known:
             facts.leases.end(program.id, device)
         if not lease.has_ended:
@@ -93,7 +94,7 @@ class Commanding:
         facts = self._facts
         holder = facts.commanders.get(device)
         if holder == facts.me.id:
-            facts.hear_question(device, program)
+            facts.events.emit(ControlRequested(device, program))
         elif holder is not None and (client := self._clients.get(holder)) is not None:
             client.say(DriveRequested(device, program))
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..bounds import MOST_PROGRAMS
+from ..line_events import StopDue
 from ..link import label
 from ..schedule.inside import LineInside
 from ..shared_state import SharedState
@@ -147,7 +148,7 @@ class Greeting:
         peer = peer_of(writer.get_extra_info("socket"))
         stop = await plain_stop(reader, self._inside.devices.known, peer)
         self._stopped(stop)
-        facts.holder.hear_stop_due(stop.devices, stop.program.text)
+        facts.events.emit(StopDue(stop.devices, stop.program.text))
         self._holder.moved(arrived=False)  # its port may be closed
         # nobody of this name comes back: its stops count on without it
         facts.stops.fold({stop.program.id})

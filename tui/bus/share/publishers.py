@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..line_events import ControlDenied
 from .beside import send_plain_stop
 from .messages import AnyMessage, Armed, Claim, PollPause
 
@@ -58,4 +59,4 @@ def give_up_own(facts: SharedState, why: str) -> None:
     for device, holder in facts.commanders.items():
         if holder == me:
             facts.release(device)
-            facts.hear_denied(device, why)
+            facts.events.emit(ControlDenied(device, why))

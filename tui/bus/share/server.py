@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from ..limits import CAUTIOUS
+from ..line_events import DevicesStopped, NoteReceived, NoticeReceived, StopDue
 from ..link import label
 from ..notes import LineNote
 from ..program import Program
@@ -141,7 +142,7 @@ class ShareServer:
         if message is None:
             return None
         facts, inside = self._inside.facts, self._inside
-        client = Client(message.program, writer, facts.holder.hear_left, heard=inside.clock())
+        client = Client(message.program, writer, facts.events, heard=inside.clock())
         own = label(inside.link)
         gone = client.program.id in self._gone_before
         client.say(Welcome(facts.me, own, own == message.label, gone))
@@ -171,7 +172,7 @@ class ShareServer:
         if self._clients.get(client.program.id) is not client:
             return
         if due := client.due_stops(self._inside.clock()):
-            self._inside.facts.holder.hear_stop_due(due, client.program.text)
+            self._inside.facts.events.emit(StopDue(due, client.program.text))
         del self._clients[client.program.id]
         log.info("%s has left the line", client.program.text)
         facts = self._inside.facts
@@ -241,7 +242,7 @@ class ShareServer:
                 client.stops_due |= dict.fromkeys(message.devices, self._inside.clock())
                 self._stopped(message)
             case Notified(device=device, text=text):
-                self._inside.facts.hear_text(device, text)
+                self._inside.facts.events.emit(NoticeReceived(device, text))
                 self._tell_all(message, but=client.program.id)
             case LineNote(data=b""):
                 for note in self._inside.facts.notes.of(message.device, message.kind):
@@ -264,7 +265,7 @@ class ShareServer:
                 self._tell_stop(message)
             case LineNote(data=b""):
                 for note in self._inside.facts.notes.of(message.device, message.kind):
-                    self._inside.facts.notes.hear(note)
+                    self._inside.facts.events.emit(NoteReceived(note))
             case LineNote():
                 pass  # kept already
             case _ if not self._commanding.hears(self._inside.facts.me, message):
@@ -279,7 +280,7 @@ class ShareServer:
 
     def _hear_stops(self, devices: tuple[int, ...], by: str, program: Program) -> None:
         facts = self._inside.facts
-        facts.hear_stop(devices, by, program)
+        facts.events.emit(DevicesStopped(devices, by, program))
         self._tell_stop(StopGiven(devices, facts.stops.of(program.id, devices), by, program))
 
     def _tell_stop(self, stop: StopGiven) -> None:

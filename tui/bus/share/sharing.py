@@ -9,6 +9,7 @@ from collections.abc import Callable
 from tui.safety import STOP_DISK_WITHIN
 
 from ..errors import LineLost, NotShared
+from ..line_events import NoticeReceived
 from ..link import label
 from ..model import LineStatus
 from ..program import KEEPER, Program, pid_namespace
@@ -178,7 +179,7 @@ class Sharing:
         """This program holds a line that a keeper was to hold; a person is to know."""
         if self._keeper:
             self._inside.facts.unkept = text = UNKEPT.format(why=why)
-            self._inside.facts.hear_text(0, text)
+            self._inside.facts.events.emit(NoticeReceived(0, text))
 
     async def _attend(self, owner: Owner, say: Say) -> None:
         """Be a client of an owner until it ends."""

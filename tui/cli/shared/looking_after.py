@@ -27,12 +27,18 @@ def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
     motors are stopped, before the line is closed.
     """
     # imported now: the package may be replaced by an upgrade before this program holds the line
+    from tui.bus.line_events import LineEvent, NoticeReceived
     from tui.session.journal import Journal
     from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
     guardian, facts = OrphanMotorGuard(opened.line, Journal()), opened.line.facts
     tell = partial(_tell, f"{name}: " if name else "")
-    facts.on_text(tell)
+
+    def hear(event: LineEvent) -> None:
+        if isinstance(event, NoticeReceived):
+            tell(event.device, event.text)
+
+    facts.events.subscribe(hear)
     if facts.unkept:
         tell(0, facts.unkept)
 

@@ -13,6 +13,7 @@ from math import ceil, log
 
 from tui.bus.api import DeviceCounters, LineCounters, LineStatus, ModbusLine
 from tui.bus.errors import ONE_BEHIND, LineError, LineLost
+from tui.bus.line_events import LineEvent, StateChanged
 from tui.bus.link import SerialLink, TcpLink
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
@@ -55,11 +56,16 @@ async def examine_line(
 ) -> DiagnosticEvidence:
     """Everything that is seen of a drive and its line."""
     behind = [ONE_BEHIND in line.state.reason]
-    end = line.on_state(lambda state: behind.append(ONE_BEHIND in state.reason))
+
+    def hear(event: LineEvent) -> None:
+        if isinstance(event, StateChanged):
+            behind.append(ONE_BEHIND in event.state.reason)
+
+    unsubscribe = line.facts.events.subscribe(hear)
     try:
         sight = await _examined(line, device, profile, changed, answering, reads, behind)
     finally:
-        end()
+        unsubscribe()
     return replace(sight, behind=any(behind))
 
 
@@ -187,9 +193,14 @@ async def _connected_again(line: ModbusLine) -> bool:
 async def _closes_idle(line: ModbusLine) -> bool:
     """True if the connection is closed in some seconds without requests."""
     lost: list[bool] = []
-    end = line.on_state(lambda state: lost.append(state.status is not LineStatus.CONNECTED))
+
+    def hear(event: LineEvent) -> None:
+        if isinstance(event, StateChanged):
+            lost.append(event.state.status is not LineStatus.CONNECTED)
+
+    unsubscribe = line.facts.events.subscribe(hear)
     try:
         await REAL_CLOCK.sleep(IDLE)
     finally:
-        end()
+        unsubscribe()
     return any(lost)

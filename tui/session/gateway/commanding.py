@@ -6,12 +6,13 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any
 
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
+from tui.bus.line_events import ControlDenied, ControlRequested, DevicesStopped, LineEvent
 from tui.bus.program import Program
 
 from ..clock import REAL_CLOCK
@@ -53,17 +54,11 @@ class GatewayCommanding:
         """The clients that have commanded each device since it was stopped."""
         self._barred: dict[tuple[int, str], str] = {}
         """Clients whose drive another client has stopped: by whom, by device and client."""
-        facts = line.facts
-        self._leave = (
-            facts.on_stop(self._stopped_elsewhere),
-            facts.on_question(self._requested),
-            facts.on_denied(self._denied),
-        )
+        self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def close(self) -> None:
         """Command nothing any more."""
-        for leave in self._leave:
-            leave()
+        self._unsubscribe()
         with self._lock:
             devices = list(self._by)
         for device in devices:
@@ -137,11 +132,17 @@ class GatewayCommanding:
             self._by.pop(device, None)
         self._line.facts.release(device)
 
-    def _stopped_elsewhere(self, devices: Iterable[int], by: str, program: Program) -> None:
-        for device in devices:
-            with self._lock:
-                self._stopped[device] = f"{by}, {program.text}"
-            self._release(device)
+    def _hear(self, event: LineEvent) -> None:
+        match event:
+            case DevicesStopped(devices, by, program):
+                for device in devices:
+                    with self._lock:
+                        self._stopped[device] = f"{by}, {program.text}"
+                    self._release(device)
+            case ControlDenied(device, why):
+                self._denied(device, why)
+            case ControlRequested(device, program):
+                self._requested(device, program)
 
     def _denied(self, device: int, why: str) -> None:
         log.warning("%s", why)

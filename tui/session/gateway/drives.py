@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import inf
 
-from tui.bus.api import LineState, LineStatus, ModbusLine, Priority
+from tui.bus.api import LineStatus, ModbusLine, Priority
 from tui.bus.errors import BytesSwapped, LineError
 from tui.bus.limits import MAX_READ, Limits
+from tui.bus.line_events import LineEvent, StateChanged
 from tui.drive.foreign_write import WordKind, classify_words
 from tui.drive.orders import chart_codes
 from tui.drive.profile import library
@@ -66,11 +67,11 @@ class GatewayDrives:
         self._charts: dict[int, float] = {}
         """When the word that decides between charts was last asked for, by device."""
         self._reads: set[asyncio.Task[None]] = set()
-        self._leave = line.on_state(self._state)
+        self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def close(self) -> None:
         """Look after nothing any more."""
-        self._leave()
+        self._unsubscribe()
         for task in (*self._tasks.values(), *self._reads):
             task.cancel()
 
@@ -172,9 +173,8 @@ class GatewayDrives:
             for code in codes:
                 await self._read_raw(session, code, Priority.POLL, CHART_READ_EACH)
 
-    def _state(self, state: LineState) -> None:
-        """Called in the line's thread."""
-        if state.status is not LineStatus.CONNECTED:
+    def _hear(self, event: LineEvent) -> None:
+        if isinstance(event, StateChanged) and event.state.status is not LineStatus.CONNECTED:
             self._losses += 1
 
     def _begin(self, device: int) -> asyncio.Task[DriveSession | None]:

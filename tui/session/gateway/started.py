@@ -10,6 +10,7 @@ import logging
 
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed, LineError
+from tui.bus.line_events import DevicesStopped, LineEvent
 from tui.drive.foreign_write import StartDirection
 
 from ..command.stop import Stopper
@@ -42,7 +43,7 @@ class StartedMotors:
         self._sessions: dict[int, DriveSession] = {}
         self._looks: dict[int, asyncio.Task[None]] = {}
         self._loop = asyncio.get_running_loop()
-        self._leave = line.facts.on_stop(lambda devices, *_: self.stopped(*devices))
+        self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def holds(self, device: int) -> bool:
         """Return True if a motor that a client has started is not yet known to be at standstill.
@@ -69,6 +70,10 @@ class StartedMotors:
     def sent(self, session: DriveSession, *, sent: bool) -> None:
         """The frame went out, or was refused before."""
         (self._keeper.sent if sent else self._keeper.never_sent)(session)
+
+    def _hear(self, event: LineEvent) -> None:
+        if isinstance(event, DevicesStopped):
+            self.stopped(*event.devices)
 
     def stopped(self, *devices: int) -> None:
         """A stop was given, by any program: check that the motors reach standstill. For any
@@ -109,7 +114,7 @@ class StartedMotors:
 
     async def end(self) -> StopSummary | None:
         """Stop what still runs: nobody commands it any more. None where nothing does."""
-        self._leave()
+        self._unsubscribe()
         left = [session for device, session in self._sessions.items() if self._keeper.holds(device)]
         summary = None
         if left:

@@ -76,7 +76,7 @@ class Monitor:
         self._stirs = 0
         self._learn_due = True
         self._trend = Trend(session.profile)
-        self._notes = TrendNotes(session.line.facts.notes, session.device, self._trend)
+        self._notes = TrendNotes(session.line.facts, session.device, self._trend)
         self._listeners: tuple[Listener, ...] = ()
         self._worker: LineWorker | None = None
 

@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import msgspec
 
-from tui.bus.notes import LONGEST_KIND, LineNote, Notes
+from tui.bus.line_events import LineEvent, NoteReceived
+from tui.bus.notes import LONGEST_KIND, LineNote
+from tui.bus.shared_state import SharedState
 
 from .trend import TREND_QUANTITIES, Trend, TrendPoint
 
@@ -23,8 +25,9 @@ class TrendNotes:
     Times are those of the machine's monotonic clock, which all its programs share.
     """
 
-    def __init__(self, notes: Notes, device: int, trend: Trend) -> None:
-        self._notes = notes
+    def __init__(self, facts: SharedState, device: int, trend: Trend) -> None:
+        self._notes = facts.notes
+        self._events = facts.events
         self._device = device
         self._trend = trend
         self._kind = trend.kind[:LONGEST_KIND]
@@ -37,7 +40,7 @@ class TrendNotes:
     def ask(self) -> None:
         """Ask for the trend of other programs; once is enough."""
         if self._end is None:
-            self._end = self._notes.on_note(self._hear)
+            self._end = self._events.subscribe(self._hear)
         if not self._requested:
             self._requested = True
             self._notes.ask(self._device, self._kind)
@@ -59,11 +62,13 @@ class TrendNotes:
             self._points = []
             self._notes.leave(LineNote(self._device, self._kind, data))
 
-    def _hear(self, note: LineNote) -> None:
-        if (note.device, note.kind) != (self._device, self._kind):
+    def _hear(self, event: LineEvent) -> None:
+        if not isinstance(event, NoteReceived):
             return
-        points = msgspec.msgpack.decode(note.data, type=list[TrendPoint])
-        self._others += [point for point in points if _is_whole(point)]
+        note = event.note
+        if (note.device, note.kind) == (self._device, self._kind):
+            points = msgspec.msgpack.decode(note.data, type=list[TrendPoint])
+            self._others += [point for point in points if _is_whole(point)]
 
 
 def _is_whole(point: TrendPoint) -> bool:

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from tui.bus.api import ModbusLine
+from tui.bus.line_events import LineEvent, WriteAbandoned
 from tui.bus.link import label
 from tui.bus.requests import ReadWrite, Request, WriteMany, WriteOne
+from tui.bus.shared_state import accepts_any_care
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile, unpacked_profile
 
@@ -49,13 +51,13 @@ class DrivesInCare:
         self._journal = journal
         self._profiles: dict[bytes, Profile] = {}
         self._sessions: dict[int, tuple[bytes, DriveSession]] = {}
-        holder = line.facts.holder
-        self._leave = (holder.on_care(self._registered), holder.on_left(self._left))
+        line.facts.accepts_care = self._registered
+        self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def close(self) -> None:
         """Keep nothing more."""
-        for leave in self._leave:
-            leave()
+        self._line.facts.accepts_care = accepts_any_care
+        self._unsubscribe()
 
     def session(self, device: int) -> DriveSession | None:
         """The drive as the program knew it that has armed it last; None if none has."""
@@ -87,11 +89,12 @@ class DrivesInCare:
 
     # Writes that were left
 
-    def _left(self, program: Program, request: Request, answer: Future[Reply]) -> None:
-        """A program has ended that had asked for a write."""
-        entry = self._entry(program, request)
-        if entry is not None:
-            answer.add_done_callback(partial(self._keep, entry))
+    def _hear(self, event: LineEvent) -> None:
+        match event:
+            case WriteAbandoned(program, request, answer):
+                entry = self._entry(program, request)
+                if entry is not None:
+                    answer.add_done_callback(partial(self._keep, entry))
 
     def _keep(self, entry: Entry, answer: Future[Reply]) -> None:
         if answer.cancelled():

@@ -12,6 +12,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
+from tui.bus.line_events import (
+    ControlAnswered,
+    ControlRequested,
+    DevicesStopped,
+    LineEvent,
+    NoticeReceived,
+    ProgramsChanged,
+)
 from tui.drive.errors import DriveError
 from tui.safety import REQUEST_ANSWERED_WITHIN, STANDSTILL_SEEN_WITHIN
 
@@ -59,20 +67,25 @@ class Handover:
         self._clock = clock
         self._names: dict[str, str] = {}
         self._commanders: Mapping[int, str] = MappingProxyType({})
-        facts = line.facts
-        self._leave = (
-            facts.on_question(self._requested),
-            facts.on_reply(self._replied),
-            facts.on_stop(self._stopped),
-            facts.on_text(self._on_text),
-            facts.on_change(self._changed),
-        )
+        self._unsubscribe = line.facts.events.subscribe(self._hear)
         self._changed()
 
     def close(self) -> None:
         """Hear nothing any more."""
-        for leave in self._leave:
-            leave()
+        self._unsubscribe()
+
+    def _hear(self, event: LineEvent) -> None:
+        match event:
+            case ControlRequested(device, program):
+                self._requested(device, program)
+            case ControlAnswered(device, granted, why):
+                self._replied(device, granted, why)
+            case DevicesStopped(devices, by, program):
+                self._stopped(devices, by, program)
+            case NoticeReceived(device, text):
+                self._events.add("stop", text, device or None)
+            case ProgramsChanged():
+                self._changed()
 
     # Asked here
 
@@ -187,9 +200,6 @@ class Handover:
         for device in devices:
             if self._session_of(device) is not None:
                 self._events.add("stop", f"Stop from {program.text} ({by}).", device)
-
-    def _on_text(self, device: int, text: str) -> None:
-        self._events.add("stop", text, device or None)
 
     def _changed(self) -> None:
         """Report arrivals, departures, and commanders on the line."""

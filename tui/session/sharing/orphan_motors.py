@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineClosed
+from tui.bus.line_events import LineEvent, ProgramLost, StopDue
 from tui.bus.link import label
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
@@ -75,8 +76,7 @@ class OrphanMotorGuard:
         """Devices whose due stop is seen to its end."""
         self._workers: list[LineWorker] = []
         self._changing = threading.Lock()
-        facts = line.facts
-        self._leave = (facts.on_gone(self.gone), facts.holder.on_stop_due(self._stop_due))
+        self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     @property
     def busy(self) -> bool:
@@ -87,22 +87,20 @@ class OrphanMotorGuard:
 
     def close(self) -> None:
         """Look after nothing any more; waits a moment for what is still to be removed."""
-        for leave in self._leave:
-            leave()
+        self._unsubscribe()
         self._care.close()
         self._starts.close()
 
-    def gone(self, program: Program) -> None:
-        """A program left the line; called in the line's thread."""
-        self._spawn(partial(self._look_after, program), f"motors of {program.text}")
+    def _hear(self, event: LineEvent) -> None:
+        match event:
+            case ProgramLost(program):
+                self._spawn(partial(self._look_after, program), f"motors of {program.text}")
+            case StopDue(devices, by):
+                self._spawn(partial(self._stop, devices, by), f"stop for {by}")
 
     def _spawn(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
         with suppress(LineClosed), self._changing:
             self._workers.append(self._line.spawn(work, name))
-
-    def _stop_due(self, devices: tuple[int, ...], by: str) -> None:
-        """A stop was given that no program carries out; called in the line's thread."""
-        self._spawn(partial(self._stop, devices, by), f"stop for {by}")
 
     async def _look_after(self, program: Program) -> None:
         """Stop each motor that it has started and that nobody takes over in time."""
