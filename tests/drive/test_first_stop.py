@@ -32,7 +32,7 @@ def word(address: int, raws: dict[int, int], way: OrderId = "stop", *named: str)
     return None if found is None else found.word
 
 
-@pytest.mark.parametrize("one", FACTS, ids=lambda item: item.id)
+@pytest.mark.parametrize("stop_profile", FACTS, ids=lambda item: item.id)
 def test_quick_head_equals_full_profile(stop_profile: StopProfile) -> None:
     profile = library.load(stop_profile.id)
     assert stop_profile.charts == tuple(profile.data.charts)

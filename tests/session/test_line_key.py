@@ -26,7 +26,7 @@ def test_a_link_that_leads_elsewhere_now_is_another_line(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("text", "other"),
     [
         ("serial:/dev/ttyS77,19200,8E1", "/dev/ttyS77"),
         ("/dev/ttyS77 19200 8E1", "SERIAL: /dev/ttyS77 , 9600"),
@@ -46,7 +46,7 @@ def test_spellings_of_one_line(text: str, other: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("text", "other"),
     [
         ("/dev/ttyS77", "/dev/ttyS7"),
         ("/dev/TTYS77", "/dev/ttyS77"),

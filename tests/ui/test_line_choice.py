@@ -154,7 +154,7 @@ async def test_typing_into_a_field_changes_no_screen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "same"),
+    ("text", "other", "same"),
     [
         (NAMED, NAMED, True),
         ("/dev/ttyUSB0", "serial:/dev/ttyUSB0,19200,8E1", True),
