@@ -86,5 +86,5 @@ def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:
 
 def test_actions_without_key_follow_the_table() -> None:
     table = key_table("line")
-    assert "- Close the line; asks where a drive acts on that." in table
+    assert "- Close the line. Asks first if a drive reacts to that." in table
     assert "|  |" not in table

@@ -19,7 +19,7 @@ BY_NAME = {
     "run_line('reverse')": ("run", "reverse"),
     "ask_stop_as('dc-braking')": ("brake",),
     "take_control": ("take",),
-    "take_over": ("after",),
+    "take_over": ("take", "over"),
     "stop_as('quick-stop')": ("stop", "quick"),
     "ask_stop_as('freewheel')": ("coast",),
     "stop_as('emergency-stop')": ("stop", "emergency"),

@@ -6,19 +6,22 @@ from tui.drive.reset_text import MAY_START
 
 from .action import FAULTS, MONITOR, PARAMETERS, on
 
-RUN = "Run forward: opens a line with the reference, Enter runs."
-REVERSE = "Run reverse: opens a line with the reference, Enter runs."
-REFER = "Give a reference in Hz or rpm: opens a line, Enter gives it."
-OPTIONS = "Choose a ramp, preset speed, motor or output; armed, asks."
-QUICK = "Quick stop at once, where the drive has one, else its ramp stop; needs no arming."
-EMERGENCY = "Emergency stop at once, else the quick stop, else the ramp stop; needs no arming."
-COAST = "Coast to a stop; asks first, needs no arming. A hoist load falls."
-BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
-TAKE = "Take the control from the terminals, where a drive has that; armed, locked only, asks."
-HAND_BACK = "Return control to the terminals. A run command active there counts; asks."
-TEACH = "Teach the scale of a raw value by the drive's own display."
-GIVE_BY = "Give the reference by a taught preset, or no more; asks."
-TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
+RUN = "Run forward. Opens the run line; Enter runs. Needs arming."
+REVERSE = "Run reverse. Opens the run line; Enter runs. Needs arming."
+REFER = "Set the reference in the run line. Needs arming."
+OPTIONS = "Choose a ramp, speed, motor or output. Needs arming; asks first."
+QUICK = "Quick stop immediately; ramp stop if the drive has none. Needs no arming."
+EMERGENCY = "Emergency stop immediately; else quick stop, else ramp stop. Needs no arming."
+COAST = "Coast to a stop; a hoist load falls. Needs no arming; asks first."
+BRAKE = "DC brake, if the drive has it. Needs no arming; asks first."
+TAKE = "Take control from the terminals, if the drive can. Needs arming and lock; asks first."
+HAND_BACK = (
+    "Return control to the terminals. Needs arming; asks first."
+    " A run command active there starts the motor."
+)
+TEACH = "Learn the scale of a raw value from the drive's display."
+GIVE_BY = "Set the reference by a preset with a learned scale, or end that. Asks first."
+TAKE_OVER = "Take over a motor whose program has ended; sends nothing. Needs arming."
 
 RESET_HELP = f"Reset the fault. Needs arming; asks first. {MAY_START}"
 INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V."
@@ -37,16 +40,16 @@ COMMAND_ACTIONS = (
             "step_reference(1)",
             "up",
             "",
-            "Raise the reference by 1 Hz, at most to its limit; armed.",
+            "Raise the reference by 1 Hz, up to its limit. Needs arming.",
         ),
         (
             "step_reference(-1)",
             "down",
             "",
-            "Lower the reference by 1 Hz, at most to its limit; armed.",
+            "Lower the reference by 1 Hz, down to its limit. Needs arming.",
         ),
-        ("step_reference(5)", "pageup", "", "Raise the reference by 5 Hz; armed."),
-        ("step_reference(-5)", "pagedown", "", "Lower the reference by 5 Hz; armed."),
+        ("step_reference(5)", "pageup", "", "Raise the reference by 5 Hz. Needs arming."),
+        ("step_reference(-5)", "pagedown", "", "Lower the reference by 5 Hz. Needs arming."),
         ("options", "o", "", OPTIONS),
         ("stop_as('quick-stop')", "k", "", QUICK),
         ("stop_as('emergency-stop')", "e", "", EMERGENCY),
@@ -64,11 +67,11 @@ TEACH_ACTIONS = (
 )
 WATCH_ACTIONS = on(
     (MONITOR,),
-    ("next_word", "tab", "", "Show the next word with all its bits."),
-    ("trend_window(-1)", "<", "", "A shorter window of the trend: 10 s, 60 s, 10 min."),
-    ("trend_window(1)", ">", "", "A longer window of the trend."),
+    ("next_word", "tab", "", "Show the next status word with all its bits."),
+    ("trend_window(-1)", "<", "", "Shorten the time window of the trend: 10 min, 60 s, 10 s."),
+    ("trend_window(1)", ">", "", "Lengthen the time window of the trend."),
     ("leave", "escape", "", "Go back to Line."),
-    ("change_rate(1)", "", "", "Poll twice as fast."),
-    ("change_rate(-1)", "", "", "Poll half as fast."),
-    ("rating", "", "", "Enter the rated current of a drive that gives its current in %."),
+    ("change_rate(1)", "", "", "Poll twice as often."),
+    ("change_rate(-1)", "", "", "Poll half as often."),
+    ("rating", "", "", "Enter the rated current, if the drive gives its current in %."),
 )

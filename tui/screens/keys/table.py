@@ -34,12 +34,12 @@ from .parameter_actions import PARAMETER_ACTIONS
 
 app_action = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
-STOP = "Stop the drive on its ramp, except while typing text; without an open drive, stop all."
-STOP_ANYWHERE = "Stop the drive on its ramp, also while text is typed."
-STOP_ALL = "Stop every drive of the line on its ramp, from any screen."
-ARM = "Arm this drive for a minute, or for a minute more."
-PROVE = "Prove that the drive reacts to a silent line as it is set to; armed, asks."
-GIVE_DRIVE = "Answer a program that asks to command this drive; asks."
+STOP = "Stop the open drive on its ramp; all drives if none is open. Not while typing text."
+STOP_ANYWHERE = "Stop the open drive on its ramp, even while typing text."
+STOP_ALL = "Stop all drives of all open lines on their ramps."
+ARM = "Arm this drive for 60 s; each key press restarts the 60 s."
+PROVE = "Test the drive's reaction to a communication loss. Needs arming; asks first."
+GIVE_DRIVE = "Answer a program that requests this drive. Asks first."
 ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
 OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 WHILE_OPENING: tuple[KeyLabel, ...] = (("leave", "Esc", "cancel"), ("help", "?", "help"))
@@ -54,17 +54,17 @@ WHILE_TYPING: tuple[KeyLabel, ...] = (
 """Keys of the whole panel other than letters."""
 STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
 """Labels of the stop key if it stops every drive, or none."""
-WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."
-SAVE = "Save what is shown to a file: a backup, an assignment, the record of a trip."
-OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
-FIND = "Find a parameter by code, name, address or value, from anywhere."
-WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
-SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks."
-WHY = "Why no answer? Diagnose a silent drive, and show the next step."
-HEAR = "Listen to a line on which another master asks; the panel sends nothing there, asks."
-ACCEPT = "Accept the line with another adapter or other drives than before; asks."
-BUNDLE = "Bundle for a colleague: all about the line in one file."
-EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
+WRITE_SOURCE = "Write the chosen configuration. Needs arming and standstill; asks first."
+SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
+OPEN = "Open a file: compare a parameter set, or propose an assignment."
+FIND = "Find a parameter by code, name, address or value; works on every screen."
+WIRING_HELP = "Show wiring and warnings of the family: pins, line rules, LEDs, commands, errata."
+SCAN_SETTINGS = "Scan at other baud rates and formats, likely ones first. Asks first."
+WHY = "Diagnose why a drive does not answer, and show the next steps."
+HEAR = "Listen to a line with another master; send nothing. Asks first."
+ACCEPT = "Accept the changed line: another adapter, or other drives. Asks first."
+BUNDLE = "Bundle everything about the line in one file, for a colleague."
+EEPROM = "Save the settings to the drive's EEPROM, if it needs that. Needs arming; asks first."
 
 PLACES: tuple[tuple[str, str, str], ...] = (
     (CONNECTION, "1", "Line"),
@@ -83,30 +83,30 @@ ACTIONS: tuple[Action, ...] = (
     stops("stop_all", "f9", "", STOP_ALL),
     *on(
         (CONNECTION,),
-        ("open_chosen", "enter", "open", "Open the chosen line or drive."),
-        ("scan", "s", "search", "Search for drives at the addresses given; those found stay."),
-        ("addresses", "c", "range", "Change the addresses to search: 1-31, or 1,3,5-7."),
-        ("type_line", "n", "line", "Type a line: serial, TCP, RTU over TCP, sim."),
-        ("stop_scan", "escape", "", "Out of a field, then end the search for drives."),
+        ("open_chosen", "enter", "open", "Open the line or drive under the cursor."),
+        ("scan", "s", "search", "Scan the addresses for drives; drives already found stay."),
+        ("addresses", "c", "range", "Change the addresses to scan: 1-31, or 1,3,5-7."),
+        ("type_line", "n", "line", "Type a line to open: serial, TCP, RTU over TCP, simulated."),
+        ("stop_scan", "escape", "", "Leave the field, then end the scan."),
         ("scan_settings", "", "", SCAN_SETTINGS),
-        ("refresh_lines", "", "", "Look for serial ports again."),
-        ("disconnect", "", "", "Close the line; asks where a drive acts on that."),
+        ("refresh_lines", "", "", "Update the list of serial ports."),
+        ("disconnect", "", "", "Close the line. Asks first if a drive reacts to that."),
     ),
     *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("arm", "a", "arm", ARM)),
-    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("disarm", "A", "", "End arming.")),
+    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("disarm", "A", "", "Disarm this drive.")),
     *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("answer_request", "G", "", GIVE_DRIVE)),
     *COMMAND_ACTIONS,
     *on((SOURCES,), ("prove", "P", "prove", PROVE)),
     Action("write_chosen", "enter", "write", WRITE_SOURCE, (SOURCES,), bound=False),
     *on(
         (FAULTS,),
-        ("open", "enter", "open", "Open the parameter, or look at that fault of the history."),
-        ("move(-1)", "up", "", "One up."),
-        ("move(1)", "down", "", "One down."),
-        ("other_page", "tab", "trip", "The seconds before the trip, or the fault."),
-        ("move_record(1)", "left", "", "Older values of the record."),
-        ("move_record(-1)", "right", "", "Newer values of the record."),
-        ("leave", "escape", "", "From a fault of the history to now, then to Monitor."),
+        ("open", "enter", "open", "Open the parameter, or show that fault of the history."),
+        ("move(-1)", "up", "", "Move up."),
+        ("move(1)", "down", "", "Move down."),
+        ("other_page", "tab", "trip", "Switch between the fault and the seconds before the trip."),
+        ("move_record(1)", "left", "", "Show older values of the record."),
+        ("move_record(-1)", "right", "", "Show newer values of the record."),
+        ("leave", "escape", "", "Return from the history to the present fault, then to Monitor."),
     ),
     *on((SOURCES,), ("leave", "escape", "back", "Go back to Monitor.")),
     *PARAMETER_ACTIONS,
@@ -116,57 +116,69 @@ ACTIONS: tuple[Action, ...] = (
     *on(
         (FRAMES, LISTENING),
         ("hold", "h", "hold", "Pause or resume the list."),
-        ("other_page", "tab", "page", "Codes and values, bytes, or what was counted."),
-        ("only", "O", "only", "Show only frames of a drive, a function or errors: 2 read error."),
-        ("find_frame", "j", "", "Find frames by drive, function, error, or what they say."),
-        ("scroll(-1)", "up", "", "Older frames; the list is held."),
-        ("scroll(1)", "down", "", "Newer frames."),
-        ("scroll(-10)", "pageup", "", "Ten frames older."),
-        ("scroll(10)", "pagedown", "", "Ten frames newer."),
+        ("other_page", "tab", "page", "Show the next page: values, bytes, counters or summary."),
+        ("only", "O", "only", "Filter the frames by drive, function or error: 2 read error."),
+        ("find_frame", "j", "", "Find frames by drive, function, error or text."),
+        ("scroll(-1)", "up", "", "Show older frames; pauses the list."),
+        ("scroll(1)", "down", "", "Show newer frames."),
+        ("scroll(-10)", "pageup", "", "Go back ten frames."),
+        ("scroll(10)", "pagedown", "", "Go forward ten frames."),
     ),
     *on(
         (FRAMES,),
-        ("reset_counters", "C", "", "Count from now on; what others see stays."),
-        ("reset_drive_counters", "Z", "", "Set the drive's own counters to 0; armed, asks."),
+        (
+            "reset_counters",
+            "C",
+            "",
+            "Restart the counts of this panel; other programs keep theirs.",
+        ),
+        (
+            "reset_drive_counters",
+            "Z",
+            "",
+            "Set the drive's own counters to 0. Needs arming; asks first.",
+        ),
         ("leave", "escape", "back", "Clear the filter, then return to Monitor."),
     ),
     *on((LISTENING,), ("leave", "escape", "end", "Clear the filter, then end listening.")),
     *on(
         (MESSAGES,),
-        ("scroll(-1)", "up", "", "Newer messages."),
-        ("scroll(1)", "down", "older", "Older messages."),
-        ("scroll(-10)", "pageup", "", "Ten lines newer."),
-        ("scroll(10)", "pagedown", "", "Ten lines older."),
+        ("scroll(-1)", "up", "", "Show newer messages."),
+        ("scroll(1)", "down", "older", "Show older messages."),
+        ("scroll(-10)", "pageup", "", "Go to newer messages, ten lines."),
+        ("scroll(10)", "pagedown", "", "Go to older messages, ten lines."),
         ("leave", "escape", "back", "Go back."),
     ),
     *on((OPENING,), ("leave", "escape", "Line", "Cancel the opening, or go to Line.")),
     *on(
         (WIRING,),
-        ("scroll(-1)", "up", "", "One line up."),
-        ("scroll(1)", "down", "scroll", "One line down."),
-        ("page(-1)", "pageup", "", "A page up."),
-        ("page(1)", "pagedown", "", "A page down."),
-        ("section(1)", "tab", "next", "The next section."),
-        ("section(-1)", "shift+tab", "", "The section before."),
+        ("scroll(-1)", "up", "", "Scroll up one line."),
+        ("scroll(1)", "down", "scroll", "Scroll down one line."),
+        ("page(-1)", "pageup", "", "Scroll up one page."),
+        ("page(1)", "pagedown", "", "Scroll down one page."),
+        ("section(1)", "tab", "next", "Go to the next section."),
+        ("section(-1)", "shift+tab", "", "Go to the previous section."),
         ("leave", "escape", "back", "Go back."),
     ),
     *(app_action(f"goto({place!r})", key, "", f"Go to {name}.") for place, key, name in PLACES),
-    app_action("step_drive(-1)", "[", "", "The drive before on this line."),
-    app_action("step_drive(1)", "]", "", "The next drive on this line."),
+    app_action("step_drive(-1)", "[", "", "Go to the previous drive on this line."),
+    app_action("step_drive(1)", "]", "", "Go to the next drive on this line."),
     app_action("find", "/", "", FIND),
-    app_action("messages", "m", "", "Messages: everything that was said, with its time."),
+    app_action("messages", "m", "", "Show all messages, with their times."),
     app_action("wiring", "I", "", WIRING_HELP),
     app_action("why", "N", "", WHY),
     app_action("hear", "H", "", HEAR),
     app_action("save_shown", "ctrl+s", "", SAVE),
     app_action("open_file", "ctrl+o", "", OPEN),
     app_action("eeprom", "S", "", EEPROM),
-    app_action("command_palette", "ctrl+p", "all", "Find any action by its words."),
-    app_action("help", "?,f1", "help", "Show every key."),
+    app_action("command_palette", "ctrl+p", "all", "Find an action by typing words."),
+    app_action("help", "?,f1", "help", "Show the keys of this screen."),
     app_action("bundle", "", "", BUNDLE),
     app_action("accept_line", "", "", ACCEPT),
-    app_action("redraw", "ctrl+l", "", "Draw the screen again if it is garbled."),
-    app_action("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),
+    app_action("redraw", "ctrl+l", "", "Redraw the screen if it is garbled."),
+    app_action(
+        "quit", "q,ctrl+q", "leave", "Leave the panel. Asks first if that has consequences."
+    ),
 )
 
 
