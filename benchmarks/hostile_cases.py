@@ -285,7 +285,7 @@ def _read_state(folder: Path, taught: Any) -> None:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.journal import Journal
     from tui.session.journal_reading import completed, read_journal, selected
-    from tui.session.settings.favourites import load_marks, save_marks
+    from tui.session.settings.favorites import load_marks, save_marks
     from tui.session.settings.restore import Mark
     from tui.session.starts.record import offer
     from tui.session.starts.starts import Starts

@@ -28,7 +28,7 @@ from ..work import Outcome, OutcomeKind, Permit, Task
 from .applied import Applied, Result
 from .apply import apply_edits
 from .eeprom import factory_reset, save_to_eeprom
-from .favourites import Marks, load_marks, save_marks
+from .favorites import Marks, load_marks, save_marks
 from .link_change import LinkChange
 from .staging import Staging
 from .watched_values import WatchedValues
