@@ -68,7 +68,7 @@ def editor_of(
     snapshot = fakes.snapshot_of(profile, state)
     console = fakes.console_of(snapshot, armed=armed)
     editor = still_editor(console, lambda: snapshot.state)
-    editor.marks = Marks(favourites=("ACC", "HSP"))
+    editor.marks = Marks(favorites=("ACC", "HSP"))
     rest = {} if reading else {p.code: 0 for p in profile.parameters if p.access != "w"}
     image = console.session.image
     for code, raw in {**rest, **state, **HELD}.items():

@@ -22,7 +22,7 @@ FilterId = Literal[
     "unsaved",
     "read-only",
     "unverified",
-    "favourites",
+    "favorites",
     "recent",
 ]
 FILTERS: tuple[FilterId, ...] = (
@@ -33,7 +33,7 @@ FILTERS: tuple[FilterId, ...] = (
     "not factory",
     "differs",
     "unsaved",
-    "favourites",
+    "favorites",
     "recent",
     "read-only",
     "unverified",
@@ -60,7 +60,7 @@ class FilterContext:
     raws: Mapping[str, int] = field(default_factory=dict)
     edits: Edits = field(default_factory=Edits)
     unsaved: Collection[str] = ()
-    favourites: Collection[str] = ()
+    favorites: Collection[str] = ()
     recent: tuple[str, ...] = ()
     other: Mapping[str, int] = field(default_factory=dict)
     """Raw values of the parameter set that the drive is compared with."""
@@ -132,8 +132,8 @@ def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool
             return parameter.access == "r"
         case "unverified":
             return not is_verified(parameter)
-        case "favourites":
-            return code in facts.favourites
+        case "favorites":
+            return code in facts.favorites
         case _:
             return True
 

@@ -14,7 +14,7 @@ from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
 FILTER_LABELS: dict[str, str] = {
     "not factory": "Changed",
     "start-up": "Simply start",
-    "favourites": "Favorites",
+    "favorites": "Favorites",
     "staged": "Staged",
     "differs": "Differs",
     "unsaved": "Unsaved",

@@ -21,7 +21,7 @@ from .group_view import GroupEntry
 from .start_up_view import start_up_items
 from .table_view import TableLine, items_of
 
-FIRST: tuple[FilterId, ...] = ("not factory", "favourites", "staged", "unsaved")
+FIRST: tuple[FilterId, ...] = ("not factory", "favorites", "staged", "unsaved")
 """Filters above the groups; after a comparison `differs` is there too."""
 LAST: tuple[FilterId, ...] = ("recent", "unverified", "read-only", "settings", "all")
 """Filters below the groups."""
@@ -90,8 +90,8 @@ class ParameterList:
     def entries(self, facts: FilterContext) -> list[GroupEntry]:
         """The lines of the column at the left."""
         # not by the rows themselves: this is drawn four times a second
-        known = sum(facts.profile.get(code) is not None for code in facts.favourites)
-        counts = {"favourites": known, "staged": len(facts.edits), "unsaved": len(facts.unsaved)}
+        known = sum(facts.profile.get(code) is not None for code in facts.favorites)
+        counts = {"favorites": known, "staged": len(facts.edits), "unsaved": len(facts.unsaved)}
         counts["not factory"] = len(rows(facts, "not factory"))
         first = [
             GroupEntry(Choice(literal_type), counts[literal_type], pinned=True)

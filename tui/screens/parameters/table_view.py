@@ -112,7 +112,7 @@ def row_line(editor: Editor, item: TableLine, width: int, *, chosen: bool) -> Te
 def _row(editor: Editor, parameter: Parameter, columns: Columns) -> Text:
     code, text = parameter.code, Text(no_wrap=True)
     sure = is_verified(parameter) or code in editor.marks.confirmed
-    text.append("*" if code in editor.marks.favourites else " ", ALARM)
+    text.append("*" if code in editor.marks.favorites else " ", ALARM)
     shown_code = short(code, columns.code - (1 if sure else 2)) + ("" if sure else "?")
     text.append(f"{shown_code:<{columns.code}}", _code_style(parameter, sure))
     if columns.number:

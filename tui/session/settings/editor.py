@@ -81,7 +81,7 @@ class Editor:
             self.session.image.raws,
             self.staging.edits,
             self.unsaved,
-            self.marks.favourites,
+            self.marks.favorites,
             self.marks.recent,
             self.other,
             self.session.image.lacking,

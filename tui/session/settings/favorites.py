@@ -11,13 +11,15 @@ from ..paths import state_folder
 from ..stored import store_json, stored_json
 
 RECENT_KEPT = 30
+STORED_KEYS = {"favorites": "favourites", "confirmed": "confirmed", "recent": "recent"}
+"""Key in the stored file by field; files of earlier versions have the same keys."""
 
 
 @dataclass(frozen=True, slots=True)
 class Marks:
     """Codes of one drive family."""
 
-    favourites: tuple[str, ...] = ()
+    favorites: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
     """Unverified parameters whose address a person has compared with the keypad."""
     recent: tuple[str, ...] = ()
@@ -25,9 +27,9 @@ class Marks:
 
     def toggled(self, code: str) -> Marks:
         """With one more favorite, or one less."""
-        if code in self.favourites:
-            return replace(self, favourites=tuple(c for c in self.favourites if c != code))
-        return replace(self, favourites=(*self.favourites, code))
+        if code in self.favorites:
+            return replace(self, favorites=tuple(c for c in self.favorites if c != code))
+        return replace(self, favorites=(*self.favorites, code))
 
     def with_confirmed(self, code: str) -> Marks:
         """With one more confirmed."""
@@ -41,10 +43,8 @@ class Marks:
 def load_marks(profile_id: str) -> Marks:
     """Return the stored marks; empty if the file is missing or damaged."""
     reported = stored_json(_file(profile_id))
-    listed = (
-        {key: reported.get(key) for key in asdict(Marks())} if isinstance(reported, dict) else {}
-    )
-    return Marks(**{key: _texts(found) for key, found in listed.items()})
+    stored = reported if isinstance(reported, dict) else {}
+    return Marks(**{name: _texts(stored.get(key)) for name, key in STORED_KEYS.items()})
 
 
 def _texts(found: object) -> tuple[str, ...]:
@@ -54,7 +54,8 @@ def _texts(found: object) -> tuple[str, ...]:
 def save_marks(profile_id: str, marks: Marks) -> None:
     """Keep them; a folder that cannot be written is not an error."""
     with suppress(OSError):
-        store_json(_file(profile_id), asdict(marks))
+        fields = asdict(marks)
+        store_json(_file(profile_id), {key: fields[name] for name, key in STORED_KEYS.items()})
 
 
 def _file(profile_id: str) -> Path:
