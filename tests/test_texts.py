@@ -1,4 +1,4 @@
-"""Wording: counts of phrases that a reader stumbles over may fall, never rise.
+"""Wording: no text has a phrase that a reader stumbles over, except those with a reason.
 
 `python -m tests.test_texts [NUMBER...]` lists every hit of a check with its file and line.
 """
@@ -9,7 +9,6 @@ import ast
 import re
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
@@ -25,7 +24,7 @@ FIRST_COMMIT = "2b17417"
 
 BASE_VERBS = """
 accept add allow answer append apply arm back begin change check close coast collect
-compare complete copy create delete diagnose discard do ends exit explain export find
+compare complete copy count create delete diagnose discard do ends exit explain export find
 follow force give go hide identify ignore import include keep learn leave limit list
 listen load log look make map mark monitor name open omit overwrite pause plot poll
 print probe publish put quit read record refuse reject remember remove repeat replace
@@ -46,11 +45,10 @@ class Text(NamedTuple):
 
 
 class Check(NamedTuple):
-    """A phrase to avoid: texts of these kinds, and how many hits there may be."""
+    """A phrase to avoid in texts of these kinds."""
 
     kinds: str
     hits: Callable[[str], int]
-    most: int
     bad: str
     """An example that must be hit."""
 
@@ -77,52 +75,64 @@ def _no_imperative(text: str) -> int:
 
 
 CHECKS: dict[int, Check] = {
-    1: Check("UDS", of(r"\b(is|are|was|be) told\b"), 0, "it is told"),
-    2: Check("UDS", of(r"\btells?\b(?! apart)"), 2, "a drive tells it"),
-    3: Check("UDS", of(r"\bask(s|ed)? (\S+ ){0,2}on\b"), 0, "the drive is asked on"),
-    4: Check("UDS", of(r"asked? no more|nobody asks"), 0, "it is asked no more"),
-    5: Check("UDS", of(r"\bof now\b"), 0, "values of now"),
-    6: Check("UD", of(r"unless told"), 0, "unless told otherwise"),
-    7: Check("UDS", of(r"\bwhoever\b|\bfor who\b|who it is"), 0, "whoever starts"),
-    8: Check("UDS", of(r"(?<!there )\b(is|are) no (?!longer)\w+"), 1, "x is no line"),
-    9: Check("UDS", of(r"\banew\b|\bmend"), 4, "read anew"),
-    10: Check("UDS", of(r"\ball the same\b|(?<!restart )\bby itself\b"), 0, "ends by itself"),
-    11: Check("UD", of(r"from (here|elsewhere)\b|\bof others\b"), 0, "commanded from here"),
-    12: Check("UD", of(r"\bgo(es)? (out|by|with)\b|\bwent out\b"), 1, "the frame goes out"),
-    13: Check("U", of(r"there already|is there again"), 0, "x is there already"),
-    14: Check("UD", of(r"\b(no|some|any)body\b"), 2, "nobody answers"),
-    15: Check("UDS", of(r"\bstands?\b(?! for\b)"), 1, "it stands there"),
-    16: Check("UDS", of(r"\b(became|becomes?) of\b|\bc(a|o)mes? to\b"), 0, "what becomes of it"),
-    17: Check("UDS", of(r"\btime-outs?\b"), 0, "its time-out"),
+    1: Check("UDS", of(r"\b(is|are|was|be) told\b"), "it is told"),
+    2: Check("UDS", of(r"\btells?\b(?! apart)"), "a drive tells it"),
+    3: Check("UDS", of(r"\bask(s|ed)? (\S+ ){0,2}on\b"), "the drive is asked on"),
+    4: Check("UDS", of(r"asked? no more|nobody asks"), "it is asked no more"),
+    5: Check("UDS", of(r"\bof now\b"), "values of now"),
+    6: Check("UD", of(r"unless told"), "unless told otherwise"),
+    7: Check("UDS", of(r"\bwhoever\b|\bfor who\b|who it is"), "whoever starts"),
+    8: Check("UDS", of(r"(?<!there )\b(is|are) no (?!longer)\w+"), "x is no line"),
+    9: Check("UDS", of(r"\banew\b|\bmend"), "read anew"),
+    10: Check("UDS", of(r"\ball the same\b|(?<!restart )\bby itself\b"), "ends by itself"),
+    11: Check("UD", of(r"from (here|elsewhere)\b|\bof others\b"), "commanded from here"),
+    12: Check("UD", of(r"\bgo(es)? (out|by|with)\b|\bwent out\b"), "the frame goes out"),
+    13: Check("U", of(r"there already|is there again"), "x is there already"),
+    14: Check("UD", of(r"\b(no|some|any)body\b"), "nobody answers"),
+    15: Check("UDS", of(r"\bstands?\b(?! for\b)"), "it stands there"),
+    16: Check("UDS", of(r"\b(became|becomes?) of\b|\bc(a|o)mes? to\b"), "what becomes of it"),
+    17: Check("UDS", of(r"\btime-outs?\b"), "its time-out"),
     18: Check(
         "UDSNL",
         of("colour|favourite|neighbour|behaviour|analogue|licence|recognis"),
-        11,
         "one_colour",
     ),
     19: Check(
-        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), 3, "told_by"
+        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), "told_by"
     ),
-    20: Check("N", of(r"^_?of_", 0), 0, "of_drives"),
+    20: Check("N", of(r"^_?of_", 0), "of_drives"),
     21: Check(
         "U",
         of(r"^(takes|keeps|leaves|writes|gives|does|closes|opens)( \w+)?$", 0),
-        5,
         "takes it",
     ),
-    22: Check("L", _no_imperative, 1, "What a drive does"),
-    23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), 0, "What it does."),
-    24: Check("D", _long, 0, "It is: one; and then two: three."),
+    22: Check("L", _no_imperative, "What a drive does"),
+    23: Check("S", of(r"\A(What|Who|Whom|Whether|Where|How)\b", 0), "What it does."),
+    24: Check("D", _long, "It is: one; and then two: three."),
     25: Check(
         "G",
         lambda text: int(bool(re.match(r"(A|An|The|What|Who|Where|No|One)\b", text))
                          or len(text) > 72),
-        0,
         "The line is open",
     ),
-    27: Check("N", of(r"^one$", 0), 0, "one"),
-    26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), 0, "test_who_asks"),
+    27: Check("N", of(r"^one$", 0), "one"),
+    26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), "test_who_asks"),
 }  # fmt: skip
+
+EXCEPTIONS: dict[tuple[int, str, str], str] = {
+    (2, "tells", "tui/drive/profile/field_texts.py"): "a key of profiles, on lamps",
+    (9, "counted-anew", "tui/session/counters"): "a kind in the JSON of `counters`",
+    (9, "mended", "tui/session"): "a kind of entry in journals, also of earlier versions",
+    (18, "analogue_input_1", "tui/drive/profile/schema"): "a quantity of profiles",
+    (18, "analogue_input_2", "tui/drive/profile/schema"): "a quantity of profiles",
+    (18, "favourites", "tui/session/settings/favorites.py"): "the key in stored files",
+    (19, "asked", "tui/cli/documents"): "a JSON field of `why`, `counters` and `listen`",
+    (21, "does", "tui/cli/shared/watch_rows.py"): "a JSON field of `watch`",
+    (21, "does", "tui/drive/profile/field_texts.py"): "a key of profiles",
+    (21, "writes", "tui/cli/commands/serve.py"): "a JSON field of `serve`",
+    (21, "writes", "tui/cli/shared/listen_outputs.py"): "a JSON field of `listen`",
+}
+"""By check, whole text and place: the reason why a hit stays. The texts are public."""
 
 
 def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
@@ -223,33 +233,51 @@ def all_texts() -> tuple[Text, ...]:
     return (*found, *_subjects())
 
 
-def hits(check: Check, texts: Iterable[Text]) -> Iterator[tuple[Text, int]]:
-    """The texts that a check finds fault with, and how often in each."""
+def hits(number: int, texts: Iterable[Text]) -> Iterator[tuple[Text, int]]:
+    """Yield the texts that a check rejects, and the number of hits in each."""
+    check = CHECKS[number]
     for text in texts:
-        if text.kind in check.kinds and (count := check.hits(text.text)):
+        count = check.hits(text.text) if text.kind in check.kinds else 0
+        if count and not is_excepted(number, text):
             yield text, count
 
 
-def test_no_check_finds_more_than_before() -> None:
-    counts = Counter((item.kind, item.text) for item in all_texts())
-    found = {
-        number: sum(
-            times * check.hits(text)
-            for (kind, text), times in counts.items()
-            if kind in check.kinds
-        )
-        for number, check in CHECKS.items()
-    }
-    more = {n: f"{found[n]}, at most {CHECKS[n].most}" for n in CHECKS if found[n] > CHECKS[n].most}
-    assert more == {}, "`python -m tests.test_texts NUMBER` lists the hits of a check"
+def is_excepted(number: int, text: Text) -> bool:
+    """Return True if a hit has a reason to stay."""
+    return any(
+        (number, text.text) == (check, excepted) and text.path.startswith(place)
+        for check, excepted, place in EXCEPTIONS
+    )
+
+
+@pytest.mark.parametrize("number", CHECKS)
+def test_no_text_has_a_phrase_to_avoid(number: int) -> None:
+    found = {f"{text.path}:{text.line}: {text.text}" for text, _ in hits(number, all_texts())}
+    assert not found
+
+
+def test_every_exception_is_needed() -> None:
+    for number, excepted, place in EXCEPTIONS:
+        check = CHECKS[number]
+        assert check.hits(excepted)
+        assert any(
+            text.text == excepted and text.kind in check.kinds and text.path.startswith(place)
+            for text in all_texts()
+        ), excepted
+
+
+def test_exception_holds_for_its_place_only() -> None:
+    public = Text("N", "tui/cli/documents/parts.py", 1, "asked")
+    assert not list(hits(19, [public]))
+    assert list(hits(19, [public._replace(path="tui/bus/line.py")]))
 
 
 @pytest.mark.parametrize("number", CHECKS)
 def test_check_finds_its_example(number: int) -> None:
     check = CHECKS[number]
     bad = Text(check.kinds[0], "x", 1, check.bad)
-    assert list(hits(check, [bad]))
-    assert not list(hits(check, [bad._replace(text="Stop the motor.")]))
+    assert list(hits(number, [bad]))
+    assert not list(hits(number, [bad._replace(text="Stop the motor.")]))
 
 
 def test_texts_of_a_module_are_sorted_by_kind() -> None:
@@ -284,8 +312,8 @@ def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 if __name__ == "__main__":
     for wanted in [int(item) for item in sys.argv[1:]] or CHECKS:
-        listed = list(hits(CHECKS[wanted], all_texts()))
-        print(f"{wanted}: {sum(c for _, c in listed)} hits, at most {CHECKS[wanted].most}")
+        listed = list(hits(wanted, all_texts()))
+        print(f"{wanted}: {sum(c for _, c in listed)} hits")
         if sys.argv[1:]:
             for text, _ in listed:
                 print(f"  {text.path}:{text.line}: {' '.join(text.text.split())[:120]}")

@@ -32,7 +32,7 @@ GATEWAY_SUSPENDED_AFTER: Final = 2.0
 """Seconds without a turn of its loop after which the gateway drops the commands that came in the
 meantime."""
 REQUEST_ANSWERED_WITHIN: Final = 15.0
-"""Seconds that a commander has to answer a request for its drive. Then the answer is no while
+"""Seconds that a commander has to answer a request for its drive. Then no answer means no while
 the motor runs, yes at standstill."""
 STANDSTILL_SEEN_WITHIN: Final = 2.0
 """Seconds since the motor was seen at standstill, for that yes."""

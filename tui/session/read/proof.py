@@ -92,8 +92,8 @@ class SlotEvidence:
         return bool(code) and self.brings(slot) == code
 
     def excludes(self, slot: str, raw: int) -> bool:
-        """Return True if a place surely returns something other than its slot's raw value stands
-        for."""
+        """Return True if a place surely returns another parameter than its slot's raw value
+        selects."""
         return not self.holds(slot, raw) and self._excluded(slot, self._code(raw))
 
     def open_codes(self, chosen: Mapping[str, int]) -> list[str]:
