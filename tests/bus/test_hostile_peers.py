@@ -19,9 +19,8 @@ from hypothesis import strategies as st
 from tui.bus.api import Priority
 from tui.bus.errors import LineError
 from tui.bus.link import Link, RtuTcpLink, TcpLink
-from tui.bus.master import LineContext, Sending
+from tui.bus.master import LineContext, Piece, ResultKind, Sending
 from tui.bus.requests import Read
-from tui.bus.result import Piece, ResultKind
 from tui.bus.rtu.exchange import FLOOD, RtuExchange
 from tui.bus.rtu.master import RtuMaster
 from tui.bus.tally import Tally

@@ -14,8 +14,8 @@ from tui.bus.errors import LineError, LineLost, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line, LineStatus, Timing
 from tui.bus.link import RtuTcpLink
+from tui.bus.master import ExchangeResult, Piece, ResultKind
 from tui.bus.requests import Read, WriteOne
-from tui.bus.result import ExchangeResult, Piece, ResultKind
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.in_step import InStep
 from tui.bus.schedule.outcomes import Outcomes

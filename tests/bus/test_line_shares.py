@@ -10,9 +10,8 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import LineLost
 from tui.bus.line import Timing
-from tui.bus.master import Sending
+from tui.bus.master import ExchangeResult, ResultKind, Sending
 from tui.bus.requests import Read, WriteOne
-from tui.bus.result import ExchangeResult, ResultKind
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job

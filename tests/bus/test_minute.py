@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from tui.bus.master import ExchangeResult, Piece, ResultKind
 from tui.bus.minute import BUCKET, BUCKETS, MinuteWindow
 from tui.bus.model import LastMinute, Priority, Timing
 from tui.bus.requests import Read
-from tui.bus.result import ExchangeResult, Piece, ResultKind
 from tui.bus.schedule.outcomes import SHORT_SILENCE, Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job

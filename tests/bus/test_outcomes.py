@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tui.bus.limits import CAUTIOUS
+from tui.bus.master import ExchangeResult, ResultKind
 from tui.bus.model import Priority, Timing
 from tui.bus.requests import Read
-from tui.bus.result import ExchangeResult, ResultKind
 from tui.bus.schedule.outcomes import Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job

@@ -13,9 +13,8 @@ import pytest
 from tests.adapters import Adapters
 from tests.adapters import adapters as adapters  # the fixture is for these tests too
 from tui.bus.link import SerialLink
-from tui.bus.master import LineContext, Sending
+from tui.bus.master import LineContext, ResultKind, Sending
 from tui.bus.requests import Read
-from tui.bus.result import ResultKind
 from tui.bus.rtu.master import RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.trace import Trace

@@ -7,8 +7,8 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.line import Timing
+from tui.bus.master import Piece
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
-from tui.bus.result import Piece
 from tui.bus.schedule.backoff import pause
 from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, SHORT_WAIT, Devices
 from tui.bus.schedule.queue import Job, JobQueue

@@ -14,9 +14,8 @@ import pytest
 import serial
 
 from tui.bus.link import SerialLink, character_time
-from tui.bus.master import LineContext, Sending
+from tui.bus.master import LineContext, ResultKind, Sending
 from tui.bus.requests import Read, Request, WriteOne
-from tui.bus.result import ResultKind
 from tui.bus.rtu.exchange import REFUSAL, RtuExchange
 from tui.bus.rtu.master import BEFORE_END, RtuMaster
 from tui.bus.tally import Tally

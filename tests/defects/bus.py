@@ -12,8 +12,8 @@ DEFECTS = (
     Defect(
         "checksum-not-checked",
         "tui/bus/rtu",
-        "if is_whole(data[match.start : match.end]):",
-        "if match:",
+        "if is_whole(data[found.start : found.end]):",
+        "if found:",
         "A value damaged by noise on the cable is shown and acted on.",
         ("tests/bus/test_rtu.py",),
     ),

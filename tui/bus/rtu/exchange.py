@@ -5,11 +5,14 @@ Knows no clock and no port: fed with bytes, told of silence and of the timeout.
 
 from __future__ import annotations
 
-from tui.wire.frames import MAX_FRAME
+from collections.abc import Iterator
+from typing import NamedTuple
 
-from ..expectation import EXCEPTION, Expectation
-from ..result import ExchangeResult, Piece, ResultKind
-from .frames import Match, begins_reply, find_reply, pieces
+from tui.wire.frame_search import frame_ends
+from tui.wire.frames import MAX_FRAME, is_whole
+
+from ..expectation import EXCEPTION, Expectation, exception_code, exception_extents
+from ..master import ExchangeResult, Piece, ResultKind
 
 FLOOD = 4096
 """Bytes of one exchange beyond which the older half is let go: no line says that much."""
@@ -17,6 +20,14 @@ REFUSAL, REFUSED_LATER = 5, 2
 """Characters of the shortest reply, and those after it that are awaited as well: it is seldom."""
 NOISE = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
+
+
+class ReplyExtent(NamedTuple):
+    """Place of the awaited reply among received bytes, from device to checksum."""
+
+    start: int
+    end: int
+    exception: int | None = None
 
 
 class RtuExchange:
@@ -84,12 +95,12 @@ class RtuExchange:
             self._let_go(len(self.buffer) - FLOOD // 2)
         if self._expectation is None:
             return None
-        while match := self._find(self._expectation):
-            if self._skip and match.exception is None:
+        while extent := self._find(self._expectation):
+            if self._skip and extent.exception is None:
                 self._skip -= 1
-                self._skipped_to = match.end
+                self._skipped_to = extent.end
                 continue
-            return self._answered(match)
+            return self._answered(extent)
         self._looked_to = max(0, len(self.buffer) - MAX_FRAME)
         return None
 
@@ -105,7 +116,7 @@ class RtuExchange:
         self._skipped_to = self.buffer.find(result.pdu, self._skipped_to) + len(result.pdu) + 2
         return self.feed(b"")
 
-    def _find(self, expectation: Expectation) -> Match | None:
+    def _find(self, expectation: Expectation) -> ReplyExtent | None:
         if self._is_too_short(expectation):
             return None
         start = max(self._after_echo(), self._skipped_to, self._looked_to)
@@ -129,31 +140,31 @@ class RtuExchange:
         copy = self.buffer.find(self.frame)
         return 0 if copy < 0 else copy + len(self.frame)
 
-    def _answered(self, match: Match) -> ExchangeResult:
+    def _answered(self, extent: ReplyExtent) -> ExchangeResult:
         before = self._after_echo()
         if not self._mirrored:
             if before:
                 self.echo = True
-            elif match.start == 0:
+            elif extent.start == 0:
                 self.echo = False
-        alone = match.end - match.start == len(self.buffer)
-        loose = [] if alone else self._loose(match)
+        alone = extent.end - extent.start == len(self.buffer)
+        loose = [] if alone else self._loose(extent)
         return ExchangeResult(
-            ResultKind.REPLY if match.exception is None else ResultKind.EXCEPTION,
-            pdu=match.pdu,
-            exception=match.exception or 0,
+            ResultKind.REPLY if extent.exception is None else ResultKind.EXCEPTION,
+            pdu=bytes(self.buffer[extent.start + 1 : extent.end - 2]),
+            exception=extent.exception or 0,
             received=bytes(self.buffer),
             strays=[piece for piece in loose if piece.whole],
             resynchronised=bool(loose),
         )
 
-    def _loose(self, match: Match | None = None) -> list[Piece]:
+    def _loose(self, extent: ReplyExtent | None = None) -> list[Piece]:
         """Return the bytes received beside the reply and the echo."""
         rest = bytearray(self.buffer)
         parts = []
-        if match is not None:
-            parts.append(rest[match.end :])
-            del rest[match.start :]
+        if extent is not None:
+            parts.append(rest[extent.end :])
+            del rest[extent.start :]
         copy = rest.find(self.frame)
         if copy >= 0:
             parts.append(rest[:copy])
@@ -221,3 +232,82 @@ class RtuExchange:
         elif self._mirrored and copied:
             result.detail = "only the adapter's echo of it came back"
         return result
+
+
+def find_reply(
+    data: bytes | bytearray,
+    device: int,
+    expectation: Expectation,
+    *,
+    start: int = 0,
+    exceptions: bool = True,
+) -> ReplyExtent | None:
+    """The first reply from `start` on that is the awaited one, checksum included.
+
+    With `exceptions` a refusal of the awaited function counts as well.
+    """
+    at = data.find(device, start)
+    while at >= 0:
+        for found in _candidates(data, at, expectation, exceptions):
+            if is_whole(data[found.start : found.end]):
+                return found
+        at = data.find(device, at + 1)
+    return None
+
+
+def _candidates(
+    data: bytes | bytearray, at: int, expectation: Expectation, exceptions: bool
+) -> Iterator[ReplyExtent]:
+    extent = expectation.extent(data, at + 1)
+    if extent and at + extent + 3 <= len(data):
+        yield ReplyExtent(at, at + extent + 3)
+    function = expectation.function
+    if not exceptions or data[at + 1 : at + 2] != bytes([function | EXCEPTION]):
+        return
+    for length in exception_extents(function):
+        pdu = bytes(data[at + 1 : at + 1 + length])
+        code = exception_code(function, pdu)
+        if code is not None and at + length + 3 <= len(data):
+            yield ReplyExtent(at, at + length + 3, code)
+
+
+def pieces(data: bytes | bytearray) -> list[Piece]:
+    """Received bytes taken apart into whole frames and what lies between them."""
+    found: list[Piece] = []
+    loose = 0
+    for at, end in sorted(frame_ends(data).items()):
+        if at < loose:
+            continue  # inside the frame before
+        if at > loose:
+            found.append(Piece(bytes(data[loose:at]), whole=False))
+        found.append(Piece(bytes(data[at:end]), whole=True))
+        loose = end
+    if len(data) > loose:
+        found.append(Piece(bytes(data[loose:]), whole=False))
+    return found
+
+
+def begins_reply(data: bytes, device: int, function: int) -> bool:
+    """Return True if a reply of the device to the function seems to begin somewhere in the
+    bytes."""
+    heads = (bytes([device, function]), bytes([device, function | EXCEPTION]))
+    return any(head in data for head in heads)
+
+
+def noted(result: ExchangeResult, request: bytes, device: int) -> Iterator[tuple[bytes, str]]:
+    """Yield the received pieces, each with its remark; empty for the reply itself."""
+    if not result.received:
+        return
+    if result.pdu and len(result.received) == len(result.pdu) + 3:
+        yield result.received, ""
+        return
+    for piece in pieces(result.received):
+        if piece.data == request and piece.pdu != result.pdu:
+            note = "echo or answer" if result.kind is ResultKind.UNSURE else "echo"
+        elif not piece.whole:
+            note = "damaged" if result.kind is ResultKind.DAMAGED else "noise"
+        elif piece.device != device:
+            note = f"of device {piece.device}"
+        else:
+            note = "" if piece.pdu == result.pdu else "not the reply"
+        yield piece.data, note

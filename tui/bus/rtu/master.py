@@ -11,13 +11,10 @@ from tui.wire.frames import MAX_FRAME, frame
 
 from ..errors import LineLost
 from ..link import Link, RtuTcpLink, character_time, silence
-from ..master import LineContext, Sending, settle
-from ..result import ExchangeResult, ResultKind
+from ..master import ExchangeResult, LineContext, ResultKind, Sending, settle
 from ..transport.base import Transport
 from ..transport.port_errors import PortErrors
-from .exchange import RtuExchange
-from .frames import pieces
-from .notes import noted
+from .exchange import RtuExchange, noted, pieces
 from .timer import PutOffTimer
 
 BABBLE = 1.0

@@ -8,16 +8,13 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..errors import LineBehind, LineClosed, LineError, LineFailed, LineLost, RequestRefused
-from ..master import Master, MonotonicClock, Sending
+from ..master import ExchangeResult, Master, MonotonicClock, Piece, ResultKind, Sending
 from ..model import Priority, Timing
-from ..requests import Request
-from ..result import ExchangeResult, Piece, ResultKind
+from ..requests import Read, Request
 from ..shared_state import SharedState
 from ..tally import Tally
 from .alive_reads import AliveReads
 from .back_to_back import BackToBack
-from .copies import ask_again, is_copy
-from .echo import resolve_echo
 from .in_step import UNANSWERED, InStep
 from .last_way import LastWay
 from .outcomes import Outcomes, with_fate
@@ -217,11 +214,9 @@ class Dispatcher:
         try:
             result = await master.exchange(self._sending(job))
             if result.kind is ResultKind.UNSURE:
-                await resolve_echo(master, job, result, self._devices, self._outcomes)
-            if is_copy(job, result, self._devices):
-                result = await ask_again(
-                    master, job, result, self._sending(job), self._devices, self._outcomes
-                )
+                await self._resolve_echo(master, job, result)
+            if self._may_be_copy(job, result):
+                result = await self._ask_again(master, job, result)
         except _NotSent as reason:
             self._not_sent(job, str(reason))
             return
@@ -242,6 +237,46 @@ class Dispatcher:
         self.in_flight = False
         self._queue.count(job, begun, self._clock(), acknowledged=result.kind is ResultKind.REPLY)
         self._conclude(job, result, begun)
+
+    async def _resolve_echo(self, master: Master, job: Job, result: ExchangeResult) -> None:
+        """Decide if a result is the adapter's echo or the reply, by the echo of a read.
+
+        Raises LineLost.
+        """
+        request = job.request
+        if Read.function in job.limits.functions:
+            probe = Read(request.device, request.register, 1)
+            await master.quiet()
+            time_out = self._devices.time_out(request.device, probe.function, job.priority)
+            probed = await master.exchange(
+                Sending(request.device, probe.pdu(), probe.expectation(), time_out)
+            )
+            self._outcomes.count_beside(request.device, probed)
+        if master.echo is False:
+            result.kind, result.pdu = ResultKind.REPLY, job.pdu
+        else:
+            result.kind = ResultKind.NOTHING
+            result.detail = "only the adapter's echo of it came back"
+
+    def _may_be_copy(self, job: Job, result: ExchangeResult) -> bool:
+        return result.kind is ResultKind.REPLY and self._devices.is_repeat(
+            job.request.device, job.pdu, result.pdu, result.turnaround
+        )
+
+    async def _ask_again(self, master: Master, job: Job, doubted: ExchangeResult) -> ExchangeResult:
+        """Send a request again whose reply may be a copy of the previous one.
+
+        The first of its two replies is right in either case. Raises LineLost.
+        """
+        device = job.request.device
+        await master.quiet()
+        result = await master.exchange(self._sending(job))
+        self._outcomes.count_beside(device, doubted)
+        if result.pdu != doubted.pdu and job.expectation is not None:
+            # it was a copy: one more reply to this request is on its way
+            self._devices.may_come(device, job.expectation, result.sent, result.end)
+        self._outcomes.note_strays(doubted.strays, doubted.end)
+        return result
 
     async def _prove(self, master: Master, job: Job, probe: Request) -> None:
         """Send a probe for a job that waits; without a reply, the job has none either."""

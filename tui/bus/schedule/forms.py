@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..limits import Limits, send_refusal
-from ..master import MonotonicClock
+from ..master import ExchangeResult, MonotonicClock, ResultKind
 from ..requests import Read
-from ..result import ExchangeResult, ResultKind
 
 MOST_MORE = 8
 """Registers that are read in addition at most."""

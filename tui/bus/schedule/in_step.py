@@ -11,10 +11,9 @@ from collections.abc import Callable
 
 from ..errors import ONE_BEHIND, LineBehind
 from ..expectation import EXCEPTION, IDENTIFY, REPORT_ID, Expectation
-from ..master import Master, MonotonicClock, Sending
+from ..master import ExchangeResult, Master, MonotonicClock, Piece, ResultKind, Sending
 from ..model import Priority, Timing
 from ..requests import Diagnose, Read, Request
-from ..result import ExchangeResult, Piece, ResultKind
 from .outcomes import Outcomes
 from .patience import Devices
 from .probes import LOOKED_BACK, Probes, may_be_silent

@@ -16,10 +16,9 @@ from ..errors import (
     WrongReply,
 )
 from ..limits import STANDARD_EXCEPTIONS
-from ..master import MonotonicClock
+from ..master import ExchangeResult, MonotonicClock, Piece, ResultKind
 from ..model import Priority, Reply, Timing
 from ..requests import BROADCAST
-from ..result import ExchangeResult, Piece, ResultKind
 from ..shared_state import SharedState
 from ..tally import Tally
 from .patience import Devices

@@ -8,9 +8,9 @@ from tui.safety import LATE_MARGIN, LONGEST_WAIT, MARGIN, MISSES, QUIET_SHARE
 
 from ..expectation import EXCEPTION, Expectation
 from ..limits import Limits
+from ..master import Piece, StrayKind
 from ..model import DeviceState, Priority, Timing
 from ..requests import Read, WriteMany
-from ..result import Piece, StrayKind
 from .backoff import pause
 from .device_record import Device, Outstanding, note_turnaround, usual
 

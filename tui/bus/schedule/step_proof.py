@@ -10,10 +10,9 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 
-from ..master import Master, MonotonicClock, Sending
+from ..master import ExchangeResult, Master, MonotonicClock, ResultKind, Sending
 from ..model import Priority
 from ..requests import BROADCAST, Diagnose, Read, Request
-from ..result import ExchangeResult, ResultKind
 from .in_step import InStep
 from .outcomes import Outcomes
 from .patience import Devices

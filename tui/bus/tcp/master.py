@@ -10,8 +10,7 @@ from pymodbus.pdu import DecodePDU
 
 from ..errors import LineLost
 from ..expectation import exception_code
-from ..master import LineContext, Sending, settle
-from ..result import ExchangeResult, Piece, ResultKind
+from ..master import ExchangeResult, LineContext, Piece, ResultKind, Sending, settle
 from ..transport.base import Transport
 
 HEADER_LENGTH = 7
