@@ -42,7 +42,7 @@ from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 
 PERIOD = 0.5
 """Wished cycle of each monitor in s, the panel's usual one."""
@@ -132,7 +132,7 @@ class Watched:
                 self._times[device, code] = reading.time
                 self._check(device, code, reading, snapshot.block)
 
-    def _check(self, device: int, code: str, reading: Reading, way: str) -> None:
+    def _check(self, device: int, code: str, reading: Shown, way: str) -> None:
         want = self._values[device].get(code)
         if want is None:
             return

@@ -14,7 +14,8 @@ from tui.drive.values import decode
 from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.monitor.snapshot import Snapshot
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading, with_text
+from tui.session.shown import Quality
 
 NOW = 1000.0
 WALL = 1_700_000_000.0
@@ -76,7 +77,7 @@ def drive_of(seen: Snapshot, profile: Profile | None = None, now: float = NOW) -
 
 def failed(seen: Snapshot, error: str) -> Snapshot:
     """Earlier values, as in a failed cycle."""
-    readings = {c: replace(r, quality=Quality.STALE) for c, r in seen.readings.items()}
+    readings = {c: replace(r, quality=Quality.STALE) for c, r in with_text(seen.readings).items()}
     state = drive_state(small_drive(), readings)
     return replace(seen, readings=readings, state=state, error=error, contact="silent")
 

@@ -18,6 +18,7 @@ from tui.cli.plant.metrics import BASE_UNITS, metrics_text, value_metric
 from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
 from tui.cli.plant.status import DriveStatus, LineReport
 from tui.drive.profile import library
+from tui.session.reading import with_text
 
 from .plant_sights import NOW, counted, cycle, drive_of, failed, line_of, small_drive
 
@@ -101,7 +102,7 @@ def test_uncertain_value_is_not_a_number_and_taught_scale_is_marked() -> None:
     changed = {"RFR": {"unsure": True}, "THD": {"taught": True}}
     readings = {
         code: replace(reading, value=replace(reading.value, **changed[code]))  # type: ignore[type-var]
-        for code, reading in seen.readings.items()
+        for code, reading in with_text(seen.readings).items()
     }
     text = text_of(line_of(drive_of(replace(seen, readings=readings))))
     assert "drivepanel_value_hertz" not in text

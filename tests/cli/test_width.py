@@ -15,7 +15,8 @@ from tui.cli.shared.say import say, say_row
 from tui.cli.shared.sets import complain_absent
 from tui.drive.profile import library
 from tui.drive.values import decode
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 
 ATV71 = library.load("atv71")
 LONG = "10 s, then: Fault SLF1, the motor freewheels; as it leaves the factory."

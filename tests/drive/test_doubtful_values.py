@@ -8,7 +8,8 @@ from tui.cli.shared.output import reading_json
 from tui.drive.profile import library
 from tui.drive.shown import shown
 from tui.drive.values import from_words
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312"])

@@ -21,7 +21,8 @@ from tui.cli.shared.output import readings_table
 from tui.drive.profile import library
 from tui.drive.values import decode
 from tui.session.monitor.rates import monitoring_codes
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 
 WATCH = ("watch", "sim:atv71@2", "-d", "2", "ETA", "--every", "0.1", "--json")
 ENDINGS = [signal.SIGINT, signal.SIGTERM]

@@ -29,7 +29,8 @@ from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.paths import recent_lines, remember_line, state_folder
 from tui.session.read.reader import Reader
-from tui.session.reading import Quality
+from tui.session.reading import reading_of
+from tui.session.shown import Quality
 from tui.simulator import DriveSpec, Simulation
 
 pytestmark = pytest.mark.usefixtures("patient_lines")
@@ -99,15 +100,15 @@ async def test_the_monitor_tells_what_the_motor_does(five: OpenLine, profile: st
     frequency = drive.profile.quantity("output_frequency")
     if frequency is not None:
         code = frequency.code
-        first = latest.readings[code].number or 0.0
+        first = reading_of(latest.readings[code]).number or 0.0
 
         def faster() -> bool:
             now = monitor.latest
-            return now is not None and (now.readings[code].number or 0.0) > first + 1
+            return now is not None and (reading_of(now.readings[code]).number or 0.0) > first + 1
 
         await until(faster)
         assert latest.readings[code].quality is Quality.GOOD
-        assert latest.readings[code].unit == "Hz"
+        assert reading_of(latest.readings[code]).unit == "Hz"
     monitor.stop()
     assert not monitor.running
 

@@ -29,7 +29,7 @@ from tui.session.read.order_check import check_byte_order
 from tui.session.read.reader import Reader
 from tui.session.read.retrying_reader import RetryingReader
 from tui.session.read.upload import readable_codes
-from tui.session.reading import Quality
+from tui.session.shown import Quality
 from tui.session.work import Permit
 from tui.simulator import DriveSpec, FaultRates, Simulation
 

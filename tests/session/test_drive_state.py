@@ -7,7 +7,8 @@ import pytest
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.drive_state import channel_text, drive_state
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 
 from .fakes import parameter, profile_of
 
@@ -106,8 +107,8 @@ def test_a_channel_word_is_reported_by_its_bits() -> None:
     bits = [{"bit": 0, "name": "terminals"}, {"bit": 3, "name": "Modbus"}]
     profile = profile_of(parameter("CCC", 8442, bits=bits))
     reading = readings(profile, CCC=8)["CCC"]
-    assert channel_text(profile["CCC"], reading) == "Modbus"
-    assert channel_text(profile["CCC"], None) == ""
+    assert reading.value is not None
+    assert channel_text(profile["CCC"], reading.value) == "Modbus"
 
 
 def test_values_without_the_status_word_tell_no_state() -> None:

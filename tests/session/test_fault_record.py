@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tui.session.monitor.fault_record import Recorder, record_name, record_text
+from tui.session.reading import reading_of
 
 from .test_command import Bench, bench
 
@@ -18,7 +19,7 @@ def watched(made: Bench) -> Recorder:
 def speed(made: Bench) -> float:
     """What Monitor shows, in Hz."""
     assert made.console.latest is not None
-    return made.console.latest.readings["RFR"].number or 0.0
+    return reading_of(made.console.latest.readings["RFR"]).number or 0.0
 
 
 async def test_a_trip_freezes_values_and_writes_of_the_seconds_before() -> None:

@@ -17,7 +17,7 @@ from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.rotation import Rotation
-from tui.session.reading import Quality
+from tui.session.shown import Quality
 
 from .fakes import OneDrive, parameter, profile_of
 

@@ -15,7 +15,8 @@ from tui.drive.profile import library
 from tui.drive.values import decode, type_range
 from tui.session.read.proof import SlotEvidence
 from tui.session.read.verdict import SlotMatch
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 
 PROFILE = library.load("atv21")
 BLOCK = block_of(PROFILE, "read")

@@ -11,7 +11,7 @@ from tui.bus.errors import NoAnswer
 from tui.session.drive import DriveSession
 from tui.session.read.kept_plans import PLANS_KEPT
 from tui.session.read.reader import Reader
-from tui.session.reading import Quality, Rating
+from tui.session.shown import Quality, Rating
 
 from .fakes import BlockDrive, OneDrive, parameter, profile_of
 

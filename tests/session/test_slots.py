@@ -24,7 +24,8 @@ from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
 from tui.session.read.slots import Slots
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 from .fake_clock import FakeClock

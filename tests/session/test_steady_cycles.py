@@ -18,7 +18,7 @@ from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.rates import SLOW_FACTOR
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.steady_cycles import LONGEST_STEADY
-from tui.session.reading import Quality
+from tui.session.shown import Quality
 
 from .fakes import OneDrive, parameter, profile_of
 

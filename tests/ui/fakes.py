@@ -41,7 +41,8 @@ from tui.session.monitor.look import Look
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.trend import Trend, TrendPoint
-from tui.session.reading import Quality, Reading
+from tui.session.reading import Reading
+from tui.session.shown import Quality
 from tui.session.timeout_report import TimeoutWatch
 from tui.terminal.abilities import EVERYTHING, Abilities
 

@@ -18,6 +18,7 @@ from tui.screens.monitor.screen import REFRESH
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor
+from tui.session.reading import reading_of, with_text
 
 LARGE = ("RFR", "LCR", "RFRD", "OTR")
 
@@ -63,11 +64,11 @@ class PlainPanel(App[None]):
             return
         now = asyncio.get_running_loop().time()
         for code in LARGE:
-            self.query_one(f"#{code}", Digits).update(snapshot.readings[code].text)
+            self.query_one(f"#{code}", Digits).update(reading_of(snapshot.readings[code]).text)
         points = [point.values[0] or 0.0 for point in monitor.trend][-80:]
         self.query_one(Sparkline).data = points
         table = self.query_one(DataTable)
-        for code, reading in snapshot.readings.items():
+        for code, reading in with_text(snapshot.readings).items():
             if code in table.rows:
                 table.update_cell(code, "value", reading.text)
                 table.update_cell(code, "age", f"{reading.age(now):.1f} s")

@@ -19,7 +19,7 @@ ATV71 = library.load("atv71")
 
 def view(raw: int | None, **more: object) -> DoctorView:
     fault = ATV71.fault(raw) if raw is not None else None
-    made = DoctorView(profile=ATV71, fault=fault, present=True, record=None, readings={})
+    made = DoctorView(profile=ATV71, fault=fault, present=True, record=None, readings={}, now=0.0)
     return replace(made, **more)  # type: ignore[arg-type]
 
 

@@ -23,7 +23,7 @@ from tui.screens.monitor.motor import motor_lines, other_values, value_cells
 from tui.screens.monitor.readouts import readout_lines
 from tui.screens.monitor.view import View
 from tui.session.monitor.trend import TrendPoint
-from tui.session.reading import Quality
+from tui.session.shown import Quality
 from tui.widgets.drawing import key_line
 from tui.widgets.gauge import gauge
 from tui.widgets.palette import STOP_KEY

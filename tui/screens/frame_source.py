@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tui.session.drive_state import DriveState
     from tui.session.fleet import Fleet
     from tui.session.monitor.look import Look
-    from tui.session.reading import Reading
+    from tui.session.shown import Shown
 
     from .app_port import Panel
 
@@ -194,18 +194,18 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
 
 def _seen(
     console: DriveConsole, look: Look | None, now: float
-) -> tuple[DriveState | None, float | None, dict[str, Reading]]:
+) -> tuple[DriveState | None, float | None, Mapping[str, Shown]]:
     """State, age where it is not the present, and readings of what was seen last."""
     snapshot = console.latest
     if look is not None:
         age = max(0.0, now - look.time)
         old = age > LOOK_IS_OLD or bool(look.error)
-        return look.state, age if old else None, dict(look.readings)
+        return look.state, age if old else None, look.readings
     if snapshot is None:
         return None, None, {}
     age = max(0.0, now - snapshot.time)
     lost = bool(snapshot.error) or snapshot.is_stale(now)
-    return snapshot.state, age if lost else None, dict(snapshot.readings)
+    return snapshot.state, age if lost else None, snapshot.readings
 
 
 def state_cell(
@@ -213,7 +213,7 @@ def state_cell(
     state: DriveState | None,
     report: StopReport | None,
     now: float,
-    readings: Mapping[str, Reading],
+    readings: Mapping[str, Shown],
 ) -> tuple[str, str]:
     """The kind of the state and its words, a stop on its way before it."""
     if report is not None:
@@ -235,10 +235,10 @@ def state_cell(
     return state.kind, state.headline.upper() or "UNKNOWN"
 
 
-def _is_at_zero(console: DriveConsole, readings: Mapping[str, Reading]) -> bool:
+def _is_at_zero(console: DriveConsole, readings: Mapping[str, Shown]) -> bool:
     parameter = console.session.profile.quantity("output_frequency")
     reading = readings.get(parameter.code) if parameter else None
-    return reading is not None and reading.quality == "good" and reading.number == 0
+    return reading is not None and reading.current_number == 0
 
 
 def stands_by(console: DriveConsole, state: DriveState) -> bool:
@@ -254,15 +254,22 @@ def stands_by(console: DriveConsole, state: DriveState) -> bool:
 
 
 def value_cell(
-    console: DriveConsole, readings: Mapping[str, Reading], quantity: str
+    console: DriveConsole, readings: Mapping[str, Shown], quantity: str
 ) -> tuple[str, str]:
     """Text and unit of a quantity that was read; empty where it was not."""
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
     reading = readings.get(parameter.code) if parameter else None
-    if reading is None:
+    if parameter is None or reading is None:
         return "", ""
-    value = reading.physical or reading.value
-    return (value.text, value.unit) if value is not None else (reading.text, reading.unit)
+    from tui.drive.values import NOT_AVAILABLE  # the first picture needs none of it
+
+    # the row, or the bar, shows the age of all its values in a place of its own
+    return reading.drawn(
+        reading.time,
+        current=lambda value: (value.text, value.unit),
+        old=lambda value, age: (value.text, value.unit),
+        missing=(NOT_AVAILABLE, parameter.unit),
+    )
 
 
 def _commanding(fleet: Fleet, device: int) -> str:

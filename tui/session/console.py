@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from .monitor.fault_record import Recorder
 from .monitor.monitor import Monitor
 from .monitor.snapshot import Snapshot
 from .read.reader import Reader
-from .reading import Reading
+from .shown import Shown
 from .teaching.teacher import Teacher
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class DriveConsole:
         self.monitor.listen(self.recorder.take)
         self.teacher = Teacher(self.session)
 
-    async def read(self, codes: Iterable[str]) -> dict[str, Reading]:
+    async def read(self, codes: Iterable[str]) -> Mapping[str, Shown]:
         """Readings by code, asked for by a person; raises the line's errors."""
         return await Reader(self.session).read(codes)
 

@@ -21,7 +21,8 @@ from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
 from .connect.prepared_stop import prepared_stop
 from .image import RegisterImage
-from .reading import Rating, Reading
+from .reading import Reading
+from .shown import Rating
 from .starts.keeper import StartKeeper
 from .timeout_report import Timeout
 from .unsaved import UnsavedSettings

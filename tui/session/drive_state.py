@@ -10,9 +10,9 @@ from typing import TypeVar
 from tui.drive.chart import ChartState, Direction, read_chart
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Bit, FaultCode, Parameter, StateKind
-from tui.drive.values import set_bits
+from tui.drive.values import Value, set_bits
 
-from .reading import Quality, Reading
+from .shown import Quality, Shown
 
 Signed = TypeVar("Signed", float, Decimal)
 """A number with the sign of a direction."""
@@ -44,7 +44,7 @@ class DriveState:
     """The state in a word or two; empty where its words were not asked for."""
 
 
-def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState:
+def drive_state(profile: Profile, readings: Mapping[str, Shown]) -> DriveState:
     """The state in these readings; stale and bad ones show nothing."""
     raws = {
         code: reading.raw
@@ -72,7 +72,7 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
     )
 
 
-def _requested(profile: Profile, readings: Mapping[str, Reading]) -> bool:
+def _requested(profile: Profile, readings: Mapping[str, Shown]) -> bool:
     """Return True if the words that show the state are among those read at all."""
     return any(chart.status in readings for chart in profile.data.charts)
 
@@ -121,11 +121,8 @@ def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> S
     return -number if not signed and state.direction == "reverse" else number
 
 
-def channel_text(parameter: Parameter, reading: Reading | None) -> str:
-    """Return the commander or reference source, from an enumeration or a word of one bit a
-    channel."""
-    if reading is None or reading.raw is None:
-        return ""
+def channel_text(parameter: Parameter, value: Value) -> str:
+    """Name the commander or the reference source: an enumeration, or a word with a bit for each."""
     if parameter.bits:
-        return ", ".join(bit.name for bit in set_bits(parameter.bits, reading.raw)) or "none"
-    return reading.text
+        return ", ".join(bit.name for bit in set_bits(parameter.bits, value.raw)) or "none"
+    return value.text

@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from enum import StrEnum
+from typing import cast
 
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import NOT_AVAILABLE, Value
 
-
-@dataclass(frozen=True, slots=True)
-class Rating:
-    """Value of 100 %: a number and its unit."""
-
-    number: Decimal
-    unit: str
-
-
-class Quality(StrEnum):
-    """True if a value may be taken for the present one."""
-
-    GOOD = "good"
-    STALE = "stale"
-    BAD = "bad"
+from .shown import Drawn, Quality, Shown
 
 
 class Origin(StrEnum):
@@ -73,6 +60,25 @@ class Reading:
             return None
         return float(self.value.number)
 
+    @property
+    def current_number(self) -> float | None:
+        """The engineering value if it is current."""
+        return self.number if self.quality is Quality.GOOD else None
+
+    def drawn(
+        self,
+        now: float,
+        *,
+        current: Callable[[Value], Drawn],
+        old: Callable[[Value, float], Drawn],
+        missing: Drawn,
+    ) -> Drawn:
+        """Draw the value, in the unit of its rating if that is known; see `Shown.drawn`."""
+        value = self.physical or self.value
+        if value is None:
+            return missing
+        return current(value) if self.quality is Quality.GOOD else old(value, self.age(now))
+
     def age(self, now: float) -> float:
         """Seconds since the value was on the wire."""
         return max(0.0, now - self.time)
@@ -112,3 +118,13 @@ class Reading:
     ) -> Reading:
         """A parameter without a value, and why."""
         return cls(parameter, None, None, Quality.BAD, time, error, absent=absent, silent=silent)
+
+
+def reading_of(shown: Shown) -> Reading:
+    """The reading that a session created, with its text."""
+    return cast("Reading", shown)  # there is no other implementation
+
+
+def with_text(readings: Mapping[str, Shown]) -> Mapping[str, Reading]:
+    """The readings by code, with their text: for output that has columns for quality and time."""
+    return {code: reading_of(shown) for code, shown in readings.items()}

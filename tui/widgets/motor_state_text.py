@@ -7,10 +7,10 @@ from rich.text import Text
 from tui.bus.api import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
+from tui.drive.values import NOT_AVAILABLE
 from tui.session.monitor.line_watch import GLANCE
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot, stale_after
-from tui.session.reading import Quality
 
 from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text
 from .palette import ALARM, FAINT, PLAIN, STALE, STRONG
@@ -41,13 +41,17 @@ def motor_state_text(
     for quantity in QUANTITIES_NOW:
         parameter = profile.quantity(quantity)
         reading = snapshot.readings.get(parameter.code) if parameter else None
-        if reading is None:
+        if parameter is None or reading is None:
             continue
-        value = reading.physical or reading.value
-        good = value is not None and reading.quality is Quality.GOOD
-        shown = value.text if value else reading.text
-        text.append(f"{shown:>{NUMBER_WIDTH}}", STRONG if good else STALE)
-        text.append(f" {(value.unit if value else reading.unit) or 'raw'} ", FAINT)
+        none = (NOT_AVAILABLE, parameter.unit, STALE)
+        number, unit, style = reading.drawn(
+            now,
+            current=lambda value: (value.text, value.unit, STRONG),
+            old=lambda value, age: (value.text, value.unit, STALE),
+            missing=none,
+        )
+        text.append(f"{number:>{NUMBER_WIDTH}}", style)
+        text.append(f" {unit or 'raw'} ", FAINT)
     text.rstrip()
     return text
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from tui.bus.api import TURNAROUND_EDGES, Contact, DeviceCounters, LineStatus
 from tui.drive.profile.schema import StateKind
+from tui.session.reading import Reading, with_text
 
 from .status import DriveStatus, LineReport
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.reading import Reading
 
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 PREFIX = "drivepanel"
@@ -231,7 +231,7 @@ def _drive_samples(where: Labels, drive: DriveStatus, now: float) -> Iterator[Me
         if state.fault is not None:
             fault = {**where, "fault": state.fault.code, "name": state.fault.name}
             yield MetricSample("drive_fault_info", fault, 1)
-    for code, reading in drive.cycle.readings.items():
+    for code, reading in with_text(drive.cycle.readings).items():
         yield from _value_samples({**where, **_who(drive.session, code)}, reading, now)
 
 

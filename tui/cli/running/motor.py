@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from tui.bus.errors import LineError
 from tui.session.command.stop_report import Phase
 from tui.session.monitor.timeout import left_alone_text
+from tui.session.reading import with_text
 from tui.session.running.ending import Ending
 from tui.session.starts.keeper import StartKeeper
 
@@ -175,7 +176,7 @@ class Run:
     def _frequency(self, latest: Snapshot) -> float | None:
         """The output frequency in Hz, as far as it is known."""
         frequency = self.console.session.profile.quantity("output_frequency")
-        reading = latest.readings.get(frequency.code) if frequency else None
+        reading = with_text(latest.readings).get(frequency.code) if frequency else None
         return reading.number if reading is not None else None
 
     def _stopped_by_itself(self, latest: Snapshot) -> tuple[str, int]:

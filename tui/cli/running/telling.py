@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from tui.session.reading import with_text
+
 from ..commands.orders import complain
 from ..shared.drive_status import shown_values, values_json
 from ..shared.pending_timeouts import timeout_json
@@ -49,7 +51,7 @@ class RunTelling:
     def _state_line(self, latest: Snapshot) -> str:
         if latest.error:
             return f"no answer: {latest.error}"
-        values = shown_values(self._session.profile, latest.readings)
+        values = shown_values(self._session.profile, with_text(latest.readings))
         return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
 
     def tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
@@ -71,7 +73,7 @@ class RunTelling:
                 "state": None if latest.error else state.kind,
                 "direction": None if latest.error else state.direction,
                 "fault": state.fault.code if state.fault and not latest.error else None,
-                "values": values_json(self._session.profile, latest.readings),
+                "values": values_json(self._session.profile, with_text(latest.readings)),
                 "error": latest.error or None,
             }
         self._say(json_text(document(data)))

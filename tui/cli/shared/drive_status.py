@@ -181,7 +181,9 @@ def _channels(
     found = {}
     for quantity, name in CHANNEL_NAMES.items():
         parameter = profile.quantity(quantity)
-        found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
+        reading = readings.get(parameter.code) if parameter else None
+        value = reading.value if reading is not None else None
+        found[name] = channel_text(parameter, value) if parameter and value else ""
     # some families tell who commands by several words
     found["Commanded by"] = state.channel or found["Commanded by"]
     found["Reference from"] = state.reference or found["Reference from"]

@@ -17,13 +17,13 @@ from tui.drive.hints import (
     reset_ready,
     reset_text,
 )
+from tui.session.reading import Reading, with_text
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
     from tui.drive.profile.schema import Hint
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
-    from tui.session.reading import Reading
 
 RESET_BY = "a fault reset"
 
@@ -75,12 +75,13 @@ async def find_out(
         help_ = profile.guide.fault(state.fault.raw if state.fault else None)
         codes = [*codes_to_read(profile, help_), *reset_codes(profile)]
         found = await console.read(list(dict.fromkeys(codes)))
-        return FaultFinding(profile, help_, found)
+        return FaultFinding(profile, help_, with_text(found))
     raws = {code: r.raw for code, r in readings.items() if r.raw is not None}
     for word, bit, name in alarms_on(profile, raws):
         if (hint := profile.guide.alarm(word, bit)) is not None:
             codes = codes_to_read(profile, hint)
-            return FaultFinding(profile, hint, await console.read(codes) if codes else {}, name)
+            found = await console.read(codes) if codes else {}
+            return FaultFinding(profile, hint, with_text(found), name)
     return None
 
 

@@ -289,7 +289,7 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
         return
     from decimal import Decimal
 
-    from tui.session.reading import Rating
+    from tui.session.shown import Rating
 
     session.ratings[current.code] = Rating(Decimal(str(rated_current)), "A")
 

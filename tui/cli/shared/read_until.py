@@ -20,13 +20,14 @@ async def read_until(
     """
     from tui.bus.errors import ExchangeError
     from tui.session.read.reader import Reader
+    from tui.session.reading import with_text
 
     readings: dict[str, Reading] = {}
     failure: Exception | None = None
     for group in sorted(Reader(console.session).groups(codes), key=lambda g: codes.index(g[0])):
         try:
             async with asyncio.timeout_at(end):
-                readings |= await console.read(group)
+                readings |= with_text(await console.read(group))
         except (ExchangeError, TimeoutError) as error:
             if failure is not None and not readings:
                 raise failure from error

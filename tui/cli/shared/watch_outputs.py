@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
+from tui.session.reading import Reading, with_text
+
 from .csv_files import CsvFile
 from .output import console, drive_json, iso_time, print_json, readings_json, readings_table
 from .say import say
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.reading import Reading
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +86,7 @@ class JsonOutput:
 
 def cycle_json(line_text: str, session: DriveSession, snapshot: Snapshot) -> dict[str, Any]:
     """The object of one cycle: values with their own times, state, direction and error."""
-    values = readings_json(line_text, session, snapshot.readings)["values"]
+    values = readings_json(line_text, session, with_text(snapshot.readings))["values"]
     for code, reading in snapshot.readings.items():
         read_at = snapshot.wall - (snapshot.time - reading.time)
         values[code]["time"] = None if reading.raw is None else iso_time(read_at)
@@ -122,7 +123,9 @@ class LineOutput:
 
     def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as a line; a value that is not good is in brackets."""
-        values = "  ".join(_shown(code, read) for code, read in snapshot.readings.items())
+        values = "  ".join(
+            _shown(code, read) for code, read in with_text(snapshot.readings).items()
+        )
         who = self._several.who(drive)
         late, state = late_text(snapshot), snapshot.state.headline
         parts = (_clock(snapshot), who, state, values, snapshot.error, late)
@@ -151,7 +154,8 @@ class TableOutput:
                 late_text(latest),
             )  # fmt: skip
             title = "  ".join(part for part in parts if part)
-            tables.append(readings_table(latest.readings, title, width=self._live.console.width))
+            readings, width = with_text(latest.readings), self._live.console.width
+            tables.append(readings_table(readings, title, width=width))
         self._live.update(Group(*tables), refresh=True)
 
 
@@ -165,7 +169,8 @@ class CsvOutput:
 
     def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Write one cycle as a row."""
-        cells = [self._cell(code, snapshot.readings.get(code)) for code in self._units]
+        readings = with_text(snapshot.readings)
+        cells = [self._cell(code, readings.get(code)) for code in self._units]
         state = snapshot.state
         reported = [snapshot.error, known_state(state) or "", state.direction or ""]
         self._file.write([iso_time(snapshot.wall), *self._several.cells(drive), *cells, *reported])

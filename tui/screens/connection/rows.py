@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tui.session.drive_state import DriveState
     from tui.session.fleet import Fleet, FoundDrive
     from tui.session.monitor.look import Look
-    from tui.session.reading import Reading
+    from tui.session.shown import Shown
 
 TRUSTED_LOOKS = 3
 """Looks after which a value is no longer taken for the present one."""
@@ -29,7 +29,7 @@ VAIN: Mapping[str, tuple[str, str]] = {
 }
 """Words for a look in vain: at first, and once nothing is current any more."""
 
-Seen = tuple["DriveState | None", Mapping[str, "Reading"], float | None, bool, "Contact"]
+Seen = tuple["DriveState | None", Mapping[str, "Shown"], float | None, bool, "Contact"]
 """State, readings, their age in s, whether that is too old, the result of the last look."""
 
 
@@ -101,9 +101,7 @@ def _called(state: DriveState | None, words: str) -> str:
     return words.lower()
 
 
-def _figure(
-    console: DriveConsole, readings: Mapping[str, Reading], quantity: str
-) -> tuple[str, str]:
+def _figure(console: DriveConsole, readings: Mapping[str, Shown], quantity: str) -> tuple[str, str]:
     """Text and unit of a value; with a sign where nobody has confirmed it for this family."""
     from tui.drive.profile.profile import is_verified  # the first picture needs none of it
 
@@ -113,7 +111,7 @@ def _figure(
     return text + sign, unit
 
 
-def _share(console: DriveConsole, readings: Mapping[str, Reading]) -> float | None:
+def _share(console: DriveConsole, readings: Mapping[str, Shown]) -> float | None:
     from tui.session.monitor.load import share_of_limit  # what a line is made of
 
     parameter = console.session.profile.quantity("motor_current")

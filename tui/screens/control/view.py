@@ -64,7 +64,15 @@ def _channel(profile: Profile, latest: Snapshot | None) -> str:
     parameter = profile.quantity("command_channel")
     if parameter is None or latest is None or latest.error:
         return NOT_AVAILABLE
-    return channel_text(parameter, latest.readings.get(parameter.code)) or NOT_AVAILABLE
+    reading = latest.readings.get(parameter.code)
+    if reading is None:
+        return NOT_AVAILABLE
+    return reading.drawn(
+        latest.time,
+        current=lambda value: channel_text(parameter, value) or NOT_AVAILABLE,
+        old=lambda value, age: f"was {channel_text(parameter, value)}",
+        missing=NOT_AVAILABLE,
+    )
 
 
 def diagram(source: ControlSource) -> list[Text]:

@@ -12,9 +12,10 @@ from tui.drive.hints import FaultAdvice, reset_text
 from tui.drive.plain import plain
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import FaultHelp, Quantity
-from tui.drive.values import NOT_AVAILABLE, set_bits
-from tui.session.reading import Reading
+from tui.drive.values import NOT_AVAILABLE, Value, set_bits
+from tui.session.shown import Shown
 from tui.widgets.drawing import cut, cut_at_word, wrapped
+from tui.widgets.drive_signs import age_text
 from tui.widgets.palette import (
     ALARM_BLOCK,
     CURSOR,
@@ -28,6 +29,7 @@ from tui.widgets.palette import (
 )
 
 from .doctor_view import DoctorView
+from .view import stored_text
 
 LABEL = 13
 """Columns of the headings at the left."""
@@ -199,7 +201,7 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
         unsure = "" if is_verified(view.profile[look.code]) else "?"
         text.append(look.code, STRONG)
         text.append(f"{unsure:<{max(1, CODE_WIDTH - len(look.code))}}", STALE)
-        value, style = _value(reading)
+        value, style = _value(reading, view.now)
         text.append(f"{cut(value, cells)} ", style)
         room = max(4, width - LABEL - text.cell_len - 1)
         hint = OPENS if chosen and len(look.why) < room - 12 else ""
@@ -214,23 +216,29 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
 def _value_cells(view: DoctorView, width: int) -> int:
     """Columns of the values: as many as they take, where their reasons leave so many."""
     longest = max(
-        (len(_value(view.readings.get(look.code))[0]) for look in view.look_at), default=0
+        (len(_value(view.readings.get(look.code), view.now)[0]) for look in view.look_at), default=0
     )
     why = max((len(look.why) for look in view.look_at), default=0)
     room = width - LABEL - CODE_WIDTH - why - len(OPENS) - 2
     return max(LOOK_VALUE_WIDTH, min(longest, room))
 
 
-def _value(reading: Reading | None) -> tuple[str, Style]:
+def _value(reading: Shown | None, now: float) -> tuple[str, Style]:
     if reading is None:
         return NOT_AVAILABLE, FAINT
-    value = reading.physical or reading.value
-    if value is None:
-        return NOT_AVAILABLE, FAINT
-    if reading.parameter.quantity in CONTACTS and reading.raw is not None:
-        ones = ", ".join(bit.name for bit in set_bits(reading.parameter.bits, reading.raw))
-        return ones or "none", PLAIN if reading.quality == "good" else STALE
-    return f"{value.text} {value.unit}".rstrip(), PLAIN if reading.quality == "good" else STALE
+    parameter = reading.parameter
+
+    def text(value: Value) -> str:
+        if parameter.quantity in CONTACTS:
+            return ", ".join(bit.name for bit in set_bits(parameter.bits, value.raw)) or "none"
+        return f"{value.text} {value.unit}".rstrip()
+
+    return reading.drawn(
+        now,
+        current=lambda value: (text(value), PLAIN),
+        old=lambda value, age: (f"{text(value)}, {age_text(age)} old", STALE),
+        missing=(NOT_AVAILABLE, FAINT),
+    )
 
 
 def _checks(view: DoctorView, width: int) -> list[Text]:
@@ -300,7 +308,9 @@ def _stored(view: DoctorView, codes: Sequence[str]) -> str:
     found = dict.fromkeys(STORED_UNITS, "")
     for code in codes:
         reading = view.readings.get(code)
-        if reading is not None and reading.unit in found and not found[reading.unit]:
-            found[reading.unit] = f"{reading.text} {reading.unit}"
+        text = stored_text(reading)
+        unit = text.rpartition(" ")[2]
+        if reading is not None and found.get(unit) == "":
+            found[unit] = text
     cells = "".join(f"{text:>9}" for text in found.values())
     return f"{STORED_MARK}{cells}" if any(found.values()) else ""

@@ -11,7 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import FaultCode, FaultHelp, Hint, LookAt
 from tui.session.monitor.alarms import PresentFault
 from tui.session.monitor.fault_record import FaultRecord
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,9 @@ class DoctorView:
     """True if the drive is in this fault now."""
     record: FaultRecord | None
     """The trip as the panel saw it, where it did and this is the fault."""
-    readings: Mapping[str, Reading]
+    readings: Mapping[str, Shown]
+    now: float
+    """Monotonic time of the moment."""
     since: PresentFault | None = None
     """The one record of when it tripped, or was first seen; that of the line."""
     at: int = 0

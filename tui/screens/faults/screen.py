@@ -15,7 +15,7 @@ from tui.drive.profile.schema import FaultCode
 from tui.session.console import DriveConsole
 from tui.session.monitor.fault_record import FaultRecord, Recorder, record_name, record_text
 from tui.session.paths import state_folder
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 
@@ -24,7 +24,7 @@ from ..dialogs.files import fault_of_new
 from ..keys.table import FAULTS, bindings
 from .doctor import doctor_lines
 from .doctor_view import DoctorView
-from .view import record_lines, stored_lines
+from .view import record_lines, stored_lines, stored_text
 
 STORED = 52
 """Columns of what the drive stored, where there is room: values stay beside their names."""
@@ -51,7 +51,7 @@ class FaultsScreen(OrderKeys):
         super().__init__()
         self.console = console
         self.session = console.session
-        self._readings: dict[str, Reading] = {}
+        self._readings: dict[str, Shown] = {}
         self._shown: FaultRecord | None = None
         self._chosen: FaultCode | None = None
         """A fault of the history that was chosen."""
@@ -134,6 +134,7 @@ class FaultsScreen(OrderKeys):
             fault=fault,
             present=present,
             record=record,
+            now=now,
             since=next(ours, None) if present else None,
             readings={code: reading.aged(now, OLD) for code, reading in self._readings.items()},
             at=self._at,
@@ -253,11 +254,11 @@ class FaultsScreen(OrderKeys):
     def _write(self, path: Path, record: FaultRecord) -> None:
         stored = self.session.profile.data.faults.stored
         rows = [
-            (code, reading.parameter.name, f"{reading.text} {reading.unit}".rstrip())
+            (code, reading.parameter.name, stored_text(reading))
             for code in (stored[0] if stored else [])
             if (reading := self._readings.get(code)) is not None
         ]
-        values = {c: f"{r.text} {r.unit}".rstrip() for c, r in self._readings.items()}
+        values = {code: stored_text(reading) for code, reading in self._readings.items()}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(record_text(self.session, record, rows, values), encoding="utf-8")

@@ -11,7 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 from tui.widgets.drawing import cut, rule
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
 
@@ -20,7 +20,7 @@ FAULT_TIME_WIDTH = 8
 
 
 def stored_lines(
-    profile: Profile, codes: Sequence[str], readings: Mapping[str, Reading], width: int
+    profile: Profile, codes: Sequence[str], readings: Mapping[str, Shown], width: int
 ) -> list[Text]:
     """Return the values that the drive stored at the moment of a fault."""
     if not codes:
@@ -32,19 +32,31 @@ def stored_lines(
     ]
 
 
-def stored_line(profile: Profile, code: str, reading: Reading | None, width: int) -> Text:
+def stored_line(profile: Profile, code: str, reading: Shown | None, width: int) -> Text:
     """One stored value; its name without the words that all of them share."""
     parameter = profile[code]
     name = parameter.name
     for tail in (" before the last fault", ", last fault"):
         name = name.removesuffix(tail)
-    value = f"{reading.text} {reading.unit}".rstrip() if reading else NOT_AVAILABLE
+    value = stored_text(reading)
     text = Text(no_wrap=True)
     room = max(8, width - len(value) - 8)
     text.append(f" {code:<5} ", FAINT)
     text.append(cut(name, room), FAINT)
     text.append(f" {value}", STRONG if reading and reading.raw is not None else FAINT)
     return text
+
+
+def stored_text(reading: Shown | None) -> str:
+    """A value that the drive stored at a fault: it is of that moment, however old."""
+    if reading is None:
+        return NOT_AVAILABLE
+    return reading.drawn(
+        reading.time,
+        current=lambda value: f"{value.text} {value.unit}".rstrip(),
+        old=lambda value, age: f"{value.text} {value.unit}".rstrip(),
+        missing=f"{NOT_AVAILABLE} {reading.parameter.unit}".rstrip(),
+    )
 
 
 def record_lines(record: FaultRecord | None, width: int, height: int, offset: int) -> list[Text]:

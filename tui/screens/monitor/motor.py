@@ -10,7 +10,7 @@ from rich.text import Text
 from tui.drive.profile.profile import Profile, is_verified, mark_of
 from tui.drive.profile.schema import MonitoringValue, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
-from tui.session.reading import Quality
+from tui.session.shown import Quality
 from tui.widgets.drawing import short
 from tui.widgets.drive_signs import age_text
 from tui.widgets.gauge import gauge
@@ -105,16 +105,22 @@ def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text
     if reading is None or reading.raw is None:
         text.append(f"{NOT_AVAILABLE:>{NUMBER_CELLS}}", FAINT)
         return text.append(f" {short(parameter.unit or 'raw', UNIT_CELLS):<{UNIT_CELLS}}", FAINT)
-    good = reading.quality is Quality.GOOD
-    own = reading.physical or reading.value
-    shown, unit = (own.text, own.unit) if own is not None else (reading.text, reading.unit)
-    text.append(f"{short(shown, NUMBER_CELLS):>{NUMBER_CELLS}}", STRONG if good else FAINT)
-    reported = unit or "raw" if good else age_text(reading.age(view.now))
-    text.append(f" {short(reported, UNIT_CELLS):<{UNIT_CELLS}}", FAINT if good else STALE)
+    number, unit = reading.drawn(
+        view.now,
+        current=lambda held: ((held.text, STRONG), (held.unit or "raw", FAINT)),
+        old=lambda held, age: ((held.text, FAINT), (age_text(age), STALE)),
+        missing=((NOT_AVAILABLE, FAINT), (age_text(reading.age(view.now)), STALE)),
+    )
+    text.append(f"{short(number[0], NUMBER_CELLS):>{NUMBER_CELLS}}", number[1])
+    text.append(f" {short(unit[0], UNIT_CELLS):<{UNIT_CELLS}}", unit[1])
     high = end_of(view, value.high)
-    if cells >= columns + 2 + BAR_CELLS + END_CELLS and high is not None and good:
+    if (
+        cells >= columns + 2 + BAR_CELLS + END_CELLS
+        and high is not None
+        and reading.quality is Quality.GOOD
+    ):
         low = end_of(view, value.low) or 0.0
         text.append("  ")
-        text.append_text(gauge(reading.number, low, high, BAR_CELLS))
+        text.append_text(gauge(reading.current_number, low, high, BAR_CELLS))
         text.append(short(f"{high:g}", END_CELLS), FAINT)
     return text

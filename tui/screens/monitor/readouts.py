@@ -9,15 +9,15 @@ from rich.text import Text
 
 from tui.drive.profile.profile import mark_of
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.drive.values import NOT_AVAILABLE, decimals_of
-from tui.session.reading import Quality, Reading
+from tui.drive.values import NOT_AVAILABLE, Value, decimals_of
+from tui.session.shown import Quality, Shown
 from tui.widgets.drawing import cut, short
 from tui.widgets.drive_signs import age_text
 from tui.widgets.gauge import gauge
 from tui.widgets.palette import BAR, BAR_REST, FAINT, STALE, STRONG
 from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
-from .view import View, directed, end_of, readout_parameter
+from .view import View, bar_number, directed, end_of, readout_parameter
 
 READOUT_SHARE = 0.55
 """Share of the width that the frequency has, for its sign."""
@@ -77,16 +77,21 @@ def _readout(view: View, quantity: Quantity, cells: int) -> list[Text]:
 def _shown(view: View, quantity: Quantity, parameter: Parameter | None) -> tuple[str, str, Style]:
     """Text, unit and style of the value."""
     reading = view.reading(parameter.code) if parameter else None
-    if parameter is None or reading is None or reading.raw is None:
-        return NOT_AVAILABLE, parameter.unit if parameter else "", FAINT
-    value = reading.physical or reading.value
-    text, unit = reading.text, reading.unit or "raw"
-    if value is not None:
-        text, unit = value.text, value.unit or "raw"
-    number = directed(view, parameter, reading) if quantity == "output_frequency" else None
-    if number is not None and number < 0 and not text.startswith("-"):
-        text = f"-{text}"
-    return text, unit, STRONG if reading.quality is Quality.GOOD else FAINT
+    none = (NOT_AVAILABLE, parameter.unit if parameter else "", FAINT)
+    if parameter is None or reading is None:
+        return none
+
+    def signed(value: Value) -> str:
+        number = directed(view, parameter, bar_number(value))
+        backward = quantity == "output_frequency" and number is not None and number < 0
+        return f"-{value.text}" if backward and not value.text.startswith("-") else value.text
+
+    return reading.drawn(
+        view.now,
+        current=lambda value: (signed(value), value.unit or "raw", STRONG),
+        old=lambda value, age: (signed(value), value.unit or "raw", FAINT),  # the heading has it
+        missing=none,
+    )
 
 
 def _field(parameter: Parameter | None, quantity: Quantity) -> int:
@@ -110,20 +115,23 @@ def _heading(view: View, quantity: Quantity, parameter: Parameter | None, cells:
     if reading is not None and reading.quality is not Quality.GOOD and reading.raw is not None:
         right, style = f"{age_text(reading.age(view.now))} old", STALE
     elif quantity == "output_frequency" and (wanted := _reference(view)) is not None:
-        right = f"ref {wanted.text:>5}"
+        right = wanted.drawn(
+            view.now,
+            current=lambda value: f"ref {value.text:>5}",
+            old=lambda value, age: "",
+            missing="",
+        )
     if right and len(title) + len(right) < cells:
         text.append(" " * (cells - len(title) - len(right)))
         text.append(right, style)
     return text
 
 
-def _reference(view: View) -> Reading | None:
+def _reference(view: View) -> Shown | None:
     """The reference, where it is known now."""
     parameter = view.profile.quantity("frequency_reference")
     reading = view.reading(parameter.code) if parameter else None
-    if reading is None or reading.number is None or reading.quality is not Quality.GOOD:
-        return None
-    return reading
+    return reading if reading is not None and reading.current_number is not None else None
 
 
 def _bar(view: View, quantity: Quantity, parameter: Parameter | None, cells: int) -> Text:
@@ -134,11 +142,16 @@ def _bar(view: View, quantity: Quantity, parameter: Parameter | None, cells: int
         return Text("")
     reading = view.reading(parameter.code)
     fresh = reading is not None and reading.quality is Quality.GOOD
-    number, mark = (reading.number if reading is not None else None), None
+    number: float | None = None
+    if reading is not None:
+        number = reading.drawn(
+            view.now, current=bar_number, old=lambda value, age: bar_number(value), missing=None
+        )
+    mark = None
     if quantity == "output_frequency":
-        number = directed(view, parameter, reading)
-        wanted = view.profile.quantity("frequency_reference")
-        mark = directed(view, wanted, _reference(view)) if fresh else None
+        number = directed(view, parameter, number)
+        wanted, reference = view.profile.quantity("frequency_reference"), _reference(view)
+        mark = directed(view, wanted, reference.current_number) if fresh and reference else None
     reverse = (number or 0) < 0 or (mark or 0) < 0
     low = -high if reverse else end_of(view, value.low) or 0.0
     drawn = gauge(number, low, high, cells, mark, BAR if fresh else BAR_REST)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from decimal import Decimal
 
@@ -12,7 +13,7 @@ from textual.events import Key
 from tui.bus.errors import LineError
 from tui.session.command.reference import reference_codes
 from tui.session.drive_state import with_direction
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 from tui.terminal.stroke import stroke_of
 from tui.widgets.drawing import key_line, key_styles
 from tui.widgets.palette import FAINT
@@ -32,7 +33,7 @@ class RunKeys(OrderKeys):
     """Nothing turns on one letter: r, v and f open a line, and Enter does what it says."""
 
     _line: RunLine | None = None
-    _around: dict[str, Reading] | None = None
+    _around: Mapping[str, Shown] | None = None
     """Facts beside the reference: limits and ramp."""
 
     def action_run_line(self, purpose: Purpose) -> None:
@@ -166,7 +167,14 @@ class RunKeys(OrderKeys):
         if latest is None or frequency is None:
             return None
         reading = latest.readings.get(frequency.code)
-        number = reading.value.number if reading is not None and reading.value else None
+        if reading is None:
+            return None
+        number = reading.drawn(
+            latest.time,
+            current=lambda value: value.number,
+            old=lambda value, age: value.number,
+            missing=None,
+        )
         return number if number is None else with_direction(frequency, number, latest.state)
 
 

@@ -21,7 +21,7 @@ from tui.session.command.reference import (
     reference_parameters,
     step_in,
 )
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import (
     ALARM,
@@ -122,7 +122,7 @@ class RunLine:
         except InvalidOperation:
             return False
 
-    def checked(self, profile: Profile, readings: Mapping[str, Reading]) -> RunLine:
+    def checked(self, profile: Profile, readings: Mapping[str, Shown]) -> RunLine:
         """With what is wrong with the reference, if anything is."""
         if not self.unit:
             return self
@@ -160,25 +160,30 @@ def proposed(
 
 
 def limits(
-    profile: Profile, readings: Mapping[str, Reading]
+    profile: Profile, readings: Mapping[str, Shown]
 ) -> tuple[Decimal | None, Decimal | None, str]:
     """Lowest and highest reference in its unit, as far as known, and the code of the highest."""
     parameter = next(iter(reference_parameters(profile)), None)
     return (None, None, "") if parameter is None else reference_limits(profile, readings, parameter)
 
 
-def _number(
-    profile: Profile, quantity: Quantity, readings: Mapping[str, Reading]
-) -> Decimal | None:
+def _number(profile: Profile, quantity: Quantity, readings: Mapping[str, Shown]) -> Decimal | None:
     parameter = profile.quantity(quantity)
     reading = readings.get(parameter.code) if parameter else None
-    return reading.value.number if reading is not None and reading.value is not None else None
+    if reading is None:
+        return None
+    return reading.drawn(
+        reading.time,
+        current=lambda value: value.number,
+        old=lambda value, age: None,
+        missing=None,
+    )
 
 
 def run_lines(
     line: RunLine,
     profile: Profile,
-    readings: Mapping[str, Reading],
+    readings: Mapping[str, Shown],
     now: float,
     width: int,
     hindrance: str = "",
@@ -213,7 +218,7 @@ def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Styl
 
 
 def _first(
-    line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal | None
+    line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal | None
 ) -> Text:
     """Return the effect of Enter, the typed reference, and its limits."""
     first = Text(" ")
@@ -241,7 +246,7 @@ def _second(line: RunLine, now: float) -> Text:
 
 
 def _around(
-    line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal | None
+    line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal | None
 ) -> str:
     """The limits and the ramp, as far as they are known."""
     parts = []
@@ -258,7 +263,7 @@ def _around(
 
 
 def _there_in(
-    line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal
+    line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal
 ) -> list[str]:
     """Return the ramp time from the present output: a motor turning the other way slows down
     first."""

@@ -13,7 +13,7 @@ from textual.events import Resize, ScreenResume
 from textual.timer import Timer
 
 from tui.session.console import DriveConsole
-from tui.session.reading import Rating
+from tui.session.shown import Rating
 from tui.widgets.lines import Lines
 from tui.widgets.palette import STALE
 from tui.widgets.strip import FrameView

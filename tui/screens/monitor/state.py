@@ -11,7 +11,6 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.safety import WARNED_AT_SHARE
 from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
-from tui.session.reading import Quality
 from tui.widgets.drawing import short, wrapped
 from tui.widgets.drive_signs import age_text
 from tui.widgets.palette import (
@@ -142,8 +141,7 @@ def _running(view: View, state: DriveState) -> str:
 def _hertz(view: View, quantity: Quantity) -> float | None:
     parameter = view.profile.quantity(quantity)
     reading = view.reading(parameter.code) if parameter else None
-    fresh = reading is not None and reading.quality is Quality.GOOD
-    return directed(view, parameter, reading) if fresh else None
+    return directed(view, parameter, reading.current_number if reading else None)
 
 
 def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]:
@@ -179,10 +177,16 @@ def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
     if parameter is None:
         return _pair(label, NOT_AVAILABLE, FAINT, width)
     reading = view.reading(parameter.code)
-    text = channel_text(parameter, reading)
-    if reading is not None and reading.quality is not Quality.GOOD:
-        return _pair(label, f"was {text}", FAINT, width)
-    return _pair(label, text or NOT_AVAILABLE, PLAIN if text else FAINT, width)
+    none = (NOT_AVAILABLE, FAINT)
+    if reading is None:
+        return _pair(label, *none, width)
+    drawn = reading.drawn(
+        view.now,
+        current=lambda value: (channel_text(parameter, value) or NOT_AVAILABLE, PLAIN),
+        old=lambda value, age: (f"was {channel_text(parameter, value)}", FAINT),
+        missing=none,
+    )
+    return _pair(label, *drawn, width)
 
 
 def _timeout(view: View, width: int) -> tuple[str, Style]:

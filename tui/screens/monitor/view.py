@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from tui.bus.api import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
+from tui.drive.values import Value
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.drive_state import with_direction
 from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.monitor.trend import TrendPoint
-from tui.session.reading import Reading
+from tui.session.shown import Shown
 from tui.session.timeout_report import TimeoutWatch
 from tui.widgets.drive_signs import age_text
 
@@ -55,7 +56,7 @@ class View:
     word: int | None = None
     """Which word is shown with all its bits in place of the trend; None for the trend."""
 
-    def reading(self, code: str) -> Reading | None:
+    def reading(self, code: str) -> Shown | None:
         """A reading as good as it is now, not as it was when it came."""
         if self.snapshot is None or (reading := self.snapshot.readings.get(code)) is None:
             return None
@@ -127,11 +128,11 @@ READOUT_NAMES: dict[Quantity, tuple[str, ...]] = {
 }
 
 
-def directed(view: View, parameter: Parameter | None, reading: Reading | None) -> float | None:
+def directed(view: View, parameter: Parameter | None, number: float | None) -> float | None:
     """A value with the sign of its direction, which the drive may report beside it."""
-    if reading is None or reading.number is None or parameter is None or view.snapshot is None:
+    if number is None or parameter is None or view.snapshot is None:
         return None
-    return with_direction(parameter, reading.number, view.snapshot.state)
+    return with_direction(parameter, number, view.snapshot.state)
 
 
 def end_of(view: View, end: str) -> float | None:
@@ -142,4 +143,13 @@ def end_of(view: View, end: str) -> float | None:
         return float(end)
     except ValueError:
         reading = view.snapshot.readings.get(end) if view.snapshot else None
-        return reading.number if reading is not None else None
+        if reading is None:
+            return None
+        return reading.drawn(
+            view.now, current=bar_number, old=lambda value, age: bar_number(value), missing=None
+        )
+
+
+def bar_number(value: Value) -> float | None:
+    """The engineering value for a bar; None for names and words."""
+    return None if value.number is None else float(value.number)

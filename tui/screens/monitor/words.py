@@ -12,7 +12,6 @@ from rich.text import Text
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Bit, Parameter
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.reading import Quality
 from tui.widgets.drawing import cut, rule
 from tui.widgets.palette import ALARM, FAINT, KEY, LINE, PLAIN, STRONG
 
@@ -183,9 +182,15 @@ def bit_lines(view: View, page: WordPage, width: int) -> list[Text]:
 def _raw(view: View, parameter: Parameter) -> tuple[int | None, str]:
     """A word as it is now, and as a person reads it; dashes where it is not known."""
     reading = view.reading(parameter.code)
-    if reading is None or reading.raw is None or reading.quality is not Quality.GOOD:
-        return None, NOT_AVAILABLE
-    return reading.raw, reading.text
+    none: tuple[int | None, str] = (None, NOT_AVAILABLE)
+    if reading is None:
+        return none
+    return reading.drawn(
+        view.now,
+        current=lambda value: (value.raw, value.text),
+        old=lambda value, age: none,
+        missing=none,
+    )
 
 
 def _heading(view: View, page: WordPage, width: int) -> Text:

@@ -14,6 +14,7 @@ from ..drive import DriveSession
 from ..monitor.cycle import as_read
 from ..monitor.monitor import Monitor
 from ..monitor.snapshot import Snapshot
+from ..reading import reading_of
 from .values import Sample, value_from
 
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.05, 86400.0
@@ -60,7 +61,7 @@ class SampleFeed:
         profile, clock = self._session.profile, self._session.clock
         cycle = as_read(profile, list(dict.fromkeys(self._named.values())), snapshot, self._since)
         values = {
-            requested: value_from(cycle.readings[code], clock)
+            requested: value_from(reading_of(cycle.readings[code]), clock)
             for requested, code in self._named.items()
         }
         time = datetime.fromtimestamp(snapshot.wall, UTC)

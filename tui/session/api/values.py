@@ -10,7 +10,8 @@ from decimal import Decimal
 from tui.drive.errors import DriveError
 
 from ..clock import Clock
-from ..reading import Quality, Reading
+from ..reading import Reading
+from ..shown import Quality
 
 
 class NotWritten(DriveError):

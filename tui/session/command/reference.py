@@ -18,7 +18,8 @@ from tui.drive.shown import depends_on, number_of, raw_of_text
 from tui.drive.taught_profile import reference_of
 from tui.drive.units import factor_between, spelled
 
-from ..reading import Reading
+from ..reading import reading_of
+from ..shown import Shown
 from .reference_units import MOTOR_DATA, ReferenceUnits
 
 _TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(1/min|[^\s\d.,+\-/][^\d.,+\-]*)?")
@@ -124,7 +125,7 @@ def no_place(profile: Profile, unit: str) -> str:
     )
 
 
-def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]) -> Reference:
+def parse_reference(profile: Profile, text: str, readings: Mapping[str, Shown]) -> Reference:
     """The reference that a person typed, within the drive's limits as far as these are known.
 
     Raises what `convert_reference` raises, and ValueRefused for one outside the limits.
@@ -136,7 +137,7 @@ def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]
     return found
 
 
-def convert_reference(profile: Profile, text: str, readings: Mapping[str, Reading]) -> Reference:
+def convert_reference(profile: Profile, text: str, readings: Mapping[str, Shown]) -> Reference:
     """The reference that a person typed, as a raw value; the drive's own unit without one.
 
     Another unit is converted by what the drive holds: pairs of poles, what 100 % is. Raises
@@ -174,7 +175,7 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Readin
     )
 
 
-def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str, Reading]) -> str:
+def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str, Shown]) -> str:
     """The difference between the value read back and the one requested; empty if there is none.
 
     The request is converted once more, what the drive holds is read as a value of its own:
@@ -182,7 +183,7 @@ def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str
     """
     code = wanted.parameter.code
     now, reading = convert_reference(profile, wanted.requested, readings), readings.get(code)
-    value = reading.value if reading is not None else None
+    value = reading_of(reading).value if reading is not None else None
     if value is None or value.number is None:
         return f"{code} could not be read back{f': {reading.error}' if reading else ''}"
     same = now.parameter.code == code and value.unit == now.unit
@@ -197,7 +198,7 @@ def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str
 
 
 def reference_limits(
-    profile: Profile, readings: Mapping[str, Reading], parameter: Parameter
+    profile: Profile, readings: Mapping[str, Shown], parameter: Parameter
 ) -> tuple[Decimal | None, Decimal | None, str]:
     """Lowest and highest reference in its own unit, as far as known; the code of the highest."""
     known = ReferenceUnits(profile, readings)
@@ -215,7 +216,7 @@ def reference_limits(
 
 
 def within_limits(
-    profile: Profile, number: Decimal, readings: Mapping[str, Reading], parameter: Parameter
+    profile: Profile, number: Decimal, readings: Mapping[str, Shown], parameter: Parameter
 ) -> Decimal:
     """A stepped reference in its own unit, at most to the limits that are known."""
     low, high, _ = reference_limits(profile, readings, parameter)
@@ -277,10 +278,10 @@ def _check_limits(known: ReferenceUnits, wanted: Reference) -> None:
             )
 
 
-def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str, Reading]) -> None:
+def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str, Shown]) -> None:
     """A highest reference that cannot be read holds nothing back: the drive has it anyway."""
     reading = readings.get(limit.code)
-    value = reading.value if reading is not None else None
+    value = reading_of(reading).value if reading is not None else None
     if value is None or value.number is None or not value.taught:
         return
     if number > abs(value.number):

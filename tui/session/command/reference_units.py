@@ -10,7 +10,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.units import factor_between
 
-from ..reading import Reading
+from ..reading import reading_of
+from ..shown import Shown
 
 MOTOR_DATA: tuple[Quantity, ...] = ("rated_frequency", "rated_speed")
 """The plate that gives the pole pairs of the motor."""
@@ -23,7 +24,7 @@ class ReferenceUnits:
     """Conversions by what was read of one drive."""
 
     profile: Profile
-    readings: Mapping[str, Reading]
+    readings: Mapping[str, Shown]
 
     @property
     def raws(self) -> dict[str, int]:
@@ -89,7 +90,7 @@ class ReferenceUnits:
 
     def _number(self, parameter: Parameter | None) -> tuple[Decimal, str] | None:
         reading = self.readings.get(parameter.code) if parameter is not None else None
-        value = reading.value if reading is not None else None
+        value = reading_of(reading).value if reading is not None else None
         if value is None or value.number is None or value.unit == "raw":
             return None
         return value.number, value.unit

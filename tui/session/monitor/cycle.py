@@ -8,7 +8,8 @@ from dataclasses import replace
 from tui.drive.profile.profile import Profile
 
 from ..drive_state import drive_state
-from ..reading import Quality, Reading
+from ..reading import Reading, with_text
+from ..shown import Quality
 from .snapshot import Snapshot
 
 
@@ -19,8 +20,9 @@ def as_read(profile: Profile, codes: Sequence[str], snapshot: Snapshot, since: f
     Its state follows from the present ones.
     """
     readings: dict[str, Reading] = {}
+    last = with_text(snapshot.readings)
     for code in codes:
-        reading = snapshot.readings.get(code)
+        reading = last.get(code)
         if reading is None:
             reading = Reading.bad(profile[code], snapshot.time, snapshot.error)
         elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):

@@ -18,7 +18,7 @@ from tui.drive.values import NOT_AVAILABLE
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal
-from ..reading import Quality, Reading
+from ..shown import Shown
 from .snapshot import Snapshot
 
 SECONDS_KEPT = 30.0
@@ -108,10 +108,15 @@ def record_codes(session: DriveSession) -> tuple[str, ...]:
     return tuple(value.parameter for value in values if value.rate == "fast")
 
 
-def _text(reading: Reading | None) -> str:
-    if reading is None or reading.value is None or reading.quality is not Quality.GOOD:
+def _text(reading: Shown | None) -> str:
+    if reading is None:
         return NOT_AVAILABLE
-    return reading.value.text
+    return reading.drawn(
+        reading.time,
+        current=lambda value: value.text,
+        old=lambda value, age: NOT_AVAILABLE,
+        missing=NOT_AVAILABLE,
+    )
 
 
 def record_text(

@@ -6,7 +6,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.shown import number_of
 
 from ..drive import DriveSession
-from ..reading import Reading
+from ..reading import reading_of
+from ..shown import Shown
 
 
 def _limit(profile: Profile) -> str:
@@ -24,10 +25,13 @@ def unread_limit(session: DriveSession) -> list[str]:
     return [code]
 
 
-def share_of_limit(session: DriveSession, current: Reading | None) -> float | None:
+def share_of_limit(session: DriveSession, current: Shown | None) -> float | None:
     """The motor current over its limit, 1 where they are the same; None where one is not known."""
-    number, limit = current.number if current else None, _limit_number(session)
-    return None if number is None or not limit else number / limit
+    limit = _limit_number(session)
+    if current is None or not limit:
+        return None
+    number = reading_of(current).number
+    return None if number is None else number / limit
 
 
 def _limit_number(session: DriveSession) -> float | None:

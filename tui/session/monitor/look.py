@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from tui.bus.api import Contact
 
 from ..drive_state import DriveState
-from ..reading import Reading
+from ..shown import Shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,7 @@ class Look:
     time: float
     timeout: float | None
     """The drive's communication timeout in seconds, if it is one that runs already."""
-    readings: Mapping[str, Reading] = field(default_factory=dict)
+    readings: Mapping[str, Shown] = field(default_factory=dict)
     """Values read with the state: output frequency, its reference, motor current."""
     before: Look | None = None
     """The last look that brought something, where this one brought nothing."""

@@ -22,7 +22,8 @@ from ..drive import DriveSession
 from ..drive_state import drive_state
 from ..read.reader import Reader
 from ..read.rotation import Rotation
-from ..reading import Quality, Reading
+from ..reading import Reading
+from ..shown import Quality
 from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan

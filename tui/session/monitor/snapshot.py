@@ -9,7 +9,7 @@ from tui.bus.api import Contact, LineState
 from tui.safety import STALE_CYCLES, STALE_LEAST
 
 from ..drive_state import DriveState
-from ..reading import Reading
+from ..shown import Shown
 from .rates import SLOW_FACTOR
 
 TOO_SLOW = 1.2
@@ -33,7 +33,7 @@ class Snapshot:
     """When it was taken (monotonic)."""
     wall: float
     """The same as time.time()."""
-    readings: Mapping[str, Reading]
+    readings: Mapping[str, Shown]
     state: DriveState
     rate: float
     """Cycles a second as they were; 0 while nothing answers."""

@@ -10,7 +10,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 
 from ..drive_state import DriveState, with_direction
-from ..reading import Reading
+from ..reading import Reading, with_text
 from .snapshot import Snapshot
 
 TREND_SECONDS = 600.0
@@ -63,7 +63,7 @@ class Trend:
 
     def add(self, snapshot: Snapshot) -> TrendPoint:
         """Add a cycle; one that failed leaves a gap in the trend, never a repeated value."""
-        readings = snapshot.readings
+        readings = with_text(snapshot.readings)
         values = tuple(
             trend_value(readings[code], snapshot.state)
             if code and code in readings and not snapshot.error

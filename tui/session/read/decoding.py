@@ -10,7 +10,8 @@ from tui.drive.shown import depends_on, shown
 from tui.drive.values import Value, percent_of
 
 from ..drive import DriveSession
-from ..reading import Rating, Reading
+from ..reading import Reading
+from ..shown import Rating
 
 
 @dataclass(slots=True)
