@@ -30,6 +30,8 @@ SPELLED: Mapping[type[ast.cmpop], str] = {
 }  # fmt: skip
 FOR_TYPES = {"cast", "TypeVar", "NewType", "ParamSpec", "dataclass", "overload", "Literal"}
 """Names whose arguments or items change nothing that runs."""
+SYMMETRIC = {"max", "min", "isclose", "gcd"}
+"""Functions whose result does not depend on the order of their arguments."""
 KINDS = (
     "condition", "boundary", "constant", "text", "argument", "call", "await", "lock", "raise",
     "return",
@@ -320,7 +322,8 @@ class Mutator:
         arguments = [self._text(argument) for argument in node.args]
         named = [self._text(argument) for argument in node.keywords]
         is_plain = not any(isinstance(argument, ast.Starred) for argument in node.args)
-        for position in range(len(arguments) - 1) if is_plain else ():
+        has_order = is_plain and name not in SYMMETRIC
+        for position in range(len(arguments) - 1) if has_order else ():
             swapped = arguments.copy()
             swapped[position : position + 2] = reversed(swapped[position : position + 2])
             if swapped != arguments:

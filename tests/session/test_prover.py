@@ -113,7 +113,7 @@ async def test_a_drive_that_reacts_as_set_is_bracketed(timeout: float) -> None:
     assert bracket.not_after - bracket.not_before <= 0.15 * timeout + 0.1
 
 
-@pytest.mark.parametrize(("timeout", "held"), [(1.0, 2.0), (4.0, 2.0)])
+@pytest.mark.parametrize(("timeout", "held"), [(0.4, 2.0), (1.0, 2.0), (4.0, 2.0)])
 async def test_a_time_out_that_is_not_the_one_set_is_reported(timeout: float, held: float) -> None:
     clock = OwnTime()
     result = await bench(clock, WatchingDrive(clock, timeout, held=held)).prove()
@@ -151,13 +151,17 @@ async def test_connection_closed_in_a_silence_is_read_once_it_is_back(timeout: f
 async def test_line_that_stays_lost_ends_the_proof() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 2.0)
-    drive.at_twelfth = lambda: setattr(drive, "before_read", lost)
+    lost_at: list[float] = []
 
     async def lost(*_: object) -> None:
+        lost_at.append(clock.now)
         raise LineLost("The line was lost: no route.")
 
+    prover = bench(clock, drive)
+    prover.tell = lambda _: setattr(drive, "before_read", lost)
     with pytest.raises(LineLost):
-        await bench(clock, drive).prove()
+        await prover.prove()
+    assert 10.0 <= clock.now - lost_at[0] < 10.2
     assert not drive.facts.paused
 
 
@@ -333,3 +337,146 @@ async def test_a_drive_that_answers_nothing_is_reported_as_such() -> None:
     session.arming.arm(seconds=math.inf)
     with pytest.raises(NoAnswer):
         await Prover(session, Journal(), session.work.permit()).prove()
+
+
+@pytest.mark.parametrize("timeout", [2.0, 10.0])
+def test_silences_are_close_around_the_timeout(timeout: float) -> None:
+    expected = [0.25, 0.5, 0.7, 0.82, 0.94, 1.06, 1.18, 1.6, 2.2, 3.0]
+    assert list(silences(timeout)) == pytest.approx([share * timeout for share in expected])
+    assert list(silences(40.0))[-3:] == [64.0, 88.0, 90.0]
+
+
+async def test_reaction_that_shows_a_moment_later_is_named() -> None:
+    clock = OwnTime()
+
+    class Slow(WatchingDrive):
+        """The fault code is set 0.25 s after the state."""
+
+        tripped = math.inf
+
+        async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+            await super().before_read(device, registers, priority)
+            if self.registers[STATUS] == TRIPPED:
+                self.tripped = min(self.tripped, clock.now)
+            is_set = clock.now - self.tripped > 0.25
+            self.registers[LAST_FAULT] = SLF if is_set else 0
+
+    drive = Slow(clock, 1.0)
+    result = await bench(clock, drive).prove()
+    assert result.as_set
+    assert result.fault.startswith("SLF")
+    assert clock.now - drive.tripped < 1.0
+
+
+class TurningDrive(WatchingDrive):
+    """A drive at 50 Hz; after its timeout it goes on in another state, at another frequency."""
+
+    def __init__(self, clock: OwnTime, status: int, hertz: float) -> None:
+        super().__init__(clock, 1.0)
+        self.registers[STATUS], self.registers[HERTZ] = RUNNING, 500
+        self.after = status, round(10 * hertz)
+
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        await super().before_read(device, registers, priority)
+        if self.registers[STATUS] == TRIPPED:
+            self.registers[STATUS], self.registers[HERTZ] = self.after
+
+
+@pytest.mark.parametrize(
+    ("status", "hertz", "seen"),
+    [(RUNNING, 39.9, "slows down"), (RUNNING, 40.0, ""), (AT_REST, 0.0, "stops")],
+)
+async def test_motor_that_slows_down_has_reacted(status: int, hertz: float, seen: str) -> None:
+    clock = OwnTime()
+    result = await bench(clock, TurningDrive(clock, status, hertz), turning=True).prove()
+    assert result.seen == seen
+    assert result.fault == ""
+
+
+async def test_stop_at_the_end_of_a_silence_keeps_the_read_from_the_drive() -> None:
+    begun: list[float] = []
+
+    class StoppedThen(OwnTime):
+        """A stop arrives as the first silence of 0.25 s ends."""
+
+        async def sleep(self, seconds: float) -> None:
+            await super().sleep(seconds)
+            if begun and self.now - begun[0] > 0.2499:
+                prover.session.work.stop("the stop key")
+
+    clock = StoppedThen()
+    drive = WatchingDrive(clock, math.inf, held=1.0)
+    prover = bench(clock, drive)
+    prover.tell = lambda _: begun.append(clock.now)
+    with pytest.raises(Stopped):
+        await prover.prove()
+    assert len(begun) == 1
+    assert drive._heard < begun[0]
+
+
+ATV71 = library.load("atv71")
+
+
+class WatchedFromItsFirstCommand(OneDrive):
+    """An Altivar 71 that watches the line once a command was written, and then trips."""
+
+    def __init__(self, clock: OwnTime, *, profile_in_force: int) -> None:
+        super().__init__(dict.fromkeys(range(0x10000), 0))
+        self.clock = clock
+        self.commands: list[tuple[int, Priority]] = []
+        self.reads_after_command: list[int] = []
+        for code, raw in {"TTO": 10, "SLL": 1, "ETA": AT_REST, "CHCF": profile_in_force}.items():
+            self.registers[ATV71[code].address] = raw
+        self._heard = math.inf
+
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        if self.commands and self.clock.now - self._heard > 1.0:
+            self.registers[ATV71["ETA"].address] = TRIPPED
+            self.registers[ATV71["LFT"].address] = SLF
+        self._heard = self.clock.now
+        if self.commands:
+            self.reads_after_command += registers
+        self.clock.now += EXCHANGE
+
+    async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
+        assert address == ATV71["CMD"].address
+        self.commands.append((values[0], how["priority"]))
+        self._heard = self.clock.now
+        return await super().write(device, address, values, **how)
+
+
+def bench_71(clock: OwnTime, drive: OneDrive) -> Prover:
+    session = DriveSession(drive, 1, ATV71, clock=clock)
+    session.arming.arm(seconds=math.inf)
+    return Prover(session, Journal(), session.work.permit())
+
+
+async def test_watch_begins_with_one_command_that_moves_nothing() -> None:
+    clock = OwnTime()
+    drive = WatchedFromItsFirstCommand(clock, profile_in_force=1)
+    prover = bench_71(clock, drive)
+    result = await prover.prove()
+    assert result.as_set
+    assert drive.commands == [(0x0006, Priority.STOP)]
+    assert ATV71["CMD"].address not in drive.reads_after_command
+    prover.journal.flush()
+    entry = prover.journal.recent[-1]
+    assert (entry.code, entry.why) == ("CMD", "begins the watch over the line, moves nothing")
+
+
+async def test_proof_in_a_profile_without_commands_is_refused() -> None:
+    clock = OwnTime()
+    drive = WatchedFromItsFirstCommand(clock, profile_in_force=0)
+    with pytest.raises(OrderRefused, match="state of the drive is not known"):
+        await bench_71(clock, drive).prove()
+    assert drive.commands == []
+
+
+async def test_stop_before_the_watch_begins_keeps_its_command_from_the_drive() -> None:
+    clock = OwnTime()
+    drive = WatchedFromItsFirstCommand(clock, profile_in_force=1)
+    prover = bench_71(clock, drive)
+    prover.session.work.stop("the stop key")
+    with pytest.raises(Stopped):
+        await prover.prove()
+    assert drive.commands == []

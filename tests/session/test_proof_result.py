@@ -1,0 +1,96 @@
+"""The result of a communication loss test: its words, its figures, its entry in the journal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tui.bus.fake import FakeLine
+from tui.drive.profile import library
+from tui.session.drive import DriveSession
+from tui.session.proof.record import proof_entry
+from tui.session.proof.result import ProofResult
+from tui.session.proof.silences import Bracket
+
+PROFILE = library.load("atv312")
+RULES = PROFILE.data.communication_fault
+assert RULES is not None
+FREEWHEEL = next(reaction for reaction in RULES.reactions if reaction.raw == 1)
+SLF = "SLF1, Modbus communication"
+AS_SET = ProofResult(
+    1, 2.0, FREEWHEEL, Bracket(1.88, 2.12), False, seen="trips", fault=SLF, expected_fault=SLF
+)
+LATE = replace(AS_SET, bracket=Bracket(4.4, 6.0))
+NEVER = replace(AS_SET, bracket=Bracket(6.0), seen="", fault="")
+
+
+@pytest.mark.parametrize(
+    ("result", "short", "parts"),
+    [
+        (AS_SET, "proved 2.0 s", ["Trips 2.0 s after", "freewheel", ", SLF1."]),
+        (LATE, "proved 5.2 s, NOT AS SET", ["Trips 5.2 s after", "NOT AS SET: 2 s are set."]),
+        (
+            replace(AS_SET, fault="OHF, overheated"),
+            "proved 2.0 s, NOT AS SET",
+            [", OHF. NOT AS SET:", f"be {SLF}."],
+        ),
+        (
+            replace(AS_SET, reaction=None, fault="", expected_fault=""),
+            "proved 2.0 s",
+            ["Trips 2.0 s after the last request."],
+        ),
+        (
+            NEVER,
+            "PROVED: NO REACTION",
+            ["DID NOT REACT to 6.0 s", "set are 2 s, freewheel.", "is not stopped when"],
+        ),
+    ],
+)
+def test_result_in_words(result: ProofResult, short: str, parts: list[str]) -> None:
+    assert result.short == short
+    assert [part for part in parts if part not in result.text] == []
+    assert ("NOT AS SET" in result.text) is ("NOT AS SET" in short)
+
+
+def test_result_in_figures() -> None:
+    assert replace(AS_SET, changed="ttO is 2 s.").json() == {
+        "configured_ms": 2000,
+        "not_before_ms": 1880,
+        "not_after_ms": 2120,
+        "measured_ms": 2000,
+        "reaction": FREEWHEEL.name,
+        "seen": "trips",
+        "fault": SLF,
+        "turning": False,
+        "as_set": True,
+        "text": AS_SET.text,
+        "changed": "ttO is 2 s.",
+    }
+    nothing = replace(NEVER, reaction=None).json()
+    missing = {"not_after_ms", "measured_ms", "reaction", "seen", "fault", "changed"}
+    assert {name for name, value in nothing.items() if value is None} == missing
+
+
+@pytest.mark.parametrize(
+    ("timeout", "agrees"),
+    [(1.88, True), (2.12, True), (1.80, True), (1.77, False), (2.22, True), (2.24, False)],
+)
+def test_timeout_may_differ_by_a_twentieth(timeout: float, agrees: bool) -> None:
+    assert AS_SET.bracket.holds(timeout) is agrees
+
+
+def test_short_timeout_may_differ_by_50_ms() -> None:
+    assert Bracket(0.3, 0.3).holds(0.34)
+    assert not Bracket(0.3, 0.3).holds(0.36)
+
+
+@pytest.mark.parametrize(("result", "verdict"), [(AS_SET, "as set"), (LATE, "NOT AS SET")])
+def test_entry_of_the_journal(result: ProofResult, verdict: str) -> None:
+    session = DriveSession(FakeLine(), 7, PROFILE)
+    entry = proof_entry(session, result)
+    assert (entry.device, entry.profile, entry.code) == (7, "atv312", "ttO")
+    assert entry.address == PROFILE["ttO"].address
+    assert (entry.new, entry.answer) == (result.text, verdict)
+    assert (entry.why, entry.kind) == ("proof of communication loss", "proof")
+    assert (entry.old_raw, entry.new_raw, entry.read_back) == (None, 0, None)
