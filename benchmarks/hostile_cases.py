@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from tui.bus.errors import LineError
-from tui.bus.identification import Objects
 from tui.bus.requests import (
     Diagnose,
     Identify,
+    Objects,
     Read,
     ReadWrite,
     Request,

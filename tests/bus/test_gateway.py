@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.bus.gateway import server
-from tui.bus.gateway.awake import Awake
 from tui.bus.gateway.pdu import (
     IdentifyAsked,
     ReadAsked,
@@ -25,7 +24,7 @@ from tui.bus.gateway.pdu import (
     written_pdu,
 )
 from tui.bus.gateway.room import ServedConnection, makes_room
-from tui.bus.gateway.server import HEADER, TcpGateway, TcpRequest
+from tui.bus.gateway.server import HEADER, Awake, TcpGateway, TcpRequest
 from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 
 

@@ -14,8 +14,7 @@ from tui.bus.master import ExchangeResult, ResultKind, Sending
 from tui.bus.requests import Read, WriteOne
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.patience import Devices
-from tui.bus.schedule.queue import Job
-from tui.bus.schedule.shares import MINIMUM_SHARES
+from tui.bus.schedule.queue import MINIMUM_SHARES, Job
 from tui.bus.tally import Tally
 
 from .conftest import WIDE

@@ -5,14 +5,13 @@ from __future__ import annotations
 import pytest
 
 from tui.bus.master import ExchangeResult, Piece, ResultKind
-from tui.bus.minute import BUCKET, BUCKETS, MinuteWindow
 from tui.bus.model import LastMinute, Priority, Timing
 from tui.bus.requests import Read
 from tui.bus.schedule.outcomes import SHORT_SILENCE, Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.shared_state import SharedState
-from tui.bus.tally import Tally
+from tui.bus.tally import BUCKET, BUCKETS, MinuteWindow, Tally
 from tui.safety import MISSES
 from tui.wire.frames import frame
 

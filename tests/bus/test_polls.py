@@ -15,10 +15,9 @@ from tui.bus.errors import DeviceException, LineError, NoAnswer, RequestRefused
 from tui.bus.limits import CAUTIOUS
 from tui.bus.line import Line
 from tui.bus.model import Reply
-from tui.bus.poll_plan import PlannedRead, PolledTurn, PollPlan
+from tui.bus.poll_plan import PlannedRead, PolledTurn, PollPlan, Subscription
 from tui.bus.program import Program
 from tui.bus.schedule.pace import SHARE
-from tui.bus.schedule.polls import Subscription
 from tui.bus.share.attached import MOST_UNREAD
 from tui.bus.share.carried import Polled, PolledReply, Subscribe
 from tui.bus.share.messages import NoMessage, packed

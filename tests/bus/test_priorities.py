@@ -43,7 +43,7 @@ async def test_urgent_requests_overtake(
     open_line: OpenLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # on a busy machine exchanges take long: a kind kept below its share would go first
-    monkeypatch.setattr("tui.bus.schedule.shares.OVERDUE", math.inf)
+    monkeypatch.setattr("tui.bus.schedule.queue.OVERDUE", math.inf)
     all_wait = threading.Event()
 
     def until_all_wait(request: bytes, count: int) -> Sequence[Step]:

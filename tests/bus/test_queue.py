@@ -9,8 +9,7 @@ from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.line import Timing
 from tui.bus.master import Piece
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
-from tui.bus.schedule.backoff import pause
-from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, SHORT_WAIT, Devices
+from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, SHORT_WAIT, Devices, pause
 from tui.bus.schedule.queue import Job, JobQueue
 from tui.bus.trace import Trace
 from tui.wire.frames import frame

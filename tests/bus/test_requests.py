@@ -8,17 +8,18 @@ import pytest
 
 from tui.bus.errors import DeviceException
 from tui.bus.expectation import exception_code
-from tui.bus.identification import Objects, own_words_of
 from tui.bus.limits import CAUTIOUS, Limits, Window, send_refusal
 from tui.bus.requests import (
     Diagnose,
     Identify,
+    Objects,
     Read,
     ReadWrite,
     ReportId,
     Request,
     WriteMany,
     WriteOne,
+    own_words_of,
     words_of,
 )
 from tui.wire.frames import frame

@@ -78,7 +78,7 @@ DEFECTS = (
     ),
     Defect(
         "object-with-two-contents-believed",
-        "tui/bus/identification.py",
+        "tui/bus/requests.py",
         "            if objects.setdefault(number, content) != content:\n",
         "            if objects.setdefault(number, content) is None:\n",
         "Two drives at one address appear as the one whose name arrived first.",

@@ -165,7 +165,7 @@ DEFECTS = (
     ),
     Defect(
         "lost-line-without-its-error",
-        "tui/bus/share/news_heard.py",
+        "tui/bus/share/client.py",
         "error_of(*news.failure) if news.failure is not None else None",
         "None",
         "The panel waits for a missing port instead of reporting it.",

@@ -11,8 +11,7 @@ import pytest
 
 from tui.bus.errors import LineError, NoAnswer, RequestRefused
 from tui.bus.model import Reply
-from tui.bus.poll_plan import PlannedRead, PolledTurn, PollPlan
-from tui.bus.schedule.polls import Subscription
+from tui.bus.poll_plan import PlannedRead, PolledTurn, PollPlan, Subscription
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.rates import SLOW_FACTOR

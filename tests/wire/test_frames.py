@@ -10,12 +10,12 @@ from pymodbus.framer.rtu import FramerRTU
 from tests.simulator.manual import FRAMES, Frame
 from tui.bus.requests import Read, ReadWrite, WriteMany
 from tui.simulator.server import frames as witness
-from tui.wire.frame_search import frame_ends
 from tui.wire.frames import (
     MAX_FRAME,
     MIN_FRAME,
     crc16,
     frame,
+    frame_ends,
     hex_text,
     is_whole,
     read_frame,

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from .errors import DeviceException, ExchangeError, LineError, NoAnswer
-from .identification import REFERENCE
 from .limits import STANDARD_EXCEPTIONS
 from .model import DeviceState, IdentificationObjects
 from .requests import (
+    REFERENCE,
     Identify,
     Read,
     ReadWrite,

@@ -13,7 +13,6 @@ from tui.safety import LATE_REPLY
 
 from .errors import RequestRefused, WrongReply
 from .expectation import IDENTIFY
-from .identification import REFERENCE, Objects, own_words_of
 from .limits import Limits, send_refusal
 from .link import Link
 from .model import (
@@ -30,12 +29,15 @@ from .prepared import PreparedWrite
 from .program import Program
 from .requests import (
     BROADCAST,
+    REFERENCE,
     Diagnose,
     Identify,
+    Objects,
     ReadWrite,
     ReportId,
     Request,
     diagnostic_of,
+    own_words_of,
     read_request,
     write_request,
 )

@@ -10,8 +10,7 @@ import tui
 from tui.bus.api import Frame
 from tui.wire.capture.forms import ModbusTcpForm, Packet, PacketForm, RtuForm
 from tui.wire.capture.pcapng import interface_block, packet_block, section_block
-from tui.wire.frames import is_whole
-from tui.wire.pdu import MBAP_BYTES, pdu_of
+from tui.wire.frames import MBAP_BYTES, is_whole, pdu_of
 
 
 class CaptureFile:

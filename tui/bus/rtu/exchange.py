@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from tui.wire.frame_search import frame_ends
-from tui.wire.frames import MAX_FRAME, is_whole
+from tui.wire.frames import MAX_FRAME, frame_ends, is_whole
 
 from ..expectation import EXCEPTION, Expectation, exception_code, exception_extents
 from ..master import ExchangeResult, Piece, ResultKind

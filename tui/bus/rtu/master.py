@@ -15,7 +15,6 @@ from ..master import ExchangeResult, LineContext, ResultKind, Sending, settle
 from ..transport.base import Transport
 from ..transport.port_errors import PortErrors
 from .exchange import RtuExchange, noted, pieces
-from .timer import PutOffTimer
 
 BABBLE = 1.0
 """Seconds to wait for silence on a line that never falls silent, before sending anyway."""
@@ -32,6 +31,44 @@ IDLE_LIMIT = 4096
 BEFORE_END, SHORTEST_PAUSE = 0.0003, 0.0005
 """Seconds before the end of a reply from which each piece of it is taken at once, and seconds for
 which it is worth to take none: a line that delivers single characters costs a turn for each."""
+
+
+class PutOffTimer:
+    """Does one thing once some seconds have gone by; lives in the line's loop."""
+
+    def __init__(self) -> None:
+        self._timer: asyncio.TimerHandle | None = None
+        self._due = 0.0
+        self._action: Callable[[], None] | None = None
+
+    def start(self, delay: float, action: Callable[[], None]) -> None:
+        """Do only this, once so many seconds have gone by; a timer that is set is put off."""
+        loop = asyncio.get_running_loop()
+        self._due, self._action = loop.time() + delay, action
+        if self._timer is not None and self._timer.when() > self._due:
+            self.stop()
+        if self._timer is None:
+            self._timer = loop.call_at(self._due, self._ring)
+
+    def _ring(self) -> None:
+        """The time that was set first is over; a new one for each piece costs more."""
+        loop, self._timer = asyncio.get_running_loop(), None
+        if self._action is None:
+            return
+        if loop.time() < self._due:
+            self._timer = loop.call_at(self._due, self._ring)
+        else:
+            self._action()
+
+    def leave(self) -> None:
+        """Do nothing any more; where it is soon started again, that costs less than stop()."""
+        self._action = None
+
+    def stop(self) -> None:
+        """Do nothing any more."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
 
 
 class RtuMaster:

@@ -24,10 +24,10 @@ from ..transport.ports import is_pseudo_terminal, open_serial, other_openers
 from ..transport.serial_posix import PosixSerial
 from ..transport.serial_thread import ThreadedSerial
 from ..transport.tcp import TcpTransport
-from .backoff import pause
 from .dispatcher import Dispatcher
 from .inside import SharedLine
 from .last_way import LastWay
+from .patience import pause
 
 log = logging.getLogger(__name__)
 

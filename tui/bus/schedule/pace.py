@@ -9,7 +9,7 @@ import threading
 from collections.abc import Hashable, Mapping
 
 from ..bounds import MOST_SHARE
-from .polls import PollCarrier
+from ..poll_plan import PollCarrier
 
 SHARE = 0.9
 """Share of the line's time that regular polls may take; the rest is the operator's."""

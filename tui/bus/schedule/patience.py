@@ -11,7 +11,6 @@ from ..limits import Limits
 from ..master import Piece, StrayKind
 from ..model import DeviceState, Priority, Timing
 from ..requests import Read, WriteMany
-from .backoff import pause
 from .device_record import Device, Outstanding, note_turnaround, usual
 
 FORGET = 0.99
@@ -301,3 +300,11 @@ class Devices:
         if after <= SHORT_WAIT:
             # what repeats frames quickly stands in the line, not in one drive
             self._settle, self._repeated = max(self._settle, after), now
+
+
+def pause(failures: int, first: float, longest: float) -> float:
+    """Seconds to wait after so many failures in a row: `first`, doubled each time, capped."""
+    if failures <= 0:
+        return 0.0
+    # the exponent is capped as well: a night of failures must not overflow
+    return min(longest, first * float(2 ** min(failures - 1, 30)))

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from tui.safety import JUST_SENT, MOST_UNACKNOWLEDGED
 
 from ..errors import LineBusy, LineError, LineFailed, RequestRefused, Superseded
 from ..expectation import Expectation
@@ -13,8 +16,6 @@ from ..limits import Limits
 from ..model import Priority, Reply
 from ..program_use import ProgramUse
 from ..requests import BROADCAST, Read, Request
-from .sent_stops import SentStops
-from .shares import LineShares
 
 
 @dataclass(eq=False, slots=True)
@@ -221,3 +222,135 @@ class JobQueue:
         """Take out everything that waits."""
         jobs, self._jobs = self._jobs, []
         return jobs
+
+
+class SentStop(NamedTuple):
+    """One stop word that was sent to a device."""
+
+    when: float
+    tries: int
+    """Number of unacknowledged attempts; 0 once acknowledged."""
+
+
+class SentStops:
+    """Says which stops take turns with what else waits. Lives in the line's loop.
+
+    A stop is the first unless the same request was acknowledged just before, and nothing else has
+    changed its device since. A repeat waits for one other exchange at most.
+    """
+
+    def __init__(self) -> None:
+        self._sent: dict[tuple[int, bytes], SentStop] = {}
+        self._stopped_last = False
+
+    def yields(self, job: Job, now: float) -> bool:
+        """True if one other request goes before this stop."""
+        if job.priority is not Priority.STOP or not self._stopped_last:
+            return False
+        sent = self._sent.get((job.request.device, job.pdu))
+        return (
+            sent is not None
+            and now - sent.when < JUST_SENT
+            and sent.tries in (0, MOST_UNACKNOWLEDGED)
+        )
+
+    def count(self, job: Job, now: float, *, acknowledged: bool) -> None:
+        """A request was sent, and its exchange is over."""
+        request = job.request
+        self._stopped_last = job.priority is Priority.STOP
+        if job.commands:
+            # the same stop means something again
+            self._sent = {
+                which: sent
+                for which, sent in self._sent.items()
+                if request.device not in (BROADCAST, which[0])
+            }
+        elif request.changes:
+            self._sent = {
+                which: sent for which, sent in self._sent.items() if now - sent.when < JUST_SENT
+            }
+            which = request.device, job.pdu
+            before = self._sent.get(which, SentStop(now, 0))
+            tries = 0 if acknowledged else min(before.tries + 1, MOST_UNACKNOWLEDGED)
+            self._sent[which] = SentStop(now, tries)
+
+
+MINIMUM_SHARES: Mapping[Priority, float] = {
+    Priority.OPERATOR_READ: 0.25,
+    Priority.POLL: 0.15,
+    Priority.BACKGROUND: 0.05,
+}
+"""Of the time of a full line, by kind of request; stops and commands take all that they need."""
+MOST_OWED = 0.3
+"""Seconds of the line that a kind may be owed: what it could not use is not made up for."""
+OVERDUE = 0.1
+"""Seconds owed from which a kind goes before those above it: a few commands pass undivided."""
+LEAST_COUNTED = 0.001
+"""Seconds that an exchange is counted for at least."""
+
+
+class LineShares:
+    """Order of requests: stops, then kinds below their share, then by priority.
+
+    Within a kind, programs take turns by the time that each has had. Lives in the line's loop.
+    """
+
+    def __init__(self) -> None:
+        self._owed = dict.fromkeys(MINIMUM_SHARES, 0.0)
+        self._had: dict[tuple[Priority, str], float] = {}
+        """Seconds by kind and program; of a program that comes back, at least the others' least."""
+
+    def rank(self, job: Job) -> tuple[float, ...]:
+        """The place of a job that waits; the smallest goes out first."""
+        kind = kind_of(job.priority)
+        owed = self._owed.get(kind, 0.0)
+        had = self._had.get((kind, job.program), 0.0)
+        if job.priority is Priority.STOP:
+            return 0.0, 0.0, 0.0, 0.0, job.order
+        if owed > OVERDUE:
+            return 1.0, -owed, had, job.priority, job.order
+        return 2.0, kind, had, job.priority, job.order
+
+    def come(self, job: Job, waiting: Iterable[Job]) -> None:
+        """A job joins those that wait: its program makes up for no time in which it had none."""
+        kind = kind_of(job.priority)
+        if kind not in self._owed:
+            return
+        others = [item.program for item in waiting if kind_of(item.priority) is kind]
+        if not others:
+            self._had = {which: had for which, had in self._had.items() if which[0] is not kind}
+        elif job.program not in others:
+            least, mine = (
+                min(self._had.get((kind, other), 0.0) for other in others),
+                (kind, job.program),
+            )
+            self._had[mine] = max(least, self._had.get(mine, 0.0))
+
+    def count(self, job: Job, seconds: float, waiting: Iterable[Job]) -> None:
+        """A job has taken so many seconds of the line, while these waited.
+
+        The time of stops is not shared: nothing is made up for after it.
+        """
+        if job.priority is Priority.STOP:
+            return
+        seconds = max(seconds, LEAST_COUNTED)
+        kinds = {kind_of(item.priority) for item in waiting}
+        kind = kind_of(job.priority)
+        for priority, share in MINIMUM_SHARES.items():
+            due = self._owed[priority] + share * seconds
+            if priority is kind:
+                # what it takes beyond its share while nothing else waits is no debt
+                due = max(due - seconds, -seconds)
+            self._owed[priority] = min(
+                due, MOST_OWED if priority is kind or priority in kinds else 0.0
+            )
+        if kind in self._owed:
+            mine = kind, job.program
+            self._had[mine] = self._had.get(mine, 0.0) + seconds
+
+
+def kind_of(priority: Priority) -> Priority:
+    """The kind of request that shares its minimum share of the line."""
+    if priority is Priority.PATIENT:
+        return Priority.BACKGROUND
+    return priority

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import OWNER_SILENT, NotShared
+from ..errors import OWNER_SILENT, LineError, NotShared
 from ..line_events import (
     ControlDenied,
     ControlRequested,
@@ -19,11 +19,12 @@ from ..line_events import (
     NoticeReceived,
 )
 from ..link import label
-from ..model import LineStatus
+from ..model import LineState, LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from ..shared_state import commanded_by
-from .carried import Polled
+from ..trace import Frame
+from .carried import Polled, error_of
 from .heartbeat import Heartbeat
 from .messages import (
     VERSION,
@@ -47,7 +48,6 @@ from .messages import (
     next_message,
     packed,
 )
-from .news_heard import NewsHeard
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .polls import PollsSubmitted
@@ -60,6 +60,44 @@ LEAVE_WITHIN = 1.0
 """Seconds that a program which leaves waits for the port to be closed."""
 STOP_UNHEARD = ("a stop while the line had no owner", "a stop while this program stood still")
 STOOD_STILL = "This program stood still and was taken for gone: it commands nothing any more."
+
+
+class NewsHeard:
+    """Keeps this program's picture of the line as its owner describes it; in the line's loop."""
+
+    def __init__(self, inside: LineInside, say: Say) -> None:
+        self.note = ""
+        """Added to the state of a connected line, after a space."""
+        self._inside = inside
+        self._say = say
+        self._state: LineState | None = None
+        self._failure: LineError | None = None
+
+    def hear(self, news: News) -> None:
+        """Take the news over."""
+        inside = self._inside
+        for device, state in news.devices.items():
+            inside.devices.copy(device, state)
+        inside.around.tally.copy(news.counters, news.counted)
+        inside.pace.others, inside.pace.stretch = news.shares, news.stretch
+        for frame in news.frames:
+            inside.around.trace.append(Frame(*frame))
+        if news.state != self._state:
+            self._state = news.state
+            self._failure = error_of(*news.failure) if news.failure is not None else None
+            self.tell_state()
+
+    def tell_state(self) -> None:
+        """Give the line the state that the owner named last."""
+        if self._state is not None:
+            connected = self._state.status is LineStatus.CONNECTED
+            reason = self._shared_with() if connected else self._state.reason
+            self._say(self._state.status, reason, self._failure)
+
+    def _shared_with(self) -> str:
+        """The programs that share the line, and its settings if others were meant."""
+        names = ", ".join(other.text for other in self._inside.facts.others)
+        return f"{f'Shared with {names}.' if names else ''}{self.note}".strip()
 
 
 class OwnerAway(Exception):

@@ -16,11 +16,10 @@ from ..errors import DeviceException, LineError, RequestRefused
 from ..limits import CAUTIOUS, Limits, send_refusal
 from ..link import character_time, silence
 from ..model import Priority, Reply
-from ..poll_plan import USUAL_TURNAROUND, PlannedRead, PolledTurn, PollPlan
+from ..poll_plan import USUAL_TURNAROUND, PlannedRead, PolledTurn, PollPlan, Subscription
 from ..requests import read_request
 from ..schedule.inside import LineInside
 from ..schedule.pace import SHARE, greatest
-from ..schedule.polls import Subscription
 from ..schedule.queue import Job
 from .attached import Client
 from .carried import Polled, PolledReply, Subscribe, Unsubscribe, error_of, failure_message

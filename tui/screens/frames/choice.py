@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from tui.bus.api import Frame
 from tui.session.listening.words import FUNCTION_NAMES
+from tui.wire.frames import pdu_of
 from tui.wire.heard.pairing import BROADCAST_DEVICE
-from tui.wire.pdu import pdu_of
 
 from .decoded import EXCEPTION_BIT
 

@@ -11,7 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
 from tui.session.listening.words import FUNCTION_NAMES
-from tui.wire.pdu import Pdu, pdu_of
+from tui.wire.frames import Pdu, pdu_of
 
 READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE = 3, 4, 6, 16, 23
 EXCEPTION_BIT = 0x80

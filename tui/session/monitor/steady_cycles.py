@@ -7,8 +7,14 @@ from dataclasses import dataclass
 
 from tui.bus.api import Priority
 from tui.bus.errors import RequestRefused
-from tui.bus.poll_plan import MOST_READS, PlannedTurn, PolledTurn, PollPlan
-from tui.bus.schedule.polls import PollCarrier, Subscription
+from tui.bus.poll_plan import (
+    MOST_READS,
+    PlannedTurn,
+    PollCarrier,
+    PolledTurn,
+    PollPlan,
+    Subscription,
+)
 
 from ..drive import DriveSession
 from ..read.reader import Reader
