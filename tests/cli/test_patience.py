@@ -8,10 +8,10 @@ from typing import Any, cast
 import pytest
 
 from tui.bus.link import Link, SerialLink, TcpLink
-from tui.cli.commands.orders import watch_of
 from tui.drive.profile import library
 from tui.session.fleet import Fleet
 from tui.session.patience import patience
+from tui.session.running.watching import learned_timeout
 from tui.session.timeout_report import TimeoutWatch
 
 
@@ -29,11 +29,14 @@ async def test_a_time_out_that_is_learnt_late_fails_no_status(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Beside a panel at 1200 baud status ended with "TTO is set and could not be learnt"."""
-    monkeypatch.setattr("tui.cli.commands.orders.LEARNT_WITHIN", 0.0)
+    monkeypatch.setattr("tui.session.running.watching.LEARNT_WITHIN", 0.0)
     session = SimpleNamespace(
         profile=library.load("atv71"), line=line_to(SerialLink("x", 1200, "8E1"))
     )
     watch, looks = TimeoutWatch(10.0, None), iter([[session]] * 4)
     line_watch = SimpleNamespace(unread=lambda: next(looks, []), watch=lambda _: watch)
     console: Any = SimpleNamespace(session=session, device=1)
-    assert await watch_of(cast("Fleet", SimpleNamespace(line_watch=line_watch)), console) is watch
+    assert (
+        await learned_timeout(cast("Fleet", SimpleNamespace(line_watch=line_watch)), console)
+        is watch
+    )

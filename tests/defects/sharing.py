@@ -528,7 +528,7 @@ DEFECTS = (
     ),
     Defect(
         "no-patience-with-a-slow-line",
-        "tui/cli/commands/orders.py",
+        "tui/session/running/watching.py",
         "within = patience(console.session.line, LEARNT_WITHIN)",
         "within = LEARNT_WITHIN",
         "`status` and `run` fail beside a panel at 1200 baud.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
@@ -11,10 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from tui.drive.orders import OrderRefused
-from tui.session.patience import patience
 from tui.session.work import Outcome, OutcomeKind
 
-from ..shared.errors import LINE_TROUBLE, REFUSED_HERE, Failure, note_journal, status_of
+from ..shared.errors import REFUSED_HERE, Failure, note_journal, status_of
 from ..shared.options import (
     Target,
     connect_drive,
@@ -29,21 +27,8 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.monitor.snapshot import Snapshot
     from tui.session.starts.keeper import StartKeeper
-    from tui.session.timeout_report import TimeoutWatch
     from tui.session.work import Permit
-
-COMMAND_POLL_INTERVAL = 0.02
-"""Seconds between two checks of the work in the line's thread."""
-PERIOD = 0.25
-"""Target cycle time of the monitor in seconds."""
-FIRST_TRIES, FIRST_WITHIN = 3, 5.0
-"""Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word that
-it does not have may meet silence, which is not an answer of any kind."""
-LEARNT_WITHIN = 10.0
-"""Seconds in which a drive's communication timeout is read on a quick line: words that it lacks
-meet silence, and a small computer is slow."""
 
 arm_option = click.option(
     "--arm", is_flag=True, help="Arm the drive for this command. Required for writing."
@@ -73,27 +58,16 @@ def close_journal(journal: Journal) -> None:
         complain(f"{entries} not in the journal{why}.")
 
 
-def moved(journal: Journal) -> bool:
-    """Return True if a command was sent, answered or not; a reference alone moves nothing."""
-    return any(not entry.why.startswith("reference") for entry in journal.sent)
-
-
-def latest_of(console: DriveConsole) -> Snapshot:
-    """The last cycle of a drive that is watched."""
-    latest = console.latest
-    assert latest is not None, "a console is handed out after the first cycle"
-    return latest
-
-
 @asynccontextmanager
 async def watched(
     opened: OpenLine, target: Target, starts: StartKeeper | None = None
 ) -> AsyncIterator[tuple[Fleet, DriveConsole]]:
     """The wanted drive, watched and fed, its state known; `starts` records those of its motor.
 
-    Raises Failure where it does not answer, and what `connect` raises.
+    Raises LineError where it does not answer, and what `connect` raises.
     """
     from tui.session.fleet import Fleet
+    from tui.session.running.watching import WATCH_PERIOD, first_cycle
 
     from ..shared.drive_status import shown_codes
 
@@ -102,28 +76,15 @@ async def watched(
     # the motors of a simulated line end with it
     fleet = Fleet(opened.line, journal, None if opened.simulation else starts)
     console = fleet.take(session)
-    console.monitor.start(period=PERIOD, extra=shown_codes(session.profile))
+    console.monitor.start(period=WATCH_PERIOD, extra=shown_codes(session.profile))
     try:
-        await _first_look(console)
+        await first_cycle(console)
         yield fleet, console
     finally:
         fleet.forget()
         close_journal(journal)
         if starts is not None:
             starts.close()
-
-
-async def _first_look(console: DriveConsole) -> None:
-    loop = asyncio.get_running_loop()
-    end = loop.time() + FIRST_WITHIN
-    while True:
-        latest = console.latest
-        tried = latest is not None and latest.cycle >= FIRST_TRIES
-        if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
-            return  # what decides about its chart may come a cycle later
-        if latest is not None and tried and loop.time() > end:
-            raise Failure(latest.error, LINE_TROUBLE)
-        await asyncio.sleep(COMMAND_POLL_INTERVAL)
 
 
 def permit_of(session: DriveSession) -> Permit:
@@ -154,11 +115,9 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     Raises OrderRefused where it is not even begun; Failure where it is refused, with the status
     of who refused it: 5 here, 4 the drive, 3 no answer.
     """
-    work = commander.session.work
-    before = work.outcome
-    give()
-    await _until(lambda: work.outcome is not before or not work.busy_for(commander))
-    outcome = work.outcome if work.outcome is not before else None
+    from tui.session.running.watching import outcome_of
+
+    outcome = await outcome_of(commander, give)
     if outcome is None:
         raise Failure("Not sent: superseded by a newer command.", REFUSED_HERE)
     if outcome.kind is OutcomeKind.REFUSED:
@@ -174,14 +133,6 @@ def _way_on(error: Exception | None) -> str:
     return " Use --unrecorded to run it anyway." if refused else ""
 
 
-async def _until(holds: Callable[[], bool]) -> None:
-    """Look until something holds that the line's thread brings about."""
-    while True:
-        if holds():
-            return
-        await asyncio.sleep(COMMAND_POLL_INTERVAL)
-
-
 def _status(error: Exception | None) -> int:
     return REFUSED_HERE if error is None else status_of(error) or REFUSED_HERE
 
@@ -194,20 +145,3 @@ def need_arming(arm: bool, does: str) -> None:
             " machine first, then add it.",
             REFUSED_HERE,
         )
-
-
-async def watch_of(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
-    """A kept drive's watch over the line; None where it has none, or it is off.
-
-    Raises Failure where it could not be learnt.
-    """
-    rules = console.session.profile.data.communication_fault
-    if rules is None or not rules.timeout:
-        return None
-    within = patience(console.session.line, LEARNT_WITHIN)
-    end = asyncio.get_running_loop().time() + within
-    while console.session in fleet.line_watch.unread():
-        if asyncio.get_running_loop().time() > end:
-            raise Failure(f"{rules.timeout} could not be learnt.", LINE_TROUBLE)
-        await asyncio.sleep(COMMAND_POLL_INTERVAL)
-    return fleet.line_watch.watch(console.device)

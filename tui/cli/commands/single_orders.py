@@ -13,6 +13,7 @@ from tui.bus.errors import LineError
 from tui.drive.fault_reset import not_in_command, reset_codes, reset_follows
 from tui.drive.reset_text import MAY_START
 from tui.session.patience import patience
+from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, reported
 from ..shared.messages import Messages
@@ -26,11 +27,9 @@ from ..shared.options import (
     read_only_option,
 )
 from .orders import (
-    COMMAND_POLL_INTERVAL,
     arm_drive,
     arm_option,
     carried_out,
-    latest_of,
     need_arming,
     watched,
 )

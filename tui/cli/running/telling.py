@@ -46,7 +46,7 @@ class RunTelling:
         if latest.time - self._reported < TOLD_EVERY * 0.9:
             return
         self._reported = latest.time
-        self.tell("state", self._state_line(latest), latest)
+        self._print("state", self._state_line(latest), latest)
 
     def _state_line(self, latest: Snapshot) -> str:
         if latest.error:
@@ -54,8 +54,15 @@ class RunTelling:
         values = shown_values(self._session.profile, with_text(latest.readings))
         return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
 
-    def tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
-        """One line, or one JSON object a line, about an event."""
+    def report(self, event: str, text: str) -> None:
+        """Print one line, or one JSON object a line, about an event."""
+        self._print(event, text)
+
+    def warn(self, text: str) -> None:
+        """Print it on standard error."""
+        complain(text)
+
+    def _print(self, event: str, text: str, latest: Snapshot | None = None) -> None:
         from tui.session.monitor.timeout import timeout_now
 
         from ..shared.output import document, iso_time, json_text

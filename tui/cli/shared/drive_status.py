@@ -12,7 +12,7 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.patience import patience
 
 from .control import control_json, control_row
-from .errors import DONE, LINE_TROUBLE, Failure
+from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_json, fault_json, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
 from .read_until import read_until
@@ -119,8 +119,7 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.monitor.timeout import timeout_now
-
-    from ..commands.orders import watch_of
+    from tui.session.running.watching import NotLearned, learned_timeout
 
     profile = session.profile
     fleet = Fleet(opened.line, Journal())
@@ -133,8 +132,8 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
         readings, unread = await read_until(console, _codes(profile), end)
         try:
             async with asyncio.timeout_at(end):
-                watch = await watch_of(fleet, console)
-        except (Failure, TimeoutError):
+                watch = await learned_timeout(fleet, console)
+        except (NotLearned, TimeoutError):
             is_late = True
         state = drive_state(profile, readings)
         try:

@@ -82,6 +82,7 @@ def status_of(error: Exception) -> int | None:
         UnknownProfile,
     )
     from tui.session.command.access import NotFollowed
+    from tui.session.running.errors import MotorStopped, MotorTripped, NotStopped
     from tui.session.settings.write import NotTaken
     from tui.simulator.errors import SimulatorError
 
@@ -95,6 +96,9 @@ def status_of(error: Exception) -> int | None:
         (RequestRefused, REFUSED_HERE),
         (NotTaken, DRIVE_REFUSED),
         (NotFollowed, DRIVE_REFUSED),
+        (NotStopped, DRIVE_REFUSED),
+        (MotorTripped, DRIVE_REFUSED),
+        (MotorStopped, ENDED_AFTER_WRITING),
         (DriveError, REFUSED_HERE),
         (DeviceException, DRIVE_REFUSED),
         (LineError, LINE_TROUBLE),

@@ -14,12 +14,13 @@ from ..command.stop_report import StopSummary
 from ..drive import DriveSession
 from ..fleet import Fleet
 from ..read.reader import Reader
+from ..running.errors import NotStopped
 from ..settings.apply import apply_edits
 from ..settings.eeprom import save_to_eeprom
 from ..settings.typed import stage_typed
 from ..work import Permit
 from .samples import SampleFeed
-from .values import DriveValue, NotStopped, NotWritten, value_from
+from .values import DriveValue, NotWritten, value_from
 
 STANDS_WITHIN = 120.0
 """Seconds in which a motor must reach standstill after a stop."""

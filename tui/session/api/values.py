@@ -22,10 +22,6 @@ class NotWritten(DriveError):
         self.why = dict(why)
 
 
-class NotStopped(DriveError):
-    """The motor could not be stopped from here."""
-
-
 @dataclass(frozen=True, slots=True)
 class DriveValue:
     """A parameter's value as it was read."""

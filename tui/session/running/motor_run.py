@@ -1,0 +1,249 @@
+"""One motor from its run command to its standstill, for a command or a script."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from tui.bus.errors import LineError
+
+from ..command.stop_report import Phase
+from ..console import DriveConsole
+from ..fleet import Fleet
+from ..journal import Entry
+from ..monitor.snapshot import Snapshot
+from ..monitor.timeout import left_alone_text
+from ..reading import with_text
+from ..timeout_report import TimeoutWatch
+from .ending import Ending
+from .errors import MotorStopped, MotorTripped, NotStopped
+from .watching import latest_of, learned_timeout
+
+RUN_POLL_INTERVAL = 0.05
+CYCLES_AT_REST = 2
+"""Cycles in a row that show a motor at rest before it counts as stopped on its own."""
+STOPS_THAT_MAY_FAIL = 2
+"""Stops that may fail on a line without trouble before the motor is reported as running."""
+
+RunEvent = Literal["control", "reference", "order", "ended", "stopping", "stopped", "left-running"]
+
+
+class RunObserver(Protocol):
+    """Shows the progress of a run; called in the loop of the run."""
+
+    def report(self, event: RunEvent, text: str) -> None:
+        """Report an event."""
+
+    def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
+        """Show a cycle; `left_alone` gives what happens to the motor when polling stops."""
+
+    def warn(self, text: str) -> None:
+        """Report at once that the motor could not be stopped yet."""
+
+
+@dataclass(slots=True)
+class MotorRun:
+    """One motor from its run command to its stop, in any loop."""
+
+    fleet: Fleet
+    console: DriveConsole
+    ending: Ending
+    observer: RunObserver
+    by: str
+    """Program that stops the motor at the end, for the journal and other programs."""
+    prepare: Callable[[], Awaitable[None]]
+    """Does what must be done before the run command: arming, taking control."""
+    command: Callable[[], Awaitable[None]]
+    """Gives the run command and waits until the motor runs."""
+    seconds: float | None = None
+    """The duration; None for no limit."""
+    leave_running: bool = False
+    watch: TimeoutWatch | None = field(default=None, init=False)
+    """The drive's communication timeout, once it is known."""
+    is_stopped_here: bool = field(default=False, init=False)
+    """True if this program has given a stop of its own: no other program stopped the motor."""
+    _commanding: bool = field(default=False, init=False)
+    """True if the run command is on its way, so that it may be sent at any time."""
+    _earlier: tuple[Entry, ...] = field(init=False)
+    _stops: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._earlier = self.fleet.journal.sent
+        self._stops = self.console.session.work.stops
+
+    async def carry_out(self) -> None:
+        """Run the motor until the end; stop it then, whatever went wrong, or leave it running.
+
+        Raises MotorStopped if it stopped on its own, and NotStopped. Returns after standstill.
+        """
+        left, stopped = False, ""
+        try:
+            if await self._started():
+                stopped = await self._follow()
+                left = self.leave_running
+        finally:
+            if self.may_turn and not left:
+                await self._bring_to_rest()
+        if left:
+            self.observer.report("left-running", self._left_alone())
+        elif stopped:
+            raise MotorStopped(self._stop_text(latest_of(self.console), stopped))
+
+    @property
+    def may_turn(self) -> bool:
+        """True if a command of this run was sent, answered or not; a reference moves nothing."""
+        earlier = set(map(id, self._earlier))
+        return self._commanding or any(
+            entry.device == self.console.device and not entry.why.startswith("reference")
+            for entry in self.fleet.journal.sent
+            if id(entry) not in earlier
+        )
+
+    def _left_alone(self) -> str:
+        """Return the drive's reaction if polling stops."""
+        return left_alone_text(self.console.session, watch=self.watch)
+
+    async def _started(self) -> bool:
+        """Give the run command; False where the end came first."""
+        start = asyncio.create_task(self._start())
+        end = asyncio.create_task(self.ending.event.wait())
+        try:
+            await asyncio.wait({start, end}, return_when=asyncio.FIRST_COMPLETED)
+            if start.done():
+                await start
+            return start.done()
+        finally:
+            start.cancel()
+            end.cancel()
+
+    async def _start(self) -> None:
+        self.watch = await learned_timeout(self.fleet, self.console)
+        await self.prepare()
+        self._commanding = True
+        try:
+            await self.command()
+        except Exception:
+            self._commanding = False
+            raise
+        self._commanding = False
+
+    async def _follow(self) -> str:
+        """Show the motor until the end; raises MotorStopped if it stops on its own.
+
+        Returns how it was stopped before the end, if it was not yet seen at rest.
+        """
+        begun = time.monotonic()
+        seen, rest = 0, 0
+        while True:
+            latest = latest_of(self.console)
+            if latest.cycle != seen and latest.time > begun:
+                seen = latest.cycle
+                self.observer.show(latest, self._left_alone)
+                rest = rest + 1 if self._at_rest(latest) else 0
+            ended = self.ending.event.is_set()
+            if rest >= CYCLES_AT_REST or (rest and ended and latest.state.fault):
+                with suppress(LineError):
+                    await self.console.read(self.console.session.followed)
+                stopped = self._stopped_on_its_own(latest)
+                self.observer.report("ended", str(stopped))
+                raise stopped
+            if ended:
+                return self._stop_of_others()
+            if self.seconds is not None and time.monotonic() - begun >= self.seconds:
+                self.ending.end(f"after {self.seconds:g} s")
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self.ending.event.wait(), RUN_POLL_INTERVAL)
+
+    def _stop_of_others(self) -> str:
+        """Name the source of a stop since the run began; empty for none or one of this program."""
+        work = self.console.session.work
+        is_other = work.stops > self._stops and not self.is_stopped_here
+        return f"by {work.stopped_by}" if is_other else ""
+
+    def _at_rest(self, latest: Snapshot) -> bool:
+        """Return True if it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
+        if latest.error:
+            return False
+        kind = latest.state.kind
+        at_zero = kind == "stopping" and self._frequency(latest) == 0
+        return at_zero or kind in ("fault", "stopped", "ready", "blocked")
+
+    def _frequency(self, latest: Snapshot) -> float | None:
+        """The output frequency in Hz, as far as it is known."""
+        frequency = self.console.session.profile.quantity("output_frequency")
+        reading = with_text(latest.readings).get(frequency.code) if frequency else None
+        return reading.number if reading is not None else None
+
+    def _stopped_on_its_own(self, latest: Snapshot) -> MotorStopped:
+        """The reason why the motor no longer runs."""
+        if fault := latest.state.fault:
+            return MotorTripped(
+                f"Device {self.console.device} tripped: {fault.code}, {fault.name}. Look at the"
+                " machine; reset it when its cause is gone."
+            )
+        how = "by the drive or by another source"
+        if by_others := self._stop_of_others():
+            how = by_others
+        elif lost := self.console.commander.given.changed_words():
+            how = f"by another program or master on the line: {lost}"
+        elif latest.state.local:
+            how = "at its terminals or keypad"
+        return MotorStopped(self._stop_text(latest, how))
+
+    def _stop_text(self, latest: Snapshot, how: str) -> str:
+        state = latest.state.headline
+        return f"Device {self.console.device} no longer runs: {state}. It was stopped {how}."
+
+    async def _bring_to_rest(self) -> None:
+        """Stop the motor and wait for its standstill; on a lost line as soon as that is back.
+
+        Raises NotStopped where the drive answers and does not stop.
+        """
+        session, stopper, failed = self.console.session, self.fleet.stopper, 0
+        why = self.ending.why or "the run has ended"
+        self.observer.report("stopping", f"stopping ({why})")
+        while True:
+            ordered = time.monotonic()
+            stopper.stop([session], by=self.by)
+            await stopper.ended([session], math.inf)
+            report = stopper.reports[session.device]
+            if report.phase is Phase.STOPPED:
+                self.observer.report("stopped", f"Device {session.device}: stopped.")
+                return
+            bad = await self._line_was_bad(ordered)
+            if self._stands():
+                self.observer.report("stopped", f"Device {session.device} is at standstill.")
+                return
+            # a ramp may be longer than a stop is followed
+            if not bad and latest_of(self.console).state.kind != "stopping":
+                failed += 1
+            if failed == STOPS_THAT_MAY_FAIL:
+                raise NotStopped(f"Device {session.device}: {report.text}")
+
+    def _stands(self) -> bool:
+        """Return True if the motor is seen at rest, though the drive did not take the stop."""
+        latest = latest_of(self.console)
+        enabled = latest.state.motion == "running"
+        return self._at_rest(latest) and not enabled and self._frequency(latest) == 0
+
+    async def _line_was_bad(self, since: float) -> bool:
+        """Wait until the drive answers; whether it failed to at any time since."""
+        requested, bad, reported = time.monotonic(), False, False
+        while True:
+            latest = latest_of(self.console)
+            if latest.error and latest.time > since:
+                bad = True
+                if not reported:
+                    reported = True
+                    self.observer.warn(
+                        f"NOT STOPPED yet: {latest.error}\n{self._left_alone()} It is stopped as"
+                        " soon as it answers; until then stop it at the machine."
+                    )
+            elif not latest.error and latest.time > requested:
+                return bad
+            await asyncio.sleep(RUN_POLL_INTERVAL)

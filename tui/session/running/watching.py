@@ -1,0 +1,86 @@
+"""A drive that is about to be commanded: watched, its state and its timeout known."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from tui.bus.errors import LineError
+
+from ..patience import patience
+
+if TYPE_CHECKING:
+    from ..command.commander import Commander
+    from ..console import DriveConsole
+    from ..fleet import Fleet
+    from ..monitor.snapshot import Snapshot
+    from ..timeout_report import TimeoutWatch
+    from ..work import Outcome
+
+COMMAND_POLL_INTERVAL = 0.02
+"""Seconds between two checks of the work in the line's thread."""
+WATCH_PERIOD = 0.25
+"""Target cycle time of the monitor in seconds."""
+FIRST_TRIES, FIRST_WITHIN = 3, 5.0
+"""Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word that
+it does not have may meet silence, which is not an answer of any kind."""
+LEARNT_WITHIN = 10.0
+"""Seconds in which a drive's communication timeout is read on a quick line: words that it lacks
+meet silence, and a small computer is slow."""
+
+
+class NotLearned(LineError):
+    """A drive's communication timeout was not read in time."""
+
+
+def latest_of(console: DriveConsole) -> Snapshot:
+    """The last cycle of a drive that is watched."""
+    latest = console.latest
+    assert latest is not None, "a console is handed out after the first cycle"
+    return latest
+
+
+async def first_cycle(console: DriveConsole) -> None:
+    """Wait until the state of a watched drive is known. Raises LineError if it does not answer."""
+    loop = asyncio.get_running_loop()
+    end = loop.time() + FIRST_WITHIN
+    while True:
+        latest = console.latest
+        tried = latest is not None and latest.cycle >= FIRST_TRIES
+        if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
+            return  # what decides about its chart may come a cycle later
+        if latest is not None and tried and loop.time() > end:
+            raise LineError(latest.error)
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
+
+
+async def learned_timeout(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
+    """A kept drive's watch over the line; None where it has none, or it is off.
+
+    Raises NotLearned.
+    """
+    rules = console.session.profile.data.communication_fault
+    if rules is None or not rules.timeout:
+        return None
+    within = patience(console.session.line, LEARNT_WITHIN)
+    end = asyncio.get_running_loop().time() + within
+    while console.session in fleet.line_watch.unread():
+        if asyncio.get_running_loop().time() > end:
+            raise NotLearned(f"{rules.timeout} could not be learnt.")
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
+    return fleet.line_watch.watch(console.device)
+
+
+async def outcome_of(commander: Commander, give: Callable[[], None]) -> Outcome | None:
+    """Give a command and wait for its outcome; None if a newer command superseded it.
+
+    Raises OrderRefused if it is not even begun.
+    """
+    work = commander.session.work
+    before = work.outcome
+    give()
+    while True:
+        if work.outcome is not before or not work.busy_for(commander):
+            return work.outcome if work.outcome is not before else None
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
