@@ -18,8 +18,7 @@ from tui.drive.byte_order import only_swapped, swapped_word, telling_codes
 from tui.drive.orders import OrderRefused, chart_in_force, stop_in_any
 from tui.drive.profile import library
 from tui.drive.values import is_enumeration, is_field, raw_range, to_words, word_count
-from tui.session.command.access import CommandAccess
-from tui.session.command.command_history import CommandHistory
+from tui.session.command.access import CommandAccess, CommandHistory
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.drive import DriveSession

@@ -13,9 +13,8 @@ from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.safety import STATE_FRESH
-from tui.session.command.access import CommandAccess
-from tui.session.command.carry_out import give_order
-from tui.session.command.command_history import CommandHistory
+from tui.session.command.access import CommandAccess, CommandHistory
+from tui.session.command.commander import give_order
 from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.journal import Journal

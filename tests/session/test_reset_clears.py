@@ -8,9 +8,8 @@ from typing import Any
 
 from tui.drive.fault_reset import reset_follows
 from tui.drive.profile import library
-from tui.session.command.access import CommandAccess
-from tui.session.command.carry_out import give_order, give_reference, run_at_reference
-from tui.session.command.command_history import CommandHistory
+from tui.session.command.access import CommandAccess, CommandHistory
+from tui.session.command.commander import give_order, give_reference, run_at_reference
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 

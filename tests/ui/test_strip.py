@@ -12,7 +12,7 @@ from tui.drive.fault_reset import not_in_command
 from tui.drive.profile import library
 from tui.screens.frame import TABS, message_lines
 from tui.screens.keys.table import MONITOR, PLACES
-from tui.session.command.carry_out import STILL_IN_FAULT
+from tui.session.command.commander import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
 from tui.widgets.strip import DriveNow, Said, StripView, strip_line, tabs_line
