@@ -552,7 +552,7 @@ DEFECTS = (
     ),
     Defect(
         "motor-of-another-user-unguarded",
-        "tui/session/starts/folders.py",
+        "tui/session/starts/files.py",
         "        for shared in self._shared():\n            try:",
         "        for shared in ():\n            try:",
         "Another user's service keeps a motor running whose program has exited.",

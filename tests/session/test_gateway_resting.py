@@ -12,7 +12,7 @@ from tui.bus.gateway.talk import TcpClient
 from tui.session.gateway.resting import RestingDrives
 from tui.session.gateway.started import StartedMotors
 from tui.session.gateway.writes import GatewayWrite
-from tui.session.starts.errors import StartNotRecorded
+from tui.session.starts.record import StartNotRecorded
 from tui.simulator import DriveSpec
 
 from .test_gateway import CMD, LFR, Bench, Make, bench, start_motor

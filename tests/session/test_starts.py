@@ -31,10 +31,9 @@ from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.line_key import line_key
 from tui.session.drive import DriveSession
-from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 from tui.session.starts.keeper import NothingToTakeOver, StartKeeper
 from tui.session.starts.processes import Processes
-from tui.session.starts.record import StartRecord
+from tui.session.starts.record import StartNotRecorded, StartOvertaken, StartRecord
 from tui.session.starts.starts import Starts
 
 LINE = "tcp:gateway"

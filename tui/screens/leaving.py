@@ -128,7 +128,7 @@ class Leaving(Panel):
 
     async def _leave_running(self) -> None:
         """Leave motors running, recorded for the next program."""
-        from tui.session.starts.errors import StartNotRecorded
+        from tui.session.starts.record import StartNotRecorded
 
         self.settled = True
         for session in self._motors():

@@ -127,7 +127,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
 
 def _way_on(error: Exception | None) -> str:
     """Return how to unblock a refused command, if possible."""
-    from tui.session.starts.errors import StartNotRecorded, StartOvertaken
+    from tui.session.starts.record import StartNotRecorded, StartOvertaken
 
     refused = isinstance(error, StartNotRecorded) and not isinstance(error, StartOvertaken)
     return " Use --unrecorded to run it anyway." if refused else ""

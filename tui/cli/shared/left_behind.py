@@ -82,7 +82,7 @@ def forget_start(session: DriveSession) -> None:
 def left_on_lines() -> list[LeftBehind]:
     """Every motor that may run so, on any line but simulated ones; reads files, asks no drive."""
     from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
-    from tui.session.starts.folders import start_records
+    from tui.session.starts.files import start_records
     from tui.session.starts.record import offer
     from tui.session.starts.starts import Starts
 

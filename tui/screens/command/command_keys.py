@@ -70,7 +70,7 @@ class OrderKeys(TeachKeys):
 
     def ask_unrecorded(self) -> None:
         """Ask once whether to run although the start cannot be recorded."""
-        from tui.session.starts.errors import StartNotRecorded, StartOvertaken
+        from tui.session.starts.record import StartNotRecorded, StartOvertaken
 
         outcome, starts = self.commander.outcome, self.session.starts
         if outcome is None or outcome is self._requested or starts is None:

@@ -11,8 +11,7 @@ from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
 from ..clock import REAL_CLOCK, Clock
-from .errors import StartNotRecorded, StartOvertaken
-from .record import StartRecord, offer
+from .record import StartNotRecorded, StartOvertaken, StartRecord, offer
 from .starts import Starts
 
 if TYPE_CHECKING:

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from tui.bus.program import ProcessKey
 
     from ..connect.identify import DriveIdentity
+from pathlib import Path
+
+from tui.drive.errors import DriveError
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,3 +113,26 @@ def _since(then: datetime | None, now: datetime) -> str:
         return ""
     then = then.astimezone(now.tzinfo)
     return f" since {then:%H:%M}" if then.date() == now.date() else f" since {then:%Y-%m-%d %H:%M}"
+
+
+OVERTAKEN = "a stop came first"
+
+
+class StartNotRecorded(DriveError):
+    """A start could not be put on record, so the motor is not to be started."""
+
+    def __init__(self, device: int, folder: Path, reason: str) -> None:
+        self.device, self.folder, self.reason = device, folder, reason
+        super().__init__(
+            f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record "
+            "it is not known after a crash which program started the motor. Make the folder "
+            "writable, or name another one in DRIVEPANEL_STATE."
+        )
+
+
+class StartOvertaken(StartNotRecorded):
+    """A stop came while the start was being recorded: the motor is not to be started at all."""
+
+    def __init__(self, device: int, folder: Path) -> None:
+        super().__init__(device, folder, OVERTAKEN)
+        self.args = (f"A stop of drive {device} came before its start, which is not sent.",)

@@ -23,16 +23,15 @@ from tui.safety import START_PATIENCE
 from ..clock import REAL_CLOCK, Clock
 from ..connect.known_lines import remembered_text
 from ..connect.line_key import line_key
-from .errors import OVERTAKEN, StartNotRecorded, StartOvertaken
-from .folders import start_records
+from .files import start_records
 from .processes import Processes
-from .record import StartRecord
-from .task import DriveKey, StartTask
+from .record import OVERTAKEN, StartNotRecorded, StartOvertaken, StartRecord
 
 if TYPE_CHECKING:
     from tui.bus.program import ProcessKey
 
     from ..connect.identify import DriveIdentity
+from dataclasses import dataclass, field
 
 log = logging.getLogger(__name__)
 
@@ -312,3 +311,19 @@ class Starts:
         if record.is_foreign:
             return self.processes.is_same_boot(record.boot_id)
         return self.processes.lives(record.boot_id, record.pid, record.started)
+
+
+DriveKey = tuple[str, int]
+"""A line's text and a device: one program calls one line by one text."""
+
+
+@dataclass(eq=False, slots=True)
+class StartTask:
+    """Work for the disk: a record to write, or with None those of a drive to remove."""
+
+    drive: DriveKey
+    record: StartRecord | None
+    done: threading.Event = field(default_factory=threading.Event)
+    trouble: str = ""
+    void: bool = False
+    """Nobody waits for it any more, or a stop came first: it is not to be put in its place."""
