@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -35,7 +36,6 @@ from ..settings.write import Writer
 from .first_stop import stop_first, unlike_families
 from .last_known import last_known_stop, run_by_others
 from .stop_report import Phase, not_proved, not_stopped
-from .wave import FirstWave
 
 log = logging.getLogger(__name__)
 
@@ -300,3 +300,27 @@ class MotorStop:
         word = readings[chart.status].raw
         kind = state_of(chart, word).kind if word is not None else "unknown"
         return kind, abs(number) if number is not None else None
+
+
+WAVE_TAKES = 10.0
+"""Seconds after which a first wave is over, though not every drive was sent its frame."""
+
+
+class FirstWave:
+    """The first frames of several stops; lives in the line's loop."""
+
+    def __init__(self, devices: Iterable[int]) -> None:
+        self._left = set(devices)
+        self._over = asyncio.Event()
+
+    def passed(self, device: int) -> None:
+        """The frame of a drive was sent, or cannot be."""
+        self._left.discard(device)
+        if not self._left:
+            self._over.set()
+
+    async def over(self) -> None:
+        """Wait until all were sent: reading and planning would hold up the next frame."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(WAVE_TAKES):
+                await self._over.wait()

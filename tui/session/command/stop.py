@@ -44,7 +44,7 @@ from ..journal import Journal
 from ..settings.write import Writer
 from .last_known import is_likely_to_run
 from .last_stop import LastStop, end_work
-from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
+from .motor_stop import STANDSTILL_POLL_INTERVAL, FirstWave, MotorStop
 from .stop_report import (
     NOT_STOPPING,
     Phase,
@@ -53,7 +53,6 @@ from .stop_report import (
     not_stopped,
 )
 from .under_way import UnderWay, watch_first_frames
-from .wave import FirstWave
 
 log = logging.getLogger(__name__)
 
