@@ -9,7 +9,7 @@ EDITOR = "tests/session/test_editor.py"
 DEFECTS = (
     Defect(
         "saved-value-of-another-source",
-        "tui/session/unsaved.py",
+        "tui/session/drive.py",
         "elif self._held[code] != before:",
         "elif False:",
         "A setting changed at the keypad is lost at power-off without a warning.",

@@ -15,8 +15,7 @@ from tui.bus.requests import Diagnose, ReadWrite, Request, WriteMany, WriteOne
 from tui.drive.errors import ProfileError
 from tui.drive.profile import library
 from tui.drive.profile.profile import LONGEST_UNPACKED, unpacked_profile
-from tui.session.care_data import CareData, packed_care
-from tui.session.drive import DriveSession
+from tui.session.drive import CareData, DriveSession, packed_care
 from tui.session.journal import Journal
 from tui.session.sharing.care import DrivesInCare
 from tui.session.sharing.orphan_motors import OrphanMotorGuard

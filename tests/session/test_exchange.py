@@ -25,10 +25,9 @@ from tui.session.blocks.write import AssignmentRefused
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
 from tui.session.journal import Entry
-from tui.session.journal_entries import CUT_SHORT
 from tui.session.journal_reading import read_journal
 from tui.session.monitor.monitor import Monitor
-from tui.session.settings.write import NotTaken
+from tui.session.settings.write import CUT_SHORT, NotTaken
 from tui.session.starts.keeper import StartKeeper
 from tui.session.work import Permit
 

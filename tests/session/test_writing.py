@@ -16,10 +16,9 @@ from tui.bus.requests import WriteOne
 from tui.session.arming import NotArmed
 from tui.session.drive import DriveSession
 from tui.session.journal import Entry, Journal
-from tui.session.journal_entries import CUT_SHORT
 from tui.session.journal_reading import completed, read_journal
 from tui.session.read.reader import Reader
-from tui.session.settings.write import NotTaken, Writer
+from tui.session.settings.write import CUT_SHORT, NotTaken, Writer
 from tui.session.work import Permit, Stopped
 
 from .fakes import OneDrive, parameter, profile_of

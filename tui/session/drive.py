@@ -5,8 +5,14 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Mapping
+from threading import Lock
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
 
 from tui.bus.api import ModbusLine
+from tui.bus.bounds import MOST_CARE
 from tui.bus.line_events import ControlDenied, DevicesStopped, LineEvent
 from tui.bus.link import label
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
@@ -14,7 +20,6 @@ from tui.drive.profile.profile import Profile
 
 from .arming import Arming
 from .byte_order import ByteOrder
-from .care_data import packed_care
 from .clock import REAL_CLOCK, Clock
 from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
@@ -25,7 +30,6 @@ from .reading import Reading
 from .shown import Rating
 from .starts.keeper import StartKeeper
 from .timeout_report import Timeout
-from .unsaved import UnsavedSettings
 from .work import WorkQueue
 
 OWN_PROFILE = "Nothing is written by a profile that is not the drive's own."
@@ -186,3 +190,64 @@ class DriveSession:
         if fault and self.image.age(fault) > longest:
             raws = {code: raw for code, raw in raws.items() if code != fault}
         return read_chart(self.profile, raws)
+
+
+class UnsavedSettings:
+    """Raw values of settings that the drive keeps until power-off only, unless it saves them.
+
+    What is saved is the value read before the first write from here, as long as nothing else has
+    changed it since. If that value is not known, the setting counts as unsaved. For any thread.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._saved: dict[str, int | None] = {}
+        self._held: dict[str, int | None] = {}
+        self._known = True
+
+    @property
+    def codes(self) -> frozenset[str]:
+        """The settings whose value is not known to be the saved one."""
+        with self._lock:
+            held = self._held.items()
+            return frozenset(c for c, raw in held if raw is None or raw != self._saved[c])
+
+    def note_write(self, code: str, before: int | None, now: int | None) -> None:
+        """Note a write: what the drive held before it, and holds now; None if not known."""
+        with self._lock:
+            if code not in self._saved:
+                self._saved[code] = before if self._known else None
+            elif self._held[code] != before:
+                self._saved[code] = None  # changed by another source, which may have saved it
+            self._held[code] = now
+
+    def note_value(self, code: str, raw: int) -> None:
+        """Note what a setting holds that was written without a sure reply."""
+        with self._lock:
+            if code in self._held:
+                self._held[code] = raw
+
+    def forget_values(self) -> None:
+        """Many settings may have changed: from now on no value read is known to be saved."""
+        with self._lock:
+            self._known = False
+            self._saved = dict.fromkeys(self._saved)
+
+    def clear(self) -> None:
+        """The drive has saved all settings, or lost what was not saved."""
+        with self._lock:
+            self._saved, self._held, self._known = {}, {}, True
+
+
+class CareData(msgspec.Struct, frozen=True):
+    """The care for one drive, as it goes to the holder of its line."""
+
+    profile: Annotated[bytes, Meta(max_length=MOST_CARE)]
+    """As Profile.packed."""
+    identity: DriveIdentity | None
+    guessed: bool
+
+
+def packed_care(profile: Profile, identity: DriveIdentity | None, *, guessed: bool) -> bytes:
+    """The bytes of the care for a drive."""
+    return msgspec.msgpack.encode(CareData(profile.packed, identity, guessed))

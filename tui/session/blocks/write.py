@@ -19,8 +19,7 @@ from tui.drive.settings.writable import AT_REST
 from ..drive import DriveSession
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
-from ..settings.refusals import device_refusal
-from ..settings.write import NotTaken, Writer
+from ..settings.write import NotTaken, Writer, device_refusal
 from ..work import Permit
 
 

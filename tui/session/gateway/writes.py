@@ -39,9 +39,9 @@ from tui.drive.values import from_words, word_count
 from tui.safety import CLIENT_WRITE_ARMED_FOR, JUST_READ
 
 from ..drive import DriveSession
-from ..journal_entries import parameter_entry
 from ..read.reader import Reader
 from ..reading import Reading
+from ..settings.write import parameter_entry
 from .in_turn import PendingWrite
 from .line import GatewayLine
 from .rules import GatewayRules

@@ -34,8 +34,7 @@ from ..read.retrying_reader import RetryingReader
 from ..work import Permit, Stopped
 from .applied import Applied, EditOutcome, Result, WriteProgress
 from .link_change import LinkChange, link_change
-from .refusals import device_refusal
-from .write import NotTaken, Writer
+from .write import NotTaken, Writer, device_refusal
 
 LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)
 

@@ -17,8 +17,7 @@ from ..drive import DriveSession
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Permit
-from .refusals import device_refusal
-from .write import Writer
+from .write import Writer, device_refusal
 
 SAVING_LONGEST = 10.0
 """Seconds that a drive may take to save or to recall."""

@@ -10,13 +10,13 @@ from functools import partial
 from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
 from tui.drive.errors import DriveError
+from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.drive.shown import depends_on
+from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, is_field, to_words, word_count
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
-from ..journal_entries import CUT_SHORT, parameter_entry, raw_text
 from ..read.reader import Reader
 from ..work import Permit
 
@@ -177,3 +177,59 @@ class Writer:
         when = self.session.clock.line_time(reply.time)
         self.session.image.confirm(parameter.code, back, when)
         return back
+
+
+CUT_SHORT = "a stop came: not known whether it was taken"
+"""Entry of a write that was ended before its answer."""
+
+
+def raw_text(session: DriveSession, parameter: Parameter, raw: int | None) -> str:
+    """A raw value as a person reads it; nothing for None."""
+    image = session.image
+    return shown_text(session.profile, parameter, raw, image.raws, image.lacking)
+
+
+def parameter_entry(
+    session: DriveSession,
+    parameter: Parameter,
+    *,
+    old: int | None,
+    new: int,
+    answer: str,
+    why: str,
+    read_back: int | None = None,
+) -> Entry:
+    """A write in progress: raw values before and after, the answer, and the value read back."""
+    return Entry(
+        time=now_text(),
+        line=session.line_text,
+        device=session.device,
+        profile=session.profile.id,
+        code=parameter.code,
+        address=parameter.address,
+        old_raw=old,
+        old=raw_text(session, parameter, old),
+        new_raw=new,
+        new=raw_text(session, parameter, new),
+        answer=answer,
+        read_back=read_back,
+        why=why,
+    )
+
+
+def device_refusal(
+    profile: Profile, parameter: Parameter, error: DeviceException, headline: str
+) -> str:
+    """Return the exception's meaning in this family, the drive's state, and the next step."""
+    known = next((e for e in profile.data.exceptions if e.code == error.code), None)
+    if known is None:
+        message = f"exception {error.code}, which no document of this family explains"
+        return f"{parameter.code}: the drive refused with {message}. The drive is {headline}."
+    meaning = _sentence(known.meaning)
+    next_step = _sentence(known.remedy)
+    text = f"{parameter.code}: the drive refused with exception {known.code}, {known.name}."
+    return f"{text} {meaning} The drive is {headline}. {next_step}".strip()
+
+
+def _sentence(text: str) -> str:
+    return text if not text or text.endswith(".") else f"{text}."

@@ -19,8 +19,7 @@ from tui.bus.shared_state import accepts_any_care
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile, unpacked_profile
 
-from ..care_data import CareData
-from ..drive import DriveSession
+from ..drive import CareData, DriveSession
 from ..journal import Entry, Journal, now_text
 
 if TYPE_CHECKING:
