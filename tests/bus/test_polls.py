@@ -308,10 +308,10 @@ async def test_the_owner_refuses_a_plan_beyond_the_limits_by_itself(share: Share
         assert kept == [1 + MOST_PLANNED // 4000, 0]
         failures = {polled.number: polled.replies[0].failure for polled in heard}
         assert failures[1] is not None
-        assert failures[1][0] == "RequestRefused"
+        assert failures[1].kind == "RequestRefused"
         last = failures[4 + MOST_PLANNED // 4000]
         assert last is not None
-        assert last[1].text == f"Not polled: more than {MOST_PLANNED} reads."
+        assert last.text == f"Not polled: more than {MOST_PLANNED} reads."
 
 
 async def test_the_owner_tells_over_the_socket_why_a_plan_is_refused(share: Share) -> None:
@@ -320,7 +320,7 @@ async def test_the_owner_tells_over_the_socket_why_a_plan_is_refused(share: Shar
         lines.open("keeper")
         refused = await asyncio.to_thread(refused_plan, lines)
         assert refused.failure is not None
-        assert refused.failure[0] == "RequestRefused"
+        assert refused.failure.kind == "RequestRefused"
         assert not peer.requests
 
 

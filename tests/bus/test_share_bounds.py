@@ -53,6 +53,7 @@ from tui.bus.share.messages import (
 from tui.bus.share.place import Owner
 from tui.bus.shared_state import SharedState
 from tui.bus.stop_counts import StopCounts
+from tui.bus.trace import Frame
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest
@@ -239,8 +240,8 @@ SAMPLES: tuple[AnyMessage, ...] = (
     ),
     Withdraw(1),
     Answer(1, b"\x03\x02\0\1", 5.0),
-    Failed(1, "NoAnswer", ErrorForm("text", 1, 3, 5, "nothing", b"x", retry_in=1.0)),
-    Failed(2, "LineLost", ErrorForm("text")),
+    Failed(1, ErrorForm("NoAnswer", "text", 1, 3, 5, "nothing", b"x", retry_in=1.0)),
+    Failed(2, ErrorForm("LineLost", "text")),
     StopGiven((5, 6), (1, 2), "a key", STRANGER, 5.0),
     Alive(),
     Claim(5, True),
@@ -253,15 +254,15 @@ SAMPLES: tuple[AnyMessage, ...] = (
     Facts((STRANGER,), {5: "stranger"}, {5: {"stranger": 1}}, {6: ("stranger", "why")}, {5: 1.0}),
     News(
         LineState(LineStatus.CONNECTED, "", 1.0, 2.0), LineCounters(3, busy_seconds=1.0),
-        {1: STATE}, {1: 0.5}, ("PortMissing", ErrorForm("gone", path="/dev/x", ports=("/dev/y",))),
-        ((1.0, "out", b"\1\3", ""),),
+        {1: STATE}, {1: 0.5}, ErrorForm("PortMissing", "gone", path="/dev/x", ports=("/dev/y",)),
+        (Frame(1.0, "out", b"\1\3"),),
         {1: DeviceCounters(1, exceptions={2: 1})}, 1.5,
     ),
     Subscribe(1, PollPlan(1, ((PlannedRead(1, 2),), (PlannedRead(5, 1, 4),)), 0.5, 5.0)),
     Unsubscribe(1),
     Polled(
         1, 0, 5.0,
-        (PolledReply(b"\x03\x02\0\1", 5.0), PolledReply(b"", 0.0, ("NoAnswer", ErrorForm()))),
+        (PolledReply(b"\x03\x02\0\1", 5.0), PolledReply(b"", 0.0, ErrorForm("NoAnswer"))),
     ),
 )  # fmt: skip
 """One message of each kind; Goodbye aside, which ends an attachment in good order."""

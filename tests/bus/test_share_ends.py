@@ -299,7 +299,7 @@ async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Shar
             old = time.monotonic() - 5
             connection.sendall(hello() + ask(kind="WriteOne", fields=write, requested=old))
             reported = await asyncio.to_thread(answer_of_kind, connection, Failed)
-            assert reported.error == "RequestRefused"
+            assert reported.form.kind == "RequestRefused"
             assert "stood still for 5 s" in reported.form.text
             # a stop is never too late
             stop = ask(number=2, kind="WriteOne", fields=write, requested=old, priority=0)

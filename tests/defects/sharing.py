@@ -166,7 +166,7 @@ DEFECTS = (
     Defect(
         "lost-line-without-its-error",
         "tui/bus/share/client.py",
-        "error_of(*news.failure) if news.failure is not None else None",
+        "error_from(news.failure) if news.failure is not None else None",
         "None",
         "The panel waits for a missing port instead of reporting it.",
         ("tests/line/test_keeper.py::test_a_port_that_is_not_there_is_reported_at_once",),

@@ -28,13 +28,14 @@ from .share.messages import (
     AnyMessage,
     Claim,
     DriveRequested,
+    Facts,
     Notified,
     PollPause,
     RequestGranted,
     StopGiven,
 )
 from .share.publishers import LinePublisher
-from .stop_counts import GivenStops, StopCounts
+from .stop_counts import StopCounts
 
 DEPARTED_KEPT = 16
 """Number of departed programs that are remembered."""
@@ -91,31 +92,25 @@ class SharedState:
         """A program on the line."""
         return next((item for item in self.programs if item.id == id), None)
 
-    def learn(
-        self,
-        programs: tuple[Program, ...],
-        commanders: Mapping[int, str],
-        given: GivenStops,
-        paused: Mapping[int, tuple[str, str]],
-        departed: tuple[Program, ...] = (),
-    ) -> tuple[int, ...]:
+    def learn(self, reported: Facts) -> tuple[int, ...]:
         """Take over the owner's message; what this program claims is its own until denied.
 
         Returns the devices with stops that this program did not know of.
         """
+        self.stops.learn_times(reported.stopped)
         with self._lock:
-            others = {d: text for d, text in commanders.items() if text != self.me.id}
+            others = {d: text for d, text in reported.commanders.items() if text != self.me.id}
             mine = {d: text for d, text in self.commanders.items() if text == self.me.id}
-            reported = {d: pair for d, pair in paused.items() if pair[0] != self.me.id}
+            theirs = {d: pair for d, pair in reported.paused.items() if pair[0] != self.me.id}
             own = {d: pair for d, pair in self.paused.items() if pair[0] == self.me.id}
-            self.paused = MappingProxyType({**reported, **own})
+            self.paused = MappingProxyType({**theirs, **own})
             self.commanders = MappingProxyType({**others, **mine})
-            unheard = self.stops.replace(given, self.me.id)
-            known = {program.id for program in (*self.departed, *programs, self.me)}
-            earlier = tuple(program for program in departed if program.id not in known)
+            unheard = self.stops.replace(reported.stops, self.me.id)
+            known = {program.id for program in (*self.departed, *reported.programs, self.me)}
+            earlier = tuple(program for program in reported.departed if program.id not in known)
             self.departed = (*earlier, *self.departed)[-DEPARTED_KEPT:]
         self.leases.forget_ended(others)
-        self.set_programs(programs)
+        self.set_programs(reported.programs)
         return unheard
 
     def set_programs(self, programs: tuple[Program, ...]) -> None:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from time import monotonic
 from typing import Literal
+
+import msgspec
+
+from .bounds import MOST_BYTES, ByteString, MonotonicTime, Word
 
 FrameDirection = Literal["out", "in"]
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(msgspec.Struct, frozen=True, array_like=True):
     """One frame, or bytes that form none; `time` is that of the line's clock."""
 
-    time: float
+    time: MonotonicTime
     direction: FrameDirection
-    data: bytes
-    note: str = ""
+    data: ByteString
+    note: Word = ""
     """Remark on the frame: empty for a request or its reply, else what is unusual."""
 
 
@@ -35,8 +37,8 @@ class Trace:
         self._looked = -math.inf
 
     def add(self, time: float, direction: FrameDirection, data: bytes, note: str = "") -> None:
-        """Keep a frame; the oldest gives way."""
-        self.append(Frame(time, direction, bytes(data), note))
+        """Keep a frame, of bytes the first MOST_BYTES; the oldest gives way."""
+        self.append(Frame(time, direction, bytes(data[:MOST_BYTES]), note))
 
     def append(self, frame: Frame) -> None:
         """Keep a frame that is made."""

@@ -19,7 +19,7 @@ from ..model import DeviceCounters, DeviceState, Priority, Reply
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .carried import failure_message, request_from
+from .carried import error_form, request_from
 from .messages import (
     Alive,
     Answer,
@@ -29,7 +29,6 @@ from .messages import (
     News,
     NoMessage,
     packed,
-    seen_frames,
 )
 from .owner_watch import is_stop
 
@@ -146,7 +145,7 @@ class Client:
         if error is None and job.priority is Priority.STOP and job.request.changes:
             self.stops_due.pop(job.request.device, None)
         if error is not None:
-            self.say(Failed(number, *failure_message(error)))
+            self.say(Failed(number, error_form(error)))
         else:
             reply = answer.result()
             self.say(Answer(number, reply.pdu, reply.time))
@@ -166,7 +165,7 @@ class Client:
                 self.known[device] = changed[device] = state
         count = inside.around.trace.count
         new = min(count - self.frames, MOST_FRAMES) if self.trace else 0
-        frames = seen_frames(inside.around.trace.frames()[-new:]) if new else ()
+        frames = inside.around.trace.frames()[-new:] if new else ()
         self.frames = count
         counters = inside.around.tally.frozen()
         counted = {
@@ -177,7 +176,7 @@ class Client:
         self.counted = counters.devices
         plain = replace(counters, devices={})
         error = inside.error()
-        failure = failure_message(error) if error is not None else None
+        failure = error_form(error) if error is not None else None
         return News(
             inside.state(), plain, changed, shares, failure, frames, counted, inside.pace.stretch
         )

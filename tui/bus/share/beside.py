@@ -30,7 +30,7 @@ from ..notes import NOTES_A_LOOK, LineNote
 from ..program import LONGEST_NAME, Program, readable
 from ..program_use import use_by_program
 from ..trace import Frame
-from .messages import LENGTH, LONGEST_MESSAGE, NoMessage, SeenFrame, StopGiven, seen_frames
+from .messages import LENGTH, LONGEST_MESSAGE, NoMessage, StopGiven
 from .place import Owner, Peer, reached
 
 STOP_HEAD, LOOK_HEAD, PAST_HEAD = b"STOP", b"LOOK", b"PAST"
@@ -133,7 +133,7 @@ def line_look(owner: Owner) -> LineLook | None:
 class LinePast(msgspec.Struct, frozen=True):
     """Frames with their times on the monotonic clock, and notes; the oldest first."""
 
-    frames: Annotated[tuple[SeenFrame, ...], Meta(max_length=FRAMES_KEPT)] = ()
+    frames: Annotated[tuple[Frame, ...], Meta(max_length=FRAMES_KEPT)] = ()
     notes: tuple[LineNote, ...] = ()
 
 
@@ -143,7 +143,7 @@ async def send_directly(
     """Send the past in pieces, so that the line has its turns in between; the first is empty."""
     await _send(writer, LinePast())
     for at in range(0, len(frames), MOST_FRAMES):
-        await _send(writer, LinePast(frames=seen_frames(frames[at : at + MOST_FRAMES])))
+        await _send(writer, LinePast(frames=tuple(frames[at : at + MOST_FRAMES])))
     for at in range(0, len(notes), NOTES_A_LOOK):
         await _send(writer, LinePast(notes=tuple(notes[at : at + NOTES_A_LOOK])))
 
@@ -172,7 +172,7 @@ def line_past(owner: Owner) -> tuple[tuple[Frame, ...], tuple[LineNote, ...]]:
                     piece = msgspec.msgpack.decode(data, type=LinePast)
                 except (msgspec.MsgspecError, UnicodeDecodeError) as error:
                     raise OSError(f"its answer is damaged: {error}") from error
-                frames += [Frame(*frame) for frame in piece.frames]
+                frames += piece.frames
                 notes += piece.notes
                 received = True
                 connection.settimeout(max(0.01, end - monotonic()))

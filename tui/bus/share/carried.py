@@ -81,8 +81,9 @@ def request_from(kind: str, fields: dict[str, Any]) -> Request:
 
 
 class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
-    """An error as a message carries it; which fields count is its kind's own business."""
+    """An error as a message carries it; its kind decides which of the other fields count."""
 
+    kind: Word = "LineError"
     text: Text = ""
     device: DeviceId = 0
     function: ByteValue = 0
@@ -117,11 +118,11 @@ _KINDS: Mapping[type[LineError], tuple[str, ...]] = {
 _NAMED = {kind.__name__: kind for kind in _KINDS}
 
 
-def failure_message(error: BaseException) -> tuple[str, ErrorForm]:
-    """The kind and the details of an error, as a message carries them."""
+def error_form(error: BaseException) -> ErrorForm:
+    """An error as a message carries it; one that is not the line's as a LineError."""
     kind = _NAMED.get(type(error).__name__, LineError)
     held = {name: _clipped(getattr(error, name)) for name in _KINDS[kind]}
-    return kind.__name__, ErrorForm(_clipped(str(error)), **held)
+    return ErrorForm(kind.__name__, _clipped(str(error)), **held)
 
 
 def _clipped(value: Any) -> Any:
@@ -131,9 +132,9 @@ def _clipped(value: Any) -> Any:
     return value[-MOST_BYTES:] if isinstance(value, str | bytes) else value
 
 
-def error_of(kind: str, form: ErrorForm) -> LineError:
-    """The error that a message carries."""
-    made = _NAMED.get(kind, LineError)
+def error_from(form: ErrorForm) -> LineError:
+    """The error that a message carries; a LineError if its kind is unknown."""
+    made = _NAMED.get(form.kind, LineError)
     fields = {name: getattr(form, name) for name in _KINDS[made]}
     return made(**fields) if fields else made(form.text)
 
@@ -156,7 +157,7 @@ class PolledReply(msgspec.Struct, frozen=True, array_like=True):
 
     pdu: ByteString
     time: MonotonicTime
-    failure: tuple[Word, ErrorForm] | None = None
+    failure: ErrorForm | None = None
 
 
 class Polled(msgspec.Struct, frozen=True, tag=True):

@@ -23,8 +23,7 @@ from ..model import LineState, LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from ..shared_state import commanded_by
-from ..trace import Frame
-from .carried import Polled, error_of
+from .carried import Polled, error_from
 from .heartbeat import Heartbeat
 from .messages import (
     VERSION,
@@ -81,10 +80,10 @@ class NewsHeard:
         inside.around.tally.copy(news.counters, news.counted)
         inside.pace.others, inside.pace.stretch = news.shares, news.stretch
         for frame in news.frames:
-            inside.around.trace.append(Frame(*frame))
+            inside.around.trace.append(frame)
         if news.state != self._state:
             self._state = news.state
-            self._failure = error_of(*news.failure) if news.failure is not None else None
+            self._failure = error_from(news.failure) if news.failure is not None else None
             self.tell_state()
 
     def tell_state(self) -> None:
@@ -309,14 +308,7 @@ class ShareClient:
 
     def _hear_facts(self, reported: Facts) -> None:
         facts = self._inside.facts
-        facts.stops.learn_times(reported.stopped)
-        unheard = facts.learn(
-            reported.programs,
-            reported.commanders,
-            reported.stops,
-            reported.paused,
-            reported.departed,
-        )
+        unheard = facts.learn(reported)
         if unheard and self.again:  # given while this program was with no owner
             by = STOP_UNHEARD[self._gone]
             facts.events.emit(DevicesStopped(unheard, by, self._owner.program))

@@ -6,14 +6,12 @@ Times are those of the machine's monotonic clock, which all its programs share.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
 
 from ..bounds import (
-    MOST_BYTES,
     MOST_DEVICES,
     MOST_FRAMES,
     MOST_PROGRAMS,
@@ -39,17 +37,14 @@ from ..limits import Limits
 from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
 from ..notes import LineNote
 from ..program import Program
-from ..trace import Frame, FrameDirection
+from ..trace import Frame
 from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 
-VERSION = 8
+VERSION = 9
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; a longer message is invalid."""
 LENGTH = 4
-
-SeenFrame = tuple[MonotonicTime, FrameDirection, ByteString, Word]
-"""The fields of a Frame."""
 
 
 class Message(msgspec.Struct, frozen=True, tag=True):
@@ -130,7 +125,6 @@ class Failed(Message, frozen=True):
     """Result of a request that failed."""
 
     number: Number
-    error: Word
     form: ErrorForm
 
 
@@ -247,9 +241,9 @@ class News(Message, frozen=True):
     """Those that have changed."""
     shares: Shares
     """The share of the line's time that all other programs' polls take, by device."""
-    failure: tuple[Word, ErrorForm] | None = None
-    """The error of a line that is lost, by its kind."""
-    frames: Annotated[tuple[SeenFrame, ...], Meta(max_length=MOST_FRAMES)] = ()
+    failure: ErrorForm | None = None
+    """The error of a line that is lost."""
+    frames: Annotated[tuple[Frame, ...], Meta(max_length=MOST_FRAMES)] = ()
     counted: Annotated[dict[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = {}
     """Counts of the devices whose counts have changed."""
     stretch: Annotated[float, Meta(ge=1.0, le=MOST_STRETCH)] = 1.0
@@ -276,13 +270,6 @@ _DECODER: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessa
 
 class NoMessage(Exception):
     """Bytes that form no valid message."""
-
-
-def seen_frames(frames: Iterable[Frame]) -> tuple[SeenFrame, ...]:
-    """Frames as messages carry them."""
-    return tuple(
-        (frame.time, frame.direction, frame.data[:MOST_BYTES], frame.note) for frame in frames
-    )
 
 
 def packed(message: AnyMessage) -> bytes:

@@ -22,7 +22,7 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import SHARE, greatest
 from ..schedule.queue import Job
 from .attached import Client
-from .carried import Polled, PolledReply, Subscribe, Unsubscribe, error_of, failure_message
+from .carried import Polled, PolledReply, Subscribe, Unsubscribe, error_form, error_from
 from .messages import AnyMessage, NoMessage
 
 log = logging.getLogger(__name__)
@@ -77,7 +77,7 @@ class PollsServed:
         if served_plan.size + sum(other.size for other in served.values()) > MOST_PLANNED:
             why = why or f"Not polled: more than {MOST_PLANNED} reads."
         if why:
-            failure = PolledReply(b"", 0.0, failure_message(RequestRefused(why)))
+            failure = PolledReply(b"", 0.0, error_form(RequestRefused(why)))
             client.say(Polled(message.number, 0, self._inside.clock(), (failure,)))
             return
         served[message.number] = served_plan
@@ -162,7 +162,7 @@ class PollsServed:
             try:
                 reply = await self._read(plan, read)
             except LineError as error:
-                found.append(PolledReply(b"", 0.0, failure_message(error)))
+                found.append(PolledReply(b"", 0.0, error_form(error)))
                 if not isinstance(error, DeviceException):
                     break
             else:
@@ -242,7 +242,7 @@ class PollsSubmitted:
         """A cycle has come. Raises NoMessage."""
         found = self._subscriptions.get(message.number)
         closed = any(
-            reply.failure and reply.failure[0] == "LineClosed" for reply in message.replies
+            reply.failure and reply.failure.kind == "LineClosed" for reply in message.replies
         )
         if found is None or closed:
             return  # on its way when the plan ended, or the owner, whose end is not this program's
@@ -281,7 +281,7 @@ def _answer_of(
 ) -> Reply | LineError:
     """Return the reply or error in a message for one read. Raises NoMessage."""
     if reply.failure is not None:
-        return error_of(*reply.failure)
+        return error_from(reply.failure)
     if len(reply.pdu) != 2 + 2 * count or reply.pdu[:2] != bytes([function, 2 * count]):
         raise NoMessage("a reply of another length")
     request = read_request(device, address, count, function)

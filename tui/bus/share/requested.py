@@ -13,7 +13,7 @@ from ..model import Priority
 from ..requests import BROADCAST
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .carried import error_of, request_form
+from .carried import error_from, request_form
 from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw
 
 OWNER_ENDED = "The program that owned the line ended"
@@ -82,11 +82,11 @@ class RequestsAsked:
             self._failed(job, message)
 
     def _failed(self, job: Job, message: Failed) -> None:
-        if message.error == "LineClosed":
+        if message.form.kind == "LineClosed":
             # the owner's end is not this program's
             self._give_up(job, sent=OUTCOME_UNKNOWN in message.form.text)
         else:
-            job.fail(error_of(message.error, message.form))
+            job.fail(error_from(message.form))
 
     def fail_all(self, why: str) -> None:
         """Fail all that waits. Nothing of it is sent later, except the words of stops."""
