@@ -198,5 +198,5 @@ def no_such_command(name: str) -> str:
 @click.option("-v", "--verbose", count=True, help="Log in more detail.")
 @click.version_option(tui.__version__, prog_name="drivepanel")
 def main(verbose: int) -> None:
-    """Watch variable-speed drives on a Modbus line. Without a command the panel opens."""
+    """Monitor and run variable-speed drives on a Modbus line. Without a command, open the panel."""
     start_logging(verbose)

@@ -21,19 +21,19 @@ _LINE_HELP, _, _STATUSES = (main.epilog or "").partition("Exit status:")
 FILES = (
     ("$XDG_CONFIG_HOME/drivepanel/settings.toml", "Names of lines."),
     ("$XDG_CONFIG_HOME/drivepanel/profiles/", "Profiles of your own."),
-    ("$XDG_STATE_HOME/drivepanel/journal.jsonl", "What was written to drives."),
+    ("$XDG_STATE_HOME/drivepanel/journal.jsonl", "The journal of writes to drives."),
     ("$XDG_STATE_HOME/drivepanel/drivepanel.log", "The log."),
 )
 VARIABLES = (
-    ("DRIVEPANEL_LINE", "The LINE, or its name, where none is written."),
-    ("DRIVEPANEL_CONFIG", "The configuration folder, in place of that in $XDG_CONFIG_HOME."),
-    ("DRIVEPANEL_STATE", "The state folder, in place of that in $XDG_STATE_HOME."),
-    ("DRIVEPANEL_MQTT_PASSWORD", "The password for the broker of serve and publish."),
+    ("DRIVEPANEL_LINE", "The default LINE, or its name."),
+    ("DRIVEPANEL_CONFIG", "The configuration folder (default: in $XDG_CONFIG_HOME)."),
+    ("DRIVEPANEL_STATE", "The state folder (default: in $XDG_STATE_HOME)."),
+    ("DRIVEPANEL_MQTT_PASSWORD", "The password for the MQTT broker of serve and publish."),
     ("NO_COLOR", "Draw without colors."),
 )
 CAUTION = (
     "The panel is not a safety device: use the emergency stop of the machine. Run commands turn"
-    " motors: nothing is written without --arm, but stop does not need it."
+    " motors. Nothing is written without --arm, except for stops, which do not need it."
 )
 
 

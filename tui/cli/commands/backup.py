@@ -34,11 +34,10 @@ STANDARD_OUTPUT = Path("-")
 @never_forced
 @reported
 def backup(target: Target, file: Path, force: bool, everything: bool, as_json: bool) -> None:
-    """Write the settings of a drive to FILE, one line a parameter; `-` is standard output.
+    """Back up the settings of a drive to FILE, one line per parameter; `-` is standard output.
 
-    The file is TOML, made for a diff: two backups of a drive that nobody set up in between differ
-    in their time only. To change a value by hand, write it into `value` and take `raw` out of that
-    line.
+    The file is TOML, and easy to diff: two backups of an unchanged drive differ in their time only.
+    To change a value by hand, edit `value` and delete `raw` from that line.
     """
     from tui.drive.settings.parameter_set import dump_set
 

@@ -66,12 +66,12 @@ def block(
     """Show, compare or change the mapping of a drive's indirect blocks or communication scanner.
 
     \b
-    show              the slots, the values that they bring, the same read directly
-    verify            the same, compared several times; ends with 1 where a slot differs
-    set NMA3=LCR ...  what slots are mapped to: a code, a number, an address, or none
-    factory           every slot as it left the factory
-    load FILE         the slots as a file has them
-    save FILE         the present slots into a file, one line each
+    show              the slots, the values that they return, and direct reads
+    verify            the same, compared several times; ends with 1 if a slot differs
+    set NMA3=LCR ...  map slots to a code, a number, an address, or none
+    factory           map every slot as in the factory setting
+    load FILE         map the slots as in a file
+    save FILE         save the present slots to a file, one line each
 
     Slots are written at standstill, one after another, each read back. Another master on the line
     may rely on the present assignment.

@@ -56,13 +56,13 @@ def bundle(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Collect all about a line in one zip, for a colleague or a manufacturer.
+    """Collect everything about a line in one zip, for a colleague or a manufacturer.
 
-    Port and adapter, why and counters, the last frames, settings and a report of each drive,
-    journal and messages of the last day, profiles in use, versions, the log. README.txt in the zip
-    explains each file and says what could not be collected.
+    It has port and adapter, why and counters, the last frames, settings and a report of each drive,
+    journal and messages of the last day, profiles in use, versions, and the log. README.txt in the
+    zip explains each file and names what could not be collected.
 
-    Drives are read behind all other requests; nothing is written to them. User names, host names,
+    Drives are read after all other requests; nothing is written to them. User names, host names,
     passwords and credentials are omitted. It works on a dead line too: status 0 means that the
     file was written.
     """

@@ -36,8 +36,8 @@ FACTORY = "factory"
     help="Show the table in this format.",
 )
 @json_option
-@profile_of("Profile of the drives.")
-@devices_option("Slave address of the drive; twice where A and B are two drives.")
+@profile_of("Use this profile for the drives.")
+@devices_option("Use the drive at this slave address; twice if A and B are two drives.")
 @never_forced
 @reported
 def compare(
@@ -51,8 +51,8 @@ def compare(
 ) -> None:
     """Compare the settings of A and B: each a FILE, a LINE, or `factory`.
 
-    Measurements, counters and command words are not settings; address, baud and format of a drive
-    are not compared with the factory. Ends with 0 where all are equal and with 1 where some differ.
+    Measurements, counters and command words are not settings. A comparison with the factory omits
+    address, baud rate and format. Ends with 0 if all are equal and with 1 if some differ.
     """
     from tui.drive.profile import library
     from tui.drive.settings.compare import compare_settings as rows_of

@@ -71,9 +71,9 @@ def counters(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Count the frames to a drive, and compare with what the drive itself counts.
+    """Count the frames to a drive, and compare them with the drive's own counters.
 
-    Ends with 1 where frames were lost or damaged, or another master asks the drive.
+    Ends with 1 if frames were lost or damaged, or if another master polls the drive.
     """
     from tui.session.counters.watch import CounterWatch
 

@@ -61,10 +61,10 @@ def hold(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Keep polling drives until Ctrl-C, so that their communication timeout does not run out.
+    """Keep polling drives until Ctrl-C, so that their communication timeout does not expire.
 
     It reads, and writes nothing. A polled drive cannot detect that its controller is lost: its own
-    protection is off. At the end it reports what each drive does then, and when.
+    protection is off. At the end it reports how and when each drive will react.
     """
     wanted = list(dict.fromkeys(device))
     targets = [Target(line_text, d, profile_id, force_profile=force_profile) for d in wanted]

@@ -50,7 +50,7 @@ def identify(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Request a drive's identity (function 43)."""
+    """Show a drive's identity (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
     from ..running.holding import hold_on

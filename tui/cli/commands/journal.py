@@ -87,10 +87,10 @@ def since(text: str, now: datetime) -> datetime | None:
 @json_option
 @reported
 def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
-    """Show what was written to drives from this computer, trips that were seen, and proofs.
+    """Show writes to drives from this computer, trips that were seen, and timeout tests.
 
-    Of each write: when, which drive, from what to what, what the drive said, and why. What a
-    damaged journal still holds is shown, too.
+    Each write has its time, the drive, the old and new value, the drive's reply, and the reason.
+    The readable entries of a damaged journal are shown, too.
     """
     from tui.session.journal import Entry, Journal
     from tui.session.journal_reading import DamagedLine, completed, read_journal, selected

@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 @json_option
 @reported
 def lines(as_json: bool) -> None:
-    """List the lines that the settings file names, and the adapters and drives remembered.
+    """List the lines that the settings file names, and the stored adapters and drives.
 
-    Lines that are open now are listed with the process that holds each, with the programs on it,
-    and with the good replies of the last minute. A motor that may still run although the program
-    that started it has exited is listed too. The settings file is checked: each fault is reported
-    with its file, line and key, and the status is 2 then.
+    Open lines are listed with the process that owns each, its programs, and the good replies of the
+    last minute. A motor that may still run although its program has exited is listed too. The
+    settings file is checked: each error is reported with its file, line and key, with status 2.
     """
     from tui.bus.share.beside import line_look
     from tui.session.connect.known_lines import load_memory

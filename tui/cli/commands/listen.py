@@ -78,11 +78,11 @@ def listen(
     seconds: float | None,
     as_json: bool,
 ) -> None:
-    """Listen to what others say on a serial line, and send nothing.
+    """Monitor the traffic of other masters on a serial line, and send nothing.
 
-    Requests and replies of any master are shown by drive, code and value, and at the end which
-    master commands which drive, how well each is polled, and what goes wrong. The port is opened
-    for reading only, and for this program alone. A sim: LINE has a master of its own that asks.
+    Requests and replies of any master are shown by drive, code and value. A summary at the end
+    shows which master commands which drive, how often each is polled, and what goes wrong. The port
+    is opened for reading only, and for this program alone. A sim: LINE has a simulated master.
     """
     if pcap_path is None and (raw or force):
         raise click.UsageError("--raw and --force require --pcap FILE.")

@@ -15,7 +15,7 @@ from ..shared.say import say
 @json_option
 @reported
 def ports(as_json: bool) -> None:
-    """List the serial ports of this machine and who holds them."""
+    """List the serial ports of this computer, and the programs that use them."""
     from tui.bus.transport.port_names import lasting_name
     from tui.bus.transport.ports import holder, list_ports
 

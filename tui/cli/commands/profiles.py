@@ -54,7 +54,7 @@ def profiles(
 ) -> None:
     """List the profiles, show one, check files, or create one of your own.
 
-    `path` shows the folder for your own profiles, `new NEW-ID --from ID` creates one there.
+    `path` shows the folder for your own profiles; `new NEW-ID --from ID` creates one there.
     """
     if wiring and (profile_id in (None, "new", "path")):
         raise click.UsageError("--wiring is of one profile: name its ID.")

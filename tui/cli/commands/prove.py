@@ -41,7 +41,7 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 @click.option(
     "--turning",
     is_flag=True,
-    help="Test with the motor turning: it may coast; a hoist falls.",
+    help="Test with the motor turning: a hoist load may fall.",
 )
 @click.option("--yes", is_flag=True, help="Skip the question of --turning.")
 @click.option("--reset", is_flag=True, help="Reset the fault that the test has caused.")
@@ -57,10 +57,10 @@ def prove(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Prove that a drive reacts to a silent line, by leaving it alone for longer and longer.
+    """Test a drive's reaction to a communication loss, by pauses of growing length.
 
-    Ends with 0 where it reacted as it is set to, with 1 otherwise. Nobody else on the line asks the
-    drive meanwhile. The motor is at rest, unless --turning.
+    Ends with 0 if it reacted as set, with 1 otherwise. In that time no other program on the line
+    polls the drive. The motor is at standstill, unless --turning is passed.
     """
     need_arming(arm, "prove lets the drive trip on its communication timeout")
 

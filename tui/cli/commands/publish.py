@@ -49,8 +49,8 @@ def publish(
     """Publish parameters of drives to an MQTT broker, by default their monitoring set.
 
     Lines, drives and codes are named as for watch; Ctrl-C ends it. Each cycle of a drive is one
-    retained message. A drive or a broker that is not there is tried on. Nothing that comes from
-    the broker is read, so nothing is written for it.
+    retained message. A missing drive or broker is retried. The program subscribes to nothing, so no
+    message from the broker can cause a write.
     """
     more, codes = further_lines(codes)
     wishes = lines_wished(target, more)

@@ -46,7 +46,7 @@ def read(
     """Read parameters of a drive.
 
     A CODE is the drive's own (ACC, 1.05, F875), the manual's number (W9001, 16#FD00) or a wire
-    address (9001), in any case.
+    address (9001), in upper or lower case.
     """
     from tui.session.read.apart import read_apart
     from tui.session.read.reader import Reader

@@ -29,8 +29,8 @@ from ..shared.sets import (
 def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.
 
-    Identification, line settings, settings changed from the factory, control source, scanner,
-    reaction to a loss of communication, faults, and what was written to it from here.
+    It has identification, line settings, settings changed from the factory, control source,
+    scanner, reaction to a communication loss, faults, and writes by Drive Panel.
     """
     from tui.session.journal import Journal
     from tui.session.journal_reading import entries_of

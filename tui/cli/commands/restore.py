@@ -64,7 +64,7 @@ CODES_NAMED = 12
 @never_forced
 @profile_option
 @devices_option(
-    "Slave address of the drive; several times for several drives.",
+    "Use the drive at this slave address; repeatable.",
     default=(1,),
     show_default=True,
 )
@@ -84,13 +84,13 @@ def restore(
     profile_id: str | None,
     devices: tuple[int, ...],
 ) -> None:
-    """Write a parameter set back to a drive: what differs is written and read back.
+    """Restore a parameter set to a drive: differences are written and read back.
 
-    With several -d the set goes to each of these drives in turn; one that cannot take it does
-    not keep it from the others.
+    With several -d, the set is restored to each drive in turn. If it fails on one drive, it is
+    still restored to the others.
 
-    --dry-run shows what would be written, what is omitted, and why. An interrupted restore is
-    resumed by the same command: the drive is read, and what is missing is written.
+    --dry-run shows what would be written, what is omitted, and why. To resume an interrupted
+    restore, repeat the command: it reads the drive, and writes what is missing.
     """
     from tui.drive.settings.restore_plan import Options
 

@@ -61,9 +61,9 @@ def run(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Run a motor as long as this command runs; Ctrl-C stops it on its ramp.
+    """Run a motor until this command ends; Ctrl-C stops it on its ramp.
 
-    So do all other signals that end a program, a closed standard output and the end of --for.
+    Other signals that end a program, a closed standard output and the end of --for stop it, too.
     """
     need_arming(arm, "run starts the motor")
     wish = RunOptions(

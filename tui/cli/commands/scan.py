@@ -52,8 +52,8 @@ def scan(
 ) -> None:
     """Find the drives on a line. It reads, and writes nothing. Ctrl-C ends it.
 
-    It listens first: where another master asks drives, it ends before it sends anything. Drives
-    found are polled until the end, so that their communication timeout does not run out.
+    It listens first: if another master polls drives, it ends before it sends anything. Drives found
+    are polled until the end, so that their communication timeout does not expire.
     """
     from tui.session.connect.addresses import parse_addresses
 

@@ -41,9 +41,7 @@ from ..shared.signals import never_suspended
 @click.command()
 @click.argument("lines", nargs=-1, metavar="LINE...", shell_complete=complete_line)
 @line_options
-@click.option(
-    "--tcp", metavar="HOST:PORT", help="Serve Modbus TCP there; loopback where no host is named."
-)
+@click.option("--tcp", metavar="HOST:PORT", help="Serve Modbus TCP (default host: loopback).")
 @click.option(
     "--map",
     "maps",
@@ -84,7 +82,7 @@ from ..shared.signals import never_suspended
     help="Poll for --metrics and --mqtt every S seconds (default: 1).",
 )
 @devices_option("Serve this drive, which does not identify itself; needs -p.")
-@profile_of("Profile of the drives of -d.")
+@profile_of("Use this profile for the drives of -d.")
 @json_option
 @reported
 def serve(
@@ -104,11 +102,11 @@ def serve(
 ) -> None:
     """Own lines without a screen until Ctrl-C or SIGTERM; panels and commands attach to them.
 
-    With --tcp programs of others reach the drives by Modbus TCP. They read; what else they may do
-    is allowed by options. A word that can only stop a motor always passes.
+    With --tcp, third-party programs reach the drives by Modbus TCP. They can read; options allow
+    more. A word that can only stop a motor always passes.
 
-    With --metrics and --mqtt the drives are read cycle by cycle, as by watch: those of a name of
-    the settings file, of LINE@1,2, and of -d.
+    With --metrics and --mqtt, drives are read cycle by cycle, as by watch. Name them by a name of
+    the settings file, by LINE@1,2, or by -d.
     """
     served = served_lines(_words(lines))
     plant = publish_options(metrics, mqtt, password_file, every)

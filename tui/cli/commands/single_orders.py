@@ -93,7 +93,7 @@ def reference(
     _ordered(target, read_only, work, as_json=as_json)
 
 
-@click.command(help=f"Reset a drive's fault. Its cause must be gone.\n\n{MAY_START}")
+@click.command(help=f"Reset a drive's fault. Its cause must be removed first.\n\n{MAY_START}")
 @line_argument
 @drive_options
 @arm_option

@@ -54,10 +54,10 @@ def status(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Show a drive's state, control source, faults and reaction to a loss of communication.
+    """Show a drive's state, control source, faults and reaction to a communication loss.
 
     Several LINEs are shown side by side; LINE@ADDRESS names drives on its line, as in pump@1,2.
-    With --all it says where to look on that line.
+    With --all, it gives the addresses to scan on that line.
     """
     if addresses and not every:
         raise click.UsageError("--addresses requires --all.")

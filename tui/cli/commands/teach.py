@@ -39,9 +39,7 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Use CODE to write the drive's reference.",
 )
-@click.option(
-    "--no-reference", is_flag=True, help="Set the reference by no taught parameter any more."
-)
+@click.option("--no-reference", is_flag=True, help="Stop using a learned code for the reference.")
 @json_option
 @never_forced
 @reported
@@ -55,11 +53,11 @@ def teach(
     no_reference: bool,
     as_json: bool,
 ) -> None:
-    """Teach the scale and unit of a raw value by what the drive's display shows now.
+    """Learn the scale and unit of a raw value from what the drive's display shows now.
 
     VALUE is what the display shows while CODE is read: 50.3 Hz. Two readings at different values
-    show scale and sign; one that contradicts them ends with 1. Without VALUE what was taught is
-    shown. Nothing is written to the drive.
+    give scale and sign; a reading that contradicts them ends with 1. Without VALUE, the learned
+    scales are listed. Nothing is written to the drive.
     """
     wishes = sum((forget, reference, no_reference, value is not None))
     if wishes > 1:

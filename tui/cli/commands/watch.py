@@ -114,13 +114,13 @@ def watch(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Watch parameters of drives, by default their monitoring set. Ctrl-C ends it.
+    """Poll parameters of drives, by default their monitoring set. Ctrl-C ends it.
 
-    Drives of several lines are watched if several LINEs precede the CODEs; LINE@ADDRESS names a
-    drive on its line, as in pump@1,2 or tcp:HOST@5.
+    To watch several lines, put their LINEs before the CODEs; LINE@ADDRESS names a drive on its
+    line, as in pump@1,2 or tcp:HOST@5.
 
-    A value is good if it was read in that cycle; otherwise it is the last one, with the quality
-    stale and the time at which it was read. State and direction are shown while the status word is
+    A value is good if it was read in that cycle. Otherwise it is the last one, with the quality
+    stale and the time at which it was read. State and direction are shown if the status word is
     watched.
     """
     more, codes = further_lines(codes)

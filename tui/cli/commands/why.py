@@ -40,15 +40,17 @@ SICK_COUNTS = (
 def why(target: Target, read_only: bool, as_json: bool) -> None:
     """Diagnose why a drive does not answer: the cause in a sentence, and the next steps.
 
-    Looks at the port and its adapter. Listens before it sends: it sends nothing while another
-    master is heard. Then it reads the drive up to 200 times. It ends earlier if all replies are
-    good: 150 exclude that 2 % are lost or damaged, and those of the last minute count. It takes
-    5 to 15 s, and up to 30 s on a sick line. A connection to a gateway is watched for 3 s without
-    a request, so a longer idle timeout does not show. A gateway on which nothing answers is also
-    tried by the other protocol, and by the units 255 and 0. Nothing is written, and no other baud
-    or format is tried. With -p, or a drive that was here before, the steps include what the manual
-    of its family says of address, settings, pins and wires. Ends with 0 if the drive answers and
-    nothing is wrong, else with 3.
+    It checks the port and its adapter, and listens before it sends. While another master is active,
+    it sends nothing. Then it reads the drive up to 200 times, and ends earlier if all replies are
+    good: 150 exclude that 2 % are lost or damaged, and those of the last minute count.
+
+    It takes 5 to 15 s, and up to 30 s on a faulty line. A connection to a gateway is watched for
+    3 s without a request, so a longer idle timeout is not detected. If nothing on a gateway
+    answers, the other protocol and the units 255 and 0 are tried. Nothing is written, and no
+    other baud rate or format is tried.
+
+    With -p, or for a drive that was here before, the steps include advice from its manual: address,
+    settings, pins and wires. Ends with 0 if the drive answers and nothing is wrong, else with 3.
     """
     from tui.bus.errors import LineError, LinkSyntaxError
     from tui.drive.profile import library

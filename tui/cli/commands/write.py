@@ -71,9 +71,9 @@ def write(
 ) -> None:
     """Write settings of a drive, each read back: ACC=3.5s HSP=50 CHCF=Separate.
 
-    A VALUE is a number, with or without a unit (3.5s, 3500ms), a name as the profile gives it, or
-    a word in hexadecimal (16#0021). A value that the drive would round to another one is refused
-    without --round. Limits and scales are written before what depends on them.
+    A VALUE is a number, with or without a unit (3.5s, 3500ms), a name from the profile, or a word
+    in hexadecimal (16#0021). A value that rounding would make 0, or that is half way between two,
+    is refused without --round. Limits and scales are written before settings that depend on them.
     """
     from ..shared.output import drive_json, print_json
 
