@@ -141,7 +141,7 @@ async def test_line_that_was_lost_is_checked_again_before_a_command() -> None:
         simulation.faults.rates = SWAPPED
         Reader(session).forget()
         given = CommandHistory(session)
-        access = CommandAccess(session, Journal(), given, Permit(session.work, session.work.stops))
+        access = CommandAccess(session, Journal(), Permit(session.work, session.work.stops), given)
         with pytest.raises(BytesSwapped):
             await access.read(["RFR"])
         assert not session.arming.armed

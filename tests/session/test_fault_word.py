@@ -76,7 +76,7 @@ def held(status: int, trip: int) -> dict[int, int]:
 def access(line: OwnDrive, profile: Profile | None = None) -> CommandAccess:
     session = DriveSession(line, 1, profile or own())
     session.arming.arm(seconds=math.inf)
-    return CommandAccess(session, Journal(), CommandHistory(session), session.work.permit())
+    return CommandAccess(session, Journal(), session.work.permit(), CommandHistory(session))
 
 
 @pytest.mark.parametrize("status", [READY, RUNNING, 0])

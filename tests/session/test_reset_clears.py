@@ -44,7 +44,7 @@ class TrippedDrive(OneDrive):
 def access(line: TrippedDrive) -> CommandAccess:
     session = DriveSession(line, 1, ATV21)
     session.arming.arm(seconds=math.inf)
-    return CommandAccess(session, Journal(), CommandHistory(session), session.work.permit())
+    return CommandAccess(session, Journal(), session.work.permit(), CommandHistory(session))
 
 
 def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:

@@ -21,7 +21,6 @@ from tui.drive.values import from_words
 from tui.safety import STEP_TIME
 
 from ..drive import DriveSession
-from ..journal import Journal
 from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..reading import Reading
@@ -38,18 +37,11 @@ class NotFollowed(OrderRefused):
 
 
 @dataclass(frozen=True, slots=True)
-class CommandAccess:
-    """Reads and writes of one command, under its permit."""
+class CommandAccess(Writer):
+    """Reads and writes of one command, as long as its permit holds."""
 
-    session: DriveSession
-    journal: Journal
-    given: CommandHistory
     permit: Permit
-
-    @property
-    def writer(self) -> Writer:
-        """Writes as long as the permit holds."""
-        return Writer(self.session, self.journal, self.permit)
+    given: CommandHistory
 
     @property
     def raws(self) -> Mapping[str, int]:
@@ -104,17 +96,13 @@ class CommandAccess:
             if parameter.code == chart.command:
                 await self.write_command(chart, word, order.name)
             else:
-                await self.writer.write_parameter(
-                    parameter, from_words(parameter, [word]), why=order.name
-                )
+                await self.write_parameter(parameter, from_words(parameter, [word]), why=order.name)
 
     async def write_command(self, chart: Chart, word: int, why: str) -> None:
         """Write a command word; it is watched from then on."""
         parameter = self.session.profile[chart.command]
         # the state of the drive tells whether it was taken; the word itself is kept on record
-        await self.writer.write_parameter(
-            parameter, from_words(parameter, [word]), why=why, check=0
-        )
+        await self.write_parameter(parameter, from_words(parameter, [word]), why=why, check=0)
         self.session.note_command()
         self.given.note_command(parameter.code, word)
 

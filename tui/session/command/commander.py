@@ -166,7 +166,7 @@ class Commander:
         """Set up who commands the drive. Raises OrderRefused when not armed."""
 
         async def work(access: CommandAccess) -> str:
-            done = await configure(self.session, access.writer, source)
+            done = await configure(self.session, access, source)
             self.given.forget_words()
             return done
 
@@ -186,7 +186,7 @@ class Commander:
         """Carry out a command behind those before it."""
 
         async def carry_out(permit: Permit) -> str:
-            return await work(CommandAccess(self.session, self.journal, self.given, permit))
+            return await work(CommandAccess(self.session, self.journal, permit, self.given))
 
         task = Task(carry_out, owner=self, given_up=self._give_up)
         self.session.work.put(task, stamp)
@@ -304,7 +304,7 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
     if option.stopped_only and state_of(chart, access.raws[chart.status]).kind in ENABLED_KINDS:
         raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
     word = reading.raw & 0xFFFF & ~option.mask | bits
-    await access.writer.write_parameter(
+    await access.write_parameter(
         parameter, from_words(parameter, [word]), why=option.name, check=option.mask
     )
     access.session.note_command()

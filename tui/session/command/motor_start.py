@@ -27,7 +27,7 @@ async def write_reference(
     access: CommandAccess, reference: Reference, *, replaceable: bool = False
 ) -> str:
     """Write a reference; the result, for a person."""
-    await access.writer.write_parameter(
+    await access.write_parameter(
         reference.parameter, reference.raw, why="reference", replaceable=replaceable
     )
     access.session.note_command()
@@ -142,9 +142,7 @@ class MotorStart:
             raise WrongReference(f"Not started: {differs}. Give the reference again.")
 
     async def _write_again(self, parameter: Parameter, raw: int) -> None:
-        await self.access.writer.write_parameter(
-            parameter, raw, why="reference before the run order"
-        )
+        await self.access.write_parameter(parameter, raw, why="reference before the run order")
         self.session.note_command()
 
     def _is_over(self) -> None:
