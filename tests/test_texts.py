@@ -127,10 +127,7 @@ EXCEPTIONS: dict[tuple[int, str, str], str] = {
     (18, "analogue_input_2", "tui/drive/profile/schema"): "a quantity of profiles",
     (18, "favourites", "tui/session/settings/favorites.py"): "the key in stored files",
     (19, "asked", "tui/cli/documents"): "a JSON field of `why`, `counters` and `listen`",
-    (21, "does", "tui/cli/shared/watch_rows.py"): "a JSON field of `watch`",
     (21, "does", "tui/drive/profile/field_texts.py"): "a key of profiles",
-    (21, "writes", "tui/cli/commands/serve.py"): "a JSON field of `serve`",
-    (21, "writes", "tui/cli/shared/listen_outputs.py"): "a JSON field of `listen`",
 }
 """By check, whole text and place: the reason why a hit stays. The texts are public."""
 

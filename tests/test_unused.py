@@ -20,7 +20,6 @@ FOR_OTHERS = {
     "session/api": {"*"},
     "simulator": {"*"},
     "cli/commands": {"*"},
-    "cli/documents/json_schema.py": {"document_of"},
 }
 """By prefix of a module's path: names for tests, scripts, or callers by name."""
 HOOKS = {

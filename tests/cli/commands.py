@@ -14,6 +14,8 @@ from tests.programs import drivepanel
 from tui.cli.commands.simulate import simulate, simulation_of
 from tui.cli.main import main
 
+from .printed import forms_of
+
 
 @contextmanager
 def tcp_line(*arguments: str) -> Iterator[str]:
@@ -35,10 +37,12 @@ def invoked(*arguments: str | Path) -> Result:
 
 
 def ended(status: int, *arguments: str | Path) -> Result:
-    """Run a command to this exit status, without a traceback."""
+    """Run a command to this exit status, without a traceback; its JSON fits the schema."""
     done = invoked(*arguments)
     assert done.exit_code == status, done.output
     assert "Traceback" not in done.stderr
+    if "--json" in arguments and "--help" not in arguments:
+        forms_of(done.stdout)
     return done
 
 

@@ -15,13 +15,13 @@ import pytest
 from tests.bus.peer import PtyPeer, silent
 from tui.bus.fake import FakeLine
 from tui.bus.link import SerialLink
-from tui.cli.documents.json_schema import document_of
 from tui.drive.profile.library import packaged_folder
 from tui.session.connect.known_line import KnownLine
 from tui.session.journal import Entry, Journal, entry_time
 from tui.session.logs import log_file
 
 from .commands import ended, run, tcp_line
+from .printed import form_of
 from .test_nothing_written import counted
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
@@ -52,7 +52,7 @@ def test_two_drives_are_whole_and_nothing_is_written(tmp_path: Path) -> None:
         folder = f"drive-{device}"
         why, counts = (json.loads(files[f"{folder}/{text}.json"]) for text in ("why", "counters"))
         for document in (why, counts):
-            document_of(json.dumps(document))
+            form_of(document)
             assert (document["device"], document["profile"]) == (device, family)
         assert why["answers"] is True
         assert counts["test"] == {"frames": 20, "answered": 20}

@@ -6,10 +6,12 @@ import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tui.cli.shared.drive_status import Status, status_json, status_of_drive, status_table
+from tui.cli.shared.drive_status import Status, status_document, status_of_drive, status_table
+from tui.cli.shared.output import json_text
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
@@ -37,6 +39,11 @@ def provoke(opened: OpenLine, fault: str | int, *, persists: bool = False) -> No
     opened.simulation.drive(1).provoke(fault, persists=persists)
 
 
+def reported_of(status: Status) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(json_text(status_document("demo", status)))
+    return found
+
+
 def text_of(status: Status) -> str:
     return "\n".join(f"{title}: {text}" for title, text in status_table(status))
 
@@ -47,7 +54,7 @@ async def test_a_fault_with_causes_checks_and_live_values() -> None:
         opened.simulation.drive(1).set("DEC", 5)
         provoke(opened, "ObF")
         status = await status_of(opened, "atv71")
-    reported = json.loads(json.dumps(status_json("demo", status)))["fault"]
+    reported = reported_of(status)["fault"]
     assert (reported["raw"], reported["code"], reported["name"]) == (18, "ObF", "Overbraking")
     assert reported["causes"][0] == "The braking is too sudden for the inertia"
     assert reported["confidence"] == "public"
@@ -82,7 +89,7 @@ async def test_the_drive_tells_that_the_cause_is_there_still() -> None:
     async with line("atv312") as opened:
         provoke(opened, "ObF", persists=True)
         status = await status_of(opened, "atv312")
-    assert status_json("demo", status)["fault"]["reset"]["possible_now"] is False
+    assert reported_of(status)["fault"]["reset"]["possible_now"] is False
     assert "reset: Not yet, says the drive" in text_of(status)
 
 
@@ -90,7 +97,7 @@ async def test_a_wait_before_the_reset() -> None:
     async with line("atv21") as opened:
         provoke(opened, "OL2")
         status = await status_of(opened, "atv21")
-    reported = status_json("demo", status)["fault"]
+    reported = reported_of(status)["fault"]
     assert reported["reset"]["wait_s"] == 120
     assert reported["reset"]["possible_now"] is None
     assert "wait about 120 s before it (general practice)" in text_of(status)
@@ -100,7 +107,7 @@ async def test_a_trip_without_a_number() -> None:
     async with line("varmeca") as opened:
         provoke(opened, 1)
         status = await status_of(opened, "varmeca")
-    reported = status_json("demo", status)["fault"]
+    reported = reported_of(status)["fault"]
     assert (reported["raw"], reported["code"], reported["name"]) == (None, None, None)
     assert reported["confidence"] == "manual"
     assert {row["code"] for row in reported["look_at"]} == {"11.63", "15.07", "10.33"}
@@ -111,7 +118,7 @@ async def test_an_alarm_has_its_causes_and_no_reset() -> None:
         assert opened.simulation is not None
         opened.simulation.drive(1).set("LRS6", 1 << 8)
         status = await status_of(opened, "atv71")
-    reported = status_json("demo", status)
+    reported = reported_of(status)
     assert (reported["fault"], reported["alarms"]) == (None, ["Undervoltage alarm"])
     rows = text_of(status).splitlines()
     at = rows.index("Alarms: Undervoltage alarm")
@@ -125,7 +132,7 @@ async def test_nothing_is_read_or_reported_where_there_is_no_fault(family: str) 
     async with line(family) as opened:
         status = await status_of(opened, family)
     assert status.finding is None
-    assert status_json("demo", status)["fault"] is None
+    assert reported_of(status)["fault"] is None
     assert "probably" not in text_of(status)
 
 

@@ -13,10 +13,10 @@ import pytest
 
 from tests.session.test_journal import entry
 from tui.cli.commands.journal import since
-from tui.cli.documents.json_schema import document_of
 from tui.session.journal import Entry
 
 from .commands import ended, held, put, refused, run, tcp_line
+from .printed import forms_of
 
 NOW = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 
@@ -62,7 +62,7 @@ def test_drive_and_time_select(journal: Path) -> None:
 def test_every_kind_of_entry_has_its_line_and_its_form(kind: Any, journal: Path) -> None:
     made = replace(entry(1), kind=kind, new="4.0 s", answer="as it was")
     journal.write_text(json.dumps(asdict(made)) + "\n")
-    document_of(run(0, "journal", "--json"))
+    forms_of(run(0, "journal", "--json"))
     reported = run(0, "journal")
     assert reported.count("as it was") == 1
     assert ("->" in reported) is (kind == "write")

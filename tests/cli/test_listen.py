@@ -18,7 +18,7 @@ from tui.simulator import DriveSpec, PlcOnLine, Simulation
 from tui.wire.frames import is_whole
 
 from .commands import ended, refused, run
-from .test_documents import documents
+from .printed import documents
 
 TWO = "sim:atv71@1,atv312@2"
 

@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from tests.session.test_proof_result import AS_SET, FREEWHEEL, NEVER, SLF
+from tui.cli.commands.prove import prove_document
+from tui.cli.documents.document import DriveFields
+from tui.session.proof.result import ProofResult
+
 from .commands import ended, refused, tcp_line
 
 ON_THE_RUN = ("prove", "sim:atv312", "--arm", "--turning")
@@ -23,3 +33,31 @@ def test_the_time_out_of_each_port_counts() -> None:
         reported = ended(1, "prove", line, "-p", "powerdrive", "--arm")
     # the simulated drive is asked by its module, which has another timeout
     assert "DID NOT REACT to 1.5 s of silence; set are 0.5 s" in reported.stdout
+
+
+def figures(result: ProofResult) -> dict[str, Any]:
+    fields: DriveFields = {"line": "L", "device": 1, "profile": "atv312", "timeout": None}
+    document = prove_document(fields, result, was_reset=False)
+    found: dict[str, Any] = msgspec.to_builtins(document)
+    head = ("schema", "command", *fields)
+    return {name: value for name, value in found.items() if name not in head}
+
+
+def test_result_in_figures() -> None:
+    assert figures(replace(AS_SET, changed="ttO is 2 s.")) == {
+        "configured_ms": 2000,
+        "not_before_ms": 1880,
+        "not_after_ms": 2120,
+        "measured_ms": 2000,
+        "reaction": FREEWHEEL.name,
+        "seen": "trips",
+        "fault": SLF,
+        "turning": False,
+        "as_set": True,
+        "text": AS_SET.text,
+        "changed": "ttO is 2 s.",
+        "reset": False,
+    }
+    nothing = figures(replace(NEVER, reaction=None))
+    missing = {"not_after_ms", "measured_ms", "reaction", "seen", "fault", "changed"}
+    assert {name for name, value in nothing.items() if value is None} == missing

@@ -25,7 +25,7 @@ from tui.simulator import DriveSpec, LineTiming, Simulation
 from tui.wire.frames import frame, read_frame
 
 from .commands import ended, invoked, tcp_line
-from .test_documents import documents
+from .printed import documents
 
 READS = {3, 4, 17, 43}
 """Functions that change nothing."""

@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from tui.cli.documents.json_schema import document_of
-
 from .commands import ended, refused, run, tcp_line
+from .printed import form_of
 from .test_watch_lines import NOBODY, settings
 
 
@@ -29,7 +28,7 @@ def listed(text: str) -> list[dict[str, Any]]:
     """The list of an output, whose documents fit the schema."""
     found: list[dict[str, Any]] = json.loads(text)
     for row in found:
-        document_of(json.dumps(row))
+        form_of(row)
     return found
 
 

@@ -20,7 +20,7 @@ from tui.session.journal import Journal
 from tui.session.starts.starts import Starts
 
 from .commands import ended, run, tcp_line
-from .test_documents import documents
+from .printed import documents
 
 NAMELESS = DriveIdentity(1, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 

@@ -11,6 +11,7 @@ import pytest
 
 from tests.drive.test_add_a_drive import example
 from tests.sweeps import kept
+from tui.cli.documents.other_documents import CheckDocument
 from tui.cli.shared.output import json_text
 from tui.cli.shared.say import printable
 from tui.drive.plain import commands
@@ -153,11 +154,11 @@ def test_a_profile_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_json_keeps_every_character_and_gives_a_terminal_none_of_the_bad_ones() -> None:
-    data = {"a": "\x1b\x7f\x9b\u202e\u2028\udcff\U000e0001 é →", "b": [1, None]}
-    text = json_text(data, compact=False)
+    bad = "\x1b\x7f\x9b\u202e\u2028\udcff\U000e0001 é →"
+    text = json_text(CheckDocument(file=bad, faults=[bad]), compact=False)
     assert tame(text)
     assert "é →" in text
-    assert json.loads(text) == data
+    assert json.loads(text) == {"schema": 1, "command": "profiles", "file": bad, "faults": [bad]}
 
 
 def test_terminal_without_signs_shows_question_mark() -> None:

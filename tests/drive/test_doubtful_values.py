@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.cli.shared.output import reading_json
+from tui.cli.shared.output import value_field
 from tui.drive.profile import library
 from tui.drive.shown import shown
 from tui.drive.values import from_words
@@ -31,6 +31,6 @@ def test_above_32767_it_is_marked(code: str, word: int, text: str) -> None:
     value = shown(profile, parameter, from_words(parameter, [word]), {})
     assert value.text == text
     assert value.unsure == text.endswith("?")
-    reported = reading_json(Reading(parameter, word, value, Quality.GOOD, 0.0))
-    assert reported["text"] == text
-    assert reported.get("unsure", False) == value.unsure
+    reported = value_field(Reading(parameter, word, value, Quality.GOOD, 0.0))
+    assert reported.text == text
+    assert (reported.unsure is True) == value.unsure

@@ -53,25 +53,6 @@ def test_result_in_words(result: ProofResult, short: str, parts: list[str]) -> N
     assert ("NOT AS SET" in result.text) is ("NOT AS SET" in short)
 
 
-def test_result_in_figures() -> None:
-    assert replace(AS_SET, changed="ttO is 2 s.").json() == {
-        "configured_ms": 2000,
-        "not_before_ms": 1880,
-        "not_after_ms": 2120,
-        "measured_ms": 2000,
-        "reaction": FREEWHEEL.name,
-        "seen": "trips",
-        "fault": SLF,
-        "turning": False,
-        "as_set": True,
-        "text": AS_SET.text,
-        "changed": "ttO is 2 s.",
-    }
-    nothing = replace(NEVER, reaction=None).json()
-    missing = {"not_after_ms", "measured_ms", "reaction", "seen", "fault", "changed"}
-    assert {name for name, value in nothing.items() if value is None} == missing
-
-
 @pytest.mark.parametrize(
     ("timeout", "agrees"),
     [(1.88, True), (2.12, True), (1.80, True), (1.77, False), (2.22, True), (2.24, False)],

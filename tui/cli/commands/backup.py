@@ -41,7 +41,8 @@ def backup(target: Target, file: Path, force: bool, everything: bool, as_json: b
     """
     from tui.drive.settings.parameter_set import dump_set
 
-    from ..shared.output import drive_json, print_json
+    from ..documents.setting_documents import BackupDocument
+    from ..shared.output import drive_fields, print_json
 
     to_output = file == STANDARD_OUTPUT
     if to_output and as_json:
@@ -62,13 +63,15 @@ def backup(target: Target, file: Path, force: bool, everything: bool, as_json: b
         messages.tell(f"{file}: {len(values.raws)} {what} of {session.profile.name}")
     complain_absent(messages, values.absent)
     if as_json:
-        found = {
-            "file": str(file),
-            "parameters": len(values.raws),
-            "all": everything,
-            "absent": dict(values.absent),
-        }
-        head = drive_json(target.line_text, session)
-        print_json({**head, **found, "messages": messages.texts})
+        print_json(
+            BackupDocument(
+                **drive_fields(target.line_text, session),
+                file=str(file),
+                parameters=len(values.raws),
+                all=everything,
+                absent=dict(values.absent),
+                messages=messages.texts,
+            )
+        )
     if values.absent:
         raise click.exceptions.Exit(DRIVE_REFUSED)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from tui.session.blocks.mapping import BlockView
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
+
+    from ..documents.setting_documents import SlotChangeField
 
 BLOCK_COMMANDS = ("show", "verify", "set", "factory", "load", "save")
 WRITING = frozenset({"set", "factory", "load"})
@@ -153,7 +155,8 @@ def _status(views: list[BlockView]) -> int:
 def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted: Wanted) -> int:
     from tui.drive.blocks.file import dump_blocks
 
-    from ..shared.output import drive_json, print_json
+    from ..documents.setting_documents import BlockFileDocument
+    from ..shared.output import drive_fields, print_json
 
     file = Path(wanted.words[0])
     plans = [plan for view in views if (plan := view.plan) is not None]
@@ -163,7 +166,8 @@ def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted:
     write_down(file, dump_blocks(session.profile, plans, note))
     count = sum(len(plan.raws) for plan in plans)
     if wanted.as_json:
-        print_json({**drive_json(line_text, session), "file": str(file), "slots": count})
+        fields = drive_fields(line_text, session)
+        print_json(BlockFileDocument(**fields, file=str(file), slots=count))
     else:
         say(f"{file}: {count} slots of {session.profile.name}")
     return DONE
@@ -177,14 +181,14 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.settings.write import NotTaken
 
-    from ..shared.output import drive_json, print_json
+    from ..documents.setting_documents import BlockChangeDocument
+    from ..shared.output import drive_fields, print_json
 
     held, plans = await plans_of(session, wanted)
     changes = _judged(session, held, plans, wanted)
     if wanted.dry_run:
         if wanted.as_json:
-            head = drive_json(line_text, session)
-            print_json({**head, "dry_run": True, "changes": changes})
+            print_json(BlockChangeDocument(**drive_fields(line_text, session), changes=changes))
         return DONE
     journal, sent, permit = journal_document(), dict[str, bool](), permit_of(session)
     try:
@@ -219,13 +223,15 @@ def _cut_short(sent: dict[str, bool]) -> str:
 
 def _judged(
     session: DriveSession, held: dict[str, int], plans: list[Assignment], wanted: Wanted
-) -> list[dict[str, Any]]:
+) -> list[SlotChangeField]:
     """Return the changes of a dry run; raises Failure if a change is refused."""
     from tui.drive.blocks.assignment import describe, slot_changes
     from tui.drive.blocks.slot_rules import assignment_problems, refusing
 
+    from ..documents.setting_documents import SlotChangeField
+
     refused: list[str] = []
-    changes: list[dict[str, Any]] = []
+    changes: list[SlotChangeField] = []
     for plan in plans:
         found = assignment_problems(session.profile, plan)
         refused += [problem.text for problem in refusing(found)]
@@ -234,7 +240,7 @@ def _judged(
                 say(problem.text, err=wanted.as_json)
         for change in slot_changes(held, plan):
             was, will = (describe(session.profile, plan.block, r) for r in (change.old, change.new))
-            changes.append({"slot": change.slot, "old": was, "new": will})
+            changes.append(SlotChangeField(slot=change.slot, old=was, new=will))
             if wanted.dry_run and not wanted.as_json:
                 say(f"write  {change.slot}: {was} -> {will}")
     if refused:

@@ -84,11 +84,20 @@ def bundle(
     if made.missing:
         messages.tell(f"Could not get: {', '.join(made.missing)}. README.txt says why.")
     if as_json:
+        from ..documents.other_documents import BundleDocument
         from ..shared.output import print_json
 
-        found = {"line": line_text, "file": str(file), "bytes": len(made.data)}
-        about = {"files": list(made.files), "missing": made.missing, "omitted": made.omitted}
-        print_json({**found, **about, "messages": messages.texts})
+        print_json(
+            BundleDocument(
+                line=line_text,
+                file=str(file),
+                bytes=len(made.data),
+                files=list(made.files),
+                missing=dict(made.missing),
+                omitted=dict(made.omitted),
+                messages=messages.texts,
+            )
+        )
 
 
 def _link_of(text: str) -> Link | None:

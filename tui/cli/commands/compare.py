@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,6 +19,8 @@ from ..shared.sets import set_in, set_of_drive
 if TYPE_CHECKING:
     from tui.drive.settings.compare import ComparedRow, TableFormat
     from tui.drive.settings.parameter_set import ParameterSet
+
+    from ..documents.parts import ComparedSettingField
 
 FACTORY = "factory"
 
@@ -59,6 +61,7 @@ def compare(
     from tui.drive.settings.compare import factory_side, side_of
     from tui.drive.settings.compare import rows_text as table
 
+    from ..documents.setting_documents import CompareDocument
     from ..shared.output import print_json
 
     if len(devices) > 2:
@@ -87,27 +90,35 @@ def compare(
     ]
     rows = rows_of(profile, *sides, all_rows=all_rows)
     if as_json:
-        equal = not any(row.differs for row in rows)
-        reported = {"a": names[0], "b": names[1], "profile": profile.id, "equal": equal}
-        print_json({**reported, "rows": [_row_json(row) for row in rows]})
+        print_json(
+            CompareDocument(
+                a=names[0],
+                b=names[1],
+                profile=profile.id,
+                equal=not any(row.differs for row in rows),
+                rows=[_row_field(row) for row in rows],
+            )
+        )
     else:
         say(table(rows, names, format_).removesuffix("\n"), indent=3)
     if any(row.differs for row in rows):
         raise click.exceptions.Exit(DIFFERENT)
 
 
-def _row_json(row: ComparedRow) -> dict[str, Any]:
-    return {
-        "code": row.code,
-        "name": row.name,
-        "group": row.group,
-        "a": row.a,
-        "b": row.b,
-        "raw_a": row.a_raw,
-        "raw_b": row.b_raw,
-        "differs": row.differs,
-        "remark": row.note or None,
-    }
+def _row_field(row: ComparedRow) -> ComparedSettingField:
+    from ..documents.parts import ComparedSettingField
+
+    return ComparedSettingField(
+        code=row.code,
+        name=row.name,
+        group=row.group,
+        a=row.a,
+        b=row.b,
+        raw_a=row.a_raw,
+        raw_b=row.b_raw,
+        differs=row.differs,
+        remark=row.note or None,
+    )
 
 
 def _set_of(text: str, target: Target) -> ParameterSet:

@@ -22,7 +22,7 @@ from ..shared.options import (
     profile_option,
     read_only_option,
 )
-from ..shared.pending_timeouts import timeout_json
+from ..shared.pending_timeouts import timeout_field
 from ..shared.say import say
 from .orders import complain
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.timeout_report import Timeout
+
+    from ..documents.drive_documents import HoldEvent
 
 DISARMS = (
     "While this runs, the communication timeout gives no protection: if the program or master"
@@ -41,7 +43,7 @@ class HeldTeller(Protocol):
     """Reports an event of a drive, at the beginning with the prevented reaction."""
 
     def __call__(
-        self, event: str, device: int, text: str, found: Timeout | None = None, /
+        self, event: HoldEvent, device: int, text: str, found: Timeout | None = None, /
     ) -> None: ...
 
 
@@ -132,18 +134,25 @@ def held_text(session: DriveSession, found: Timeout) -> str:
     return f"{who}: kept alive within its communication timeout of {watch.timeout:g} s ({does})."
 
 
-def _teller(_event: str, _device: int, text: str, _found: Timeout | None = None) -> None:
+def _teller(_event: HoldEvent, _device: int, text: str, _found: Timeout | None = None) -> None:
     say(f"{time.strftime('%H:%M:%S')}  {text}")
 
 
 def _json_teller(line_text: str) -> HeldTeller:
+    from msgspec import UNSET
+
+    from ..documents.drive_documents import HoldDocument
     from ..shared.output import iso_time, print_json
 
-    def tell(event: str, device: int, text: str, found: Timeout | None = None) -> None:
-        data = {"time": iso_time(time.time()), "line": line_text, "device": device}
-        data |= {"event": event, "text": text}
-        if found is not None:
-            data["timeout"] = timeout_json(found)
-        print_json(data, compact=True)
+    def tell(event: HoldEvent, device: int, text: str, found: Timeout | None = None) -> None:
+        document = HoldDocument(
+            time=iso_time(time.time()),
+            line=line_text,
+            device=device,
+            event=event,
+            text=text,
+            timeout=UNSET if found is None else timeout_field(found),
+        )
+        print_json(document, compact=True)
 
     return tell

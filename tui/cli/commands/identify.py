@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
-IDENTITY_KEYS = ("device", "vendor", "reference", "version", "name", "profile")
-"""Names of the fields of an identity in JSON."""
+    from ..documents.drive_documents import IdentityDocument
+    from ..documents.parts import ModelField
+
 IDENTITY_TITLES = 11
 """Width of the column of titles, with its gap."""
 
@@ -53,32 +54,43 @@ def identify(
     """Show a drive's identity (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
+    from ..documents.drive_documents import IdentityDocument
     from ..running.holding import hold_on
-    from ..shared.output import drive_json
+    from ..shared.output import drive_fields
 
     target = Target(line_text, device[0], None, others=device[1:])
     sessions: list[DriveSession] = []
 
-    async def identify_drive(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+    async def identify_drive(opened: OpenLine, drive: Target) -> tuple[IdentityDocument, int]:
         identity = await ask(opened.line, drive.device)
         mind_the_drive(opened, drive.device, identity)
         session = await asyncio.to_thread(_session, opened, identity)
         words = await _model_words(session)
         if not as_json:
             _say_identity(identity, words)
-        reported = {"line": line_text, "timeout": None}
+        timeout = None
         if session is not None:
             sessions.append(session)
             await look_after(opened, session, line_text).learn()
-            reported = drive_json(line_text, session)
+            timeout = drive_fields(line_text, session)["timeout"]
         elif hold:
             raise Failure(
                 f"Device {drive.device} does not identify itself, so it cannot be kept alive."
                 " Use 'drivepanel hold' with -p.",
                 REFUSED_HERE,
             )
-        reported |= {key: getattr(identity, key) for key in IDENTITY_KEYS}
-        return {**reported, "model": _model(identity, words)}, DONE
+        document = IdentityDocument(
+            line=line_text,
+            device=identity.device,
+            profile=identity.profile,
+            timeout=timeout,
+            vendor=identity.vendor,
+            reference=identity.reference,
+            version=identity.version,
+            name=identity.name,
+            model=_model(identity, words),
+        )
+        return document, DONE
 
     async def work(opened: OpenLine) -> int:
         status = await each_drive(
@@ -137,29 +149,31 @@ async def _model_words(session: DriveSession | None) -> Mapping[str, int]:
     return {code: reading.raw for code, reading in found.items() if reading.raw is not None}
 
 
-def _model(identity: DriveIdentity, words: Mapping[str, int]) -> dict[str, Any] | None:
+def _model(identity: DriveIdentity, words: Mapping[str, int]) -> ModelField | None:
     """The model by the drive's own code word; null where there is none."""
     if identity.profile is None or not words:
         return None
     from tui.drive.model import model_of, model_read
     from tui.drive.profile import library
 
+    from ..documents.parts import ModelField
+
     profile = library.load(identity.profile)
     model = model_of(profile, words)
-    return {
-        "code": words.get(profile.data.identification.model_parameter),
-        "text": model_read(profile, words),
-        "reference": (model.reference or None) if model else None,
-        "voltage": (model.voltage or None) if model else None,
-        "power_kw": (model.power_kw or None) if model else None,
-        "variant": (model.variant or None) if model else None,
-        "class_b": model.class_b if model else None,
-    }
+    return ModelField(
+        code=words.get(profile.data.identification.model_parameter),
+        text=model_read(profile, words),
+        reference=(model.reference or None) if model else None,
+        voltage=(model.voltage or None) if model else None,
+        power_kw=(model.power_kw or None) if model else None,
+        variant=(model.variant or None) if model else None,
+        class_b=model.class_b if model else None,
+    )
 
 
 def _model_row(identity: DriveIdentity, words: Mapping[str, int]) -> list[tuple[str, str]]:
     model = _model(identity, words)
-    return [("Model", model["text"])] if model else []
+    return [("Model", model.text)] if model else []
 
 
 def _choices(found: DriveIdentity) -> str:

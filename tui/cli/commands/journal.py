@@ -104,15 +104,21 @@ def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
     shown = selected(entries, device=wanted.device, line=wanted.line, since=begin)
     damaged = [line for line in lines if isinstance(line, DamagedLine)]
     if as_json:
+        from ..documents.other_documents import (
+            DamagedLineField,
+            JournalDocument,
+            JournalEntryField,
+        )
+
         print_json(
-            {
-                "journal": str(kept.path),
-                "entries": [asdict(entry) for entry in shown],
-                "damaged": [
-                    {"file": str(line.file), "line": line.number, "text": line.text}
+            JournalDocument(
+                journal=str(kept.path),
+                entries=[JournalEntryField(**asdict(entry)) for entry in shown],
+                damaged=[
+                    DamagedLineField(file=str(line.file), line=line.number, text=line.text)
                     for line in damaged
                 ],
-            }
+            )
         )
         return
     _say(shown, damaged, str(kept.path), filtered=len(shown) < len(entries))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,10 +13,12 @@ from ..shared.options import json_option
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.bus.share.beside import LineClient, LineLook
+    from tui.bus.share.beside import LineLook
     from tui.bus.share.place import Owner
     from tui.session.connect.known_lines import LineMark
     from tui.session.connect.named_lines import NamedLine
+
+    from ..documents.other_documents import KnownLineField, LeftOnLineDocument, OpenLineDocument
 
 
 @click.command()
@@ -34,6 +36,7 @@ def lines(as_json: bool) -> None:
     from tui.session.connect.named_lines import line_settings
     from tui.session.connect.share_place import owners
 
+    from ..documents.other_documents import LinesDocument, NamedLineField
     from ..shared.output import print_json
 
     settings, memory, left = line_settings(), load_memory(), left_on_lines()
@@ -44,14 +47,19 @@ def lines(as_json: bool) -> None:
     faults = [*settings.faults, *found]
     if as_json:
         print_json(
-            {
-                "settings": str(settings.path),
-                "faults": faults,
-                "lines": [_named_json(line) for line in named],
-                "known": [_known_json(key, mark) for key, mark in memory.lines.items()],
-                "open": [_open_json(*pair) for pair in held],
-                "left_behind": [_left_json(behind) for behind in left],
-            }
+            LinesDocument(
+                settings=str(settings.path),
+                faults=faults,
+                lines=[
+                    NamedLineField(
+                        name=line.name, line=line.line, device=line.device, profile=line.profile
+                    )
+                    for line in named
+                ],
+                known=[_known_field(key, mark) for key, mark in memory.lines.items()],
+                open=[_open_field(*pair) for pair in held],
+                left_behind=[_left_field(behind) for behind in left],
+            )
         )
     else:
         if not named and not faults:
@@ -103,35 +111,44 @@ def _faults(line: NamedLine) -> Iterator[str]:
         yield str(error)
 
 
-def _named_json(line: NamedLine) -> dict[str, Any]:
-    return {"name": line.name, "line": line.line, "device": line.device, "profile": line.profile}
+def _open_field(owner: Owner, look: LineLook | None) -> OpenLineDocument:
+    from ..documents.other_documents import LineClientDocument, OpenLineDocument
+    from ..shared.output import last_minute_field
+
+    clients, minute = (None, None) if look is None else (look.clients, look.minute)
+    return OpenLineDocument(
+        line=owner.line,
+        program=owner.program.name,
+        pid=owner.program.pid,
+        clients=None
+        if clients is None
+        else [
+            LineClientDocument(program=client.program, pid=client.pid, share=client.share)
+            for client in clients
+        ],
+        last_minute=None if minute is None else last_minute_field(minute, minute.share),
+    )
 
 
-def _open_json(owner: Owner, look: LineLook | None) -> dict[str, Any]:
-    from ..shared.output import minute_json
+def _left_field(behind: LeftBehind) -> LeftOnLineDocument:
+    from ..documents.other_documents import LeftOnLineDocument
 
-    minute = look.minute if look is not None else None
-    return {
-        "line": owner.line,
-        "program": owner.program.name,
-        "pid": owner.program.pid,
-        "clients": None if look is None else [_client_json(client) for client in look.clients],
-        "last_minute": None if minute is None else minute_json(minute, minute.share),
-    }
+    record = behind.record
+    return LeftOnLineDocument(line=record.line, device=record.device, **behind.fields())
 
 
-def _client_json(client: LineClient) -> dict[str, Any]:
-    return {"program": client.program, "pid": client.pid, "share": client.share}
+def _known_field(key: str, mark: LineMark) -> KnownLineField:
+    from ..documents.other_documents import KnownDriveField, KnownLineField
 
-
-def _left_json(behind: LeftBehind) -> dict[str, Any]:
-    return {"line": behind.record.line, "device": behind.record.device, **behind.as_json()}
-
-
-def _known_json(key: str, mark: LineMark) -> dict[str, Any]:
-    keys = ("vendor", "reference", "version", "name", "profile")
     drives = [
-        {"device": device, **{key: getattr(drive, key) or None for key in keys}}
+        KnownDriveField(
+            device=device,
+            vendor=drive.vendor or None,
+            reference=drive.reference or None,
+            version=drive.version or None,
+            name=drive.name or None,
+            profile=drive.profile or None,
+        )
         for device, drive in mark.drives.items()
     ]
-    return {"line": key, "adapter": mark.adapter or None, "drives": drives}
+    return KnownLineField(line=key, adapter=mark.adapter or None, drives=drives)

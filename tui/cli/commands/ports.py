@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
 from ..shared.errors import reported
@@ -19,18 +17,25 @@ def ports(as_json: bool) -> None:
     from tui.bus.transport.port_names import lasting_name
     from tui.bus.transport.ports import holder, list_ports
 
+    from ..documents.other_documents import PortDocument
     from ..shared.output import print_json
 
     found = [(port, holder(port.path)) for port in list_ports()]
     names = {port.path: lasting_name(port.path) for port, _ in found}
     if as_json:
-        rows: list[dict[str, Any]] = [
-            {"path": p.path, "description": p.description, "holder": by} for p, by in found
-        ]
-        for row in rows:
-            name = names[row["path"]]
-            lasts = name.lasting and name.path != row["path"]
-            row |= {"lasting": name.path if lasts else None, "adapter": name.adapter or None}
+        rows = []
+        for port, by in found:
+            name = names[port.path]
+            lasts = name.lasting and name.path != port.path
+            rows.append(
+                PortDocument(
+                    path=port.path,
+                    description=port.description,
+                    holder=by,
+                    lasting=name.path if lasts else None,
+                    adapter=name.adapter or None,
+                )
+            )
         print_json(rows)
         return
     if not found:

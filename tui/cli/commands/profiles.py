@@ -85,11 +85,12 @@ def check_files(files: list[Path], as_json: bool) -> None:
     """Report every fault of every file; status 2 if there is one."""
     from tui.drive.profile import library
 
+    from ..documents.other_documents import CheckDocument
     from ..shared.output import print_json
 
     found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
     if as_json:
-        print_json([{"file": str(path), "faults": faults} for path, faults in found.items()])
+        print_json([CheckDocument(file=str(path), faults=some) for path, some in found.items()])
     else:
         for path, faults in found.items():
             if not faults:
@@ -109,11 +110,12 @@ def check_files(files: list[Path], as_json: bool) -> None:
 def _tell_folder(as_json: bool) -> None:
     from tui.drive.profile import library
 
+    from ..documents.other_documents import ProfileFolder
     from ..shared.output import print_json
 
     folder = str(library.user_folder())
     if as_json:
-        print_json({"folder": folder})
+        print_json(ProfileFolder(folder=folder))
     else:
         say(folder)
 
@@ -124,6 +126,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     from tui.drive.profile.new_file import new_profile_text
     from tui.drive.small_file import read_small_text
 
+    from ..documents.other_documents import ProfileBegun
     from ..shared.output import print_json
 
     if len(words) != 1 or origin is None:
@@ -144,7 +147,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     except FileExistsError:
         raise click.UsageError(f"{path} already exists; nothing was written.") from None
     if as_json:
-        print_json({"id": new_id, "from": source.id, "file": str(path)})
+        print_json(ProfileBegun(id=new_id, from_=source.id, file=str(path)))
         return
     say(f"{path}")
     say(f"It is a copy of {source.id}. Change it, then: drivepanel profiles --check {path}")
@@ -153,15 +156,22 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
 def _list(as_json: bool) -> None:
     from tui.drive.profile import library
 
+    from ..documents.other_documents import ProfileDocument
     from ..shared.output import print_json
 
     found = library.all_files()
     if as_json:
-        keys = ("id", "name", "vendor", "parameters")
         print_json(
             [
-                {key: getattr(listing, key) for key in keys}
-                | {"own": listing.own, "file": str(listing.path), "remark": _remark(listing)}
+                ProfileDocument(
+                    id=listing.id,
+                    name=listing.name,
+                    vendor=listing.vendor,
+                    parameters=listing.parameters,
+                    own=listing.own,
+                    file=str(listing.path),
+                    remark=_remark(listing),
+                )
                 for listing in found
             ]
         )
@@ -194,14 +204,22 @@ def _show_wiring(profile: Profile, as_json: bool) -> None:
 
     from tui.drive.family_page import family_page, page_lines
 
+    from ..documents.other_documents import WiringDocument, WiringRowField, WiringSectionField
     from ..shared.output import print_json
 
     sections = family_page(profile)
     if as_json:
-        import msgspec
-
-        reported = [msgspec.to_builtins(section) for section in sections]
-        print_json({"id": profile.id, "name": profile.name, "sections": reported})
+        fields = [
+            WiringSectionField(
+                title=section.title,
+                rows=[
+                    WiringRowField(head=row.head, text=row.text, sure=row.sure, warns=row.warns)
+                    for row in section.rows
+                ],
+            )
+            for section in sections
+        ]
+        print_json(WiringDocument(id=profile.id, name=profile.name, sections=fields))
         return
     say(plain(f"{profile.vendor} {profile.name}"))
     for line in page_lines(sections, min(100, get_terminal_size().columns)):
@@ -214,7 +232,9 @@ def _show(profile: Profile, as_json: bool) -> None:
     if as_json:
         import msgspec
 
-        print_json(msgspec.to_builtins(profile.data))
+        from ..documents.other_documents import ProfileShown
+
+        print_json(ProfileShown(**msgspec.to_builtins(profile.data)))
         return
     from rich.table import Table
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,7 +16,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.output import drive_json, print_json
+from ..shared.output import drive_fields, print_json
 from ..shared.say import say
 from .orders import arm_drive, arm_option, carried_out, complain, need_arming, watched
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
     from tui.session.proof.result import ProofResult
+
+    from ..documents.document import DriveFields
+    from ..documents.drive_documents import ProveDocument
 
 ON_THE_RUN = (
     "The motor turns while it is proved: it does what is set, and may coast; a hoist falls. It is"
@@ -72,7 +75,8 @@ def prove(
             result = await _proved(fleet, console, turning, quiet=as_json)
             if reset and result.fault:
                 await carried_out(console.commander, lambda: console.commander.order("reset"))
-            _tell(drive_json(target.line_text, console.session), result, reset, as_json)
+            fields = drive_fields(target.line_text, console.session)
+            _tell(fields, result, reset, as_json)
             return result.as_set
 
     if not on_line(target, work, read_only=read_only):
@@ -117,10 +121,9 @@ async def _proved(
     return result
 
 
-def _tell(about: dict[str, Any], result: ProofResult, reset: bool, as_json: bool) -> None:
+def _tell(fields: DriveFields, result: ProofResult, reset: bool, as_json: bool) -> None:
     if as_json:
-        was_reset = reset and bool(result.fault)
-        print_json({**about, **result.json(), "reset": was_reset})
+        print_json(prove_document(fields, result, was_reset=reset and bool(result.fault)))
         return
     say(f"Device {result.device}: {result.text}")
     if result.changed:
@@ -130,3 +133,29 @@ def _tell(about: dict[str, Any], result: ProofResult, reset: bool, as_json: bool
 
         now = f"the fault {result.fault}" if result.fault != UNNAMED_FAULT else UNNAMED_FAULT
         say(f"It is in {now} now; `drivepanel reset` with --arm ends that.")
+
+
+def prove_document(fields: DriveFields, result: ProofResult, *, was_reset: bool) -> ProveDocument:
+    """The figures of a result, in whole ms; null where there is none."""
+    from ..documents.drive_documents import ProveDocument
+
+    bracket = result.bracket
+    return ProveDocument(
+        **fields,
+        configured_ms=round(1000 * result.configured),
+        not_before_ms=round(1000 * bracket.not_before),
+        not_after_ms=_milliseconds(bracket.not_after),
+        measured_ms=_milliseconds(bracket.measured),
+        reaction=result.reaction.name if result.reaction else None,
+        seen=result.seen or None,
+        fault=result.fault or None,
+        turning=result.turning,
+        as_set=result.as_set,
+        text=result.text,
+        changed=result.changed or None,
+        reset=was_reset,
+    )
+
+
+def _milliseconds(seconds: float | None) -> int | None:
+    return None if seconds is None else round(1000 * seconds)

@@ -73,6 +73,7 @@ async def _published(
     as_json: bool,
 ) -> None:
     """Publish until this is cancelled."""
+    from ..documents.other_documents import PublishReady
     from ..plant.drives import PlantDrive, PlantLine
     from ..plant.publishing import Changes, published_to, reading
 
@@ -89,7 +90,7 @@ async def _published(
     ]
     async with published_to(lines, broker, changes) as place, reading(lines):
         if as_json:
-            print_json({"event": "ready", "mqtt": place}, compact=True)
+            print_json(PublishReady(mqtt=place), compact=True)
         else:
             say(f"Ready: values to {place}. Ctrl-C ends it.")
         await asyncio.Event().wait()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,6 +25,8 @@ from ..shared.say import say
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
+
+    from ..documents.drive_documents import ReadDocument
 
 
 @click.command()
@@ -51,12 +53,13 @@ def read(
     from tui.session.read.apart import read_apart
     from tui.session.read.reader import Reader
 
+    from ..documents.drive_documents import ReadDocument
     from ..running.holding import hold_on
-    from ..shared.output import print_readings, readings_json
+    from ..shared.output import drive_fields, print_readings, value_field
 
     sessions: list[DriveSession] = []
 
-    async def read_drive(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+    async def read_drive(opened: OpenLine, drive: Target) -> tuple[ReadDocument, int]:
         session = await connect_drive(opened, drive)
         sessions.append(session)
         wanted = [session.profile.find(code).code for code in codes]
@@ -66,8 +69,11 @@ def read(
         refused = [reading for reading in readings.values() if reading.raw is None]
         for reading in refused:
             say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
-        reported = readings_json(target.line_text, session, readings)
-        return reported, DRIVE_REFUSED if refused else DONE
+        document = ReadDocument(
+            **drive_fields(target.line_text, session),
+            values={code: value_field(reading) for code, reading in readings.items()},
+        )
+        return document, DRIVE_REFUSED if refused else DONE
 
     async def work(opened: OpenLine) -> int:
         status = await each_drive(target, lambda drive: read_drive(opened, drive), as_json=as_json)

@@ -36,7 +36,8 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
 
-    from ..shared.output import drive_json, print_json
+    from ..documents.setting_documents import ReportDocument
+    from ..shared.output import drive_fields, print_json
 
     refuse_existing(file, force=force)
     try:
@@ -48,6 +49,12 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     messages = Messages(as_json=as_json)
     messages.tell(f"{file}: report on {session.profile.name} at address {target.device}")
     if as_json:
-        found = {"file": str(file), "parameters": len(values.raws), "absent": dict(values.absent)}
-        head = drive_json(target.line_text, session)
-        print_json({**head, **found, "messages": messages.texts})
+        print_json(
+            ReportDocument(
+                **drive_fields(target.line_text, session),
+                file=str(file),
+                parameters=len(values.raws),
+                absent=dict(values.absent),
+                messages=messages.texts,
+            )
+        )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import click
 
@@ -28,7 +29,7 @@ from ..shared.sets import (
     counter,
     dry_run_option,
     file_argument,
-    results_json,
+    result_fields,
     round_option,
     save_option,
     say_afterwards,
@@ -38,10 +39,28 @@ from ..shared.sets import (
 from .orders import arm_option, close_journal, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
+    from tui.drive.settings.edits import Edit
     from tui.drive.settings.parameter_set import ParameterSet
     from tui.drive.settings.restore_plan import Options, RestoreItem, RestorePlan
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
+    from tui.session.settings.applied import Result
+
+    from ..documents.parts import EditField, PlanItemField
+    from ..documents.setting_documents import RestoreDocument
+
+
+class _Restored(TypedDict):
+    """The fields of the document about the plan and its results."""
+
+    plan: list[PlanItemField]
+    same_rating: bool | None
+    needs_stop: bool
+    across: bool
+    results: list[EditField]
+    saved: bool
+    left: list[str]
+
 
 ALIKE = 3
 """If more settings than this are omitted for one reason, they are reported without their values."""
@@ -94,13 +113,14 @@ def restore(
     """
     from tui.drive.settings.restore_plan import Options
 
-    from ..shared.output import drive_json
+    from ..documents.setting_documents import RestoreDocument
+    from ..shared.output import drive_fields
 
     _either(dry_run=dry_run, arm=arm)
     values = set_in(file)
     telling = ResultTelling(Messages(as_json=as_json))
 
-    async def restore_drive(opened: OpenLine, target: Target) -> tuple[dict[str, Any], int]:
+    async def restore_drive(opened: OpenLine, target: Target) -> tuple[RestoreDocument, int]:
         nonlocal telling
         telling = ResultTelling(Messages(as_json=as_json))
         session = await connect_drive(opened, target)
@@ -109,8 +129,13 @@ def restore(
             found, status = await _tell(session, values, options, telling.messages)
         else:
             found, status = await _restore(session, values, options, telling, save=save)
-        head = {**drive_json(line_text, session), "dry_run": dry_run}
-        return {**head, **found, "messages": telling.messages.texts}, status
+        document = RestoreDocument(
+            **drive_fields(line_text, session),
+            dry_run=dry_run,
+            **found,
+            messages=telling.messages.texts,
+        )
+        return document, status
 
     where = Target(line_text, devices[0], profile_id, others=devices[1:])
     try:
@@ -138,27 +163,44 @@ def _either(*, dry_run: bool, arm: bool) -> None:
 
 async def _tell(
     session: DriveSession, values: ParameterSet, options: Options, messages: Messages
-) -> tuple[dict[str, Any], int]:
+) -> tuple[_Restored, int]:
     from tui.drive.profile import library
     from tui.session.settings.restore import plan_for
 
     source = library.load(values.head.profile)
     plan = await plan_for(session, values, source, options, counter("Read"))
     say_plan(session, plan, messages)
-    return {**_plan_json(plan), "results": [], "saved": False, "left": []}, DONE
+    return _restored(plan), DONE
 
 
-def _plan_json(plan: RestorePlan) -> dict[str, Any]:
-    keys = ("code", "kind", "reason", "text", "old", "new")
+def _restored(
+    plan: RestorePlan,
+    results: Sequence[Result] = (),
+    *,
+    saved: bool = False,
+    left: Iterable[Edit] = (),
+) -> _Restored:
+    from ..documents.parts import PlanItemField
+
     return {
         "plan": [
-            {key: getattr(item, key) or None for key in keys}
+            PlanItemField(
+                code=item.code,
+                kind=item.kind,
+                reason=item.reason or None,
+                text=item.text or None,
+                old=item.old or None,
+                new=item.new or None,
+            )
             for item in plan.items
             if item.reason != "no setting"
         ],
         "same_rating": plan.same_rating,
         "needs_stop": plan.needs_stop,
         "across": plan.across,
+        "results": result_fields(results),
+        "saved": saved,
+        "left": [edit.code for edit in left],
     }
 
 
@@ -203,7 +245,7 @@ async def _restore(
     telling: ResultTelling,
     *,
     save: bool,
-) -> tuple[dict[str, Any], int]:
+) -> tuple[_Restored, int]:
     from tui.drive.profile import library
     from tui.session.settings.eeprom import save_to_eeprom
     from tui.session.settings.restore import Mark
@@ -234,12 +276,7 @@ async def _restore(
             messages.complain("The same command writes what is missing.")
     finally:
         close_journal(journal)
-    found = {
-        **_plan_json(done.plan),
-        "results": results_json(done.results),
-        "saved": saved,
-        "left": [edit.code for edit in done.left],
-    }
+    found = _restored(done.plan, done.results, saved=saved, left=done.left)
     if done.unseen:
         return found, LINE_TROUBLE
     return found, DONE if done.complete else status_of_results(done.results) or DRIVE_REFUSED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +13,7 @@ from ..shared.options import hold_option, json_option, line_argument, on_line, r
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
 
+    from ..documents.drive_documents import ScanEndDocument
     from ..running.scanning import Scan
 
 ALL_ADDRESSES = "1-247"
@@ -128,17 +129,23 @@ def _end(scans: list[Scan], addresses: str) -> str:
     drives = f"{count or 'No'} drive{'' if count == 1 else 's'} found"
     early = "" if scan.done else ", not all of which were asked"
     text = f"{drives} at addresses {addresses}{early}{_settings_text(scan)}."
-    ended: dict[str, Any] = {
-        "done": scan.done,
-        "found": count,
-        "addresses": addresses,
-        "settings": [{"baud": setting.baud, "format": setting.format} for setting in scan.tried],
-        "not_tried": len(scan.settings) - len(scan.tried),
-        "held_back": scan.held_back or None,
-        "remarks": scan.remarks,
-        "text": text,
-    }
-    scan.tell.ended(ended)
+
+    def document(line_text: str) -> ScanEndDocument:
+        from ..documents.drive_documents import LineSettingField, ScanEndDocument
+
+        return ScanEndDocument(
+            line=line_text,
+            done=scan.done,
+            found=count,
+            addresses=addresses,
+            settings=[LineSettingField(baud=item.baud, format=item.format) for item in scan.tried],
+            not_tried=len(scan.settings) - len(scan.tried),
+            held_back=scan.held_back or None,
+            remarks=scan.remarks,
+            text=text,
+        )
+
+    scan.tell.ended(document)
     return " ".join((text, *scan.remarks))
 
 

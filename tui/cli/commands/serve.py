@@ -8,7 +8,7 @@ import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -36,6 +36,9 @@ from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.served_lines import ServedLine, served_lines
 from ..shared.signals import never_suspended
+
+if TYPE_CHECKING:
+    from ..documents.other_documents import ServeReady
 
 
 @click.command()
@@ -130,7 +133,7 @@ def serve(
     def ready(places: ServedAt) -> str:
         text = ", ".join(texts) + _reached(places, wish)
         if as_json:
-            print_json(_ready_json(texts, places, wish), compact=True)
+            print_json(_ready_document(texts, places, wish), compact=True)
         else:
             say(f"Ready: {text}. Ctrl-C ends it.")
             sys.stdout.flush()
@@ -240,13 +243,14 @@ def _may(wish: GatewayWish) -> str:
     return " and ".join([", ".join(may[:-1]), may[-1]]) if may[1:] else "reads only"
 
 
-def _ready_json(texts: list[str], places: ServedAt, wish: GatewayWish | None) -> dict[str, Any]:
-    return {
-        "event": "ready",
-        "lines": texts,
-        "tcp": places.tcp,
-        "metrics": places.metrics,
-        "mqtt": places.mqtt,
-        "writes": [] if wish is None else sorted(wish.rules.writes),
-        "commands": wish is not None and wish.rules.commands,
-    }
+def _ready_document(texts: list[str], places: ServedAt, wish: GatewayWish | None) -> ServeReady:
+    from ..documents.other_documents import ServeReady
+
+    return ServeReady(
+        lines=texts,
+        tcp=places.tcp,
+        metrics=places.metrics,
+        mqtt=places.mqtt,
+        writes=[] if wish is None else sorted(wish.rules.writes),
+        commands=wish is not None and wish.rules.commands,
+    )

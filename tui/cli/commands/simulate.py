@@ -16,7 +16,7 @@ from ..shared.errors import reported
 from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
 from ..shared.options import json_option
-from ..shared.output import document, json_text, print_json
+from ..shared.output import json_text, print_json
 from ..shared.say import say, say_beside
 from ..shared.signals import never_suspended
 from ..shared.standard_input import typed_lines
@@ -124,8 +124,12 @@ def simulate(
         specs = [drive.spec for drive in simulation.drives]
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
         if as_json:
-            found = [{"profile": spec.profile, "device": spec.address} for spec in specs]
-            print_json({"event": "ready", "line": where, "drives": found}, compact=True)
+            from ..documents.other_documents import SimulatedDriveField, SimulationReady
+
+            found = [
+                SimulatedDriveField(profile=spec.profile, device=spec.address) for spec in specs
+            ]
+            print_json(SimulationReady(line=where, drives=found), compact=True)
         else:
             say(f"Ready: {names} on {where}. Ctrl-C ends it.")
         inputs = (simulation, as_json)
@@ -172,6 +176,8 @@ def _follow(simulation: Simulation, as_json: bool) -> None:
     """Set inputs as the lines of standard input say; a wrong line is reported."""
     from tui.simulator import SimulatorError, set_inputs
 
+    from ..documents.other_documents import InputsDocument
+
     for line in typed_lines():
         if line.strip():
             try:
@@ -180,9 +186,7 @@ def _follow(simulation: Simulation, as_json: bool) -> None:
                 say_beside(str(error), err=True)
                 continue
             if as_json:
-                # click knows no command in a thread
-                reported = {"command": "simulate", "event": "inputs", "text": text}
-                say_beside(json_text(document(reported)), as_it_is=True)
+                say_beside(json_text(InputsDocument(text=text)), as_it_is=True)
             else:
                 say_beside(text)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -39,11 +39,14 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.work import Outcome
 
+    from ..documents.document import DriveFields
+
 FAULT_GONE_WITHIN = 3.0
 """Seconds that a drive may take to leave its fault after a reset, on a quick line."""
 
 
 def _ordered(
+    command: Literal["reference", "reset"],
     target: Target,
     read_only: bool,
     work: Callable[[DriveConsole, Messages], Coroutine[Any, Any, str]],
@@ -51,20 +54,21 @@ def _ordered(
     as_json: bool,
 ) -> None:
     """Do the work at the armed drive and print its result."""
-    from ..shared.output import drive_json, print_json
+    from ..documents.drive_documents import CommandDocument
+    from ..shared.output import drive_fields, print_json
 
     messages = Messages(as_json=as_json)
 
-    async def at_console(opened: OpenLine) -> dict[str, Any]:
+    async def at_console(opened: OpenLine) -> tuple[DriveFields, str]:
         async with watched(opened, target) as (_, console):
             arm_drive(console)
             text = await work(console, messages)
             messages.tell(text)
-            return {**drive_json(target.line_text, console.session), "text": text}
+            return drive_fields(target.line_text, console.session), text
 
-    found = on_line(target, at_console, read_only=read_only)
+    fields, text = on_line(target, at_console, read_only=read_only)
     if as_json:
-        print_json({**found, "messages": messages.texts})
+        print_json(CommandDocument(command=command, **fields, text=text, messages=messages.texts))
 
 
 @click.command()
@@ -90,7 +94,7 @@ def reference(
         commander = console.commander
         return (await carried_out(commander, lambda: commander.refer(text))).text
 
-    _ordered(target, read_only, work, as_json=as_json)
+    _ordered("reference", target, read_only, work, as_json=as_json)
 
 
 @click.command(help=f"Reset a drive's fault. Its cause must be removed first.\n\n{MAY_START}")
@@ -118,7 +122,7 @@ def reset(
         now = came.partition(";")[2]
         return f"{name}: {latest_of(console).state.headline}{';' * bool(now)}{now}"
 
-    _ordered(target, read_only, work, as_json=as_json)
+    _ordered("reset", target, read_only, work, as_json=as_json)
 
 
 async def _follows(console: DriveConsole) -> str:

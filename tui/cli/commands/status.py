@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ..shared.completion import complete_line
-from ..shared.drive_status import status_json, status_of_drive
+from ..shared.drive_status import status_document, status_of_drive
 from ..shared.drives import each_drive
 from ..shared.errors import reported
 from ..shared.every_drive import USUAL_SEARCH, every_drive
@@ -28,6 +28,8 @@ from ..shared.status_lines import StatusWish, say_in_a_line, say_status, status_
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
+
+    from ..documents.drive_documents import StatusDocument
 
 
 @click.command()
@@ -85,7 +87,7 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
     target = first._replace(others=tuple(other.device for other in others))
     sessions: list[DriveSession] = []
 
-    async def show_drive(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+    async def show_drive(opened: OpenLine, drive: Target) -> tuple[StatusDocument, int]:
         session = await connect_drive(opened, drive)
         sessions.append(session)
         found = await status_of_drive(session, opened)
@@ -93,7 +95,7 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
             say_in_a_line(found)
         elif not wanted.as_json:
             say_status(found)
-        return status_json(target.line_text, found), found.status
+        return status_document(target.line_text, found), found.status
 
     async def work(opened: OpenLine) -> int:
         drives = target

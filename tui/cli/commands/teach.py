@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,9 +20,11 @@ from ..shared.options import (
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.drive.teaching import Lesson, TaughtScale
+    from tui.drive.teaching import TaughtScale
     from tui.session.connect.open_line import OpenLine
     from tui.session.teaching.teacher import Teacher
+
+    from ..documents.setting_documents import ScaleField, TaughtField
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # -12.5 is a VALUE
@@ -100,11 +102,22 @@ async def _teacher(opened: OpenLine, target: Target) -> Teacher:
 
 
 async def _look(teacher: Teacher, code: str, value: str, unit: str, *, as_json: bool) -> int:
+    from ..documents.setting_documents import LessonDocument
     from ..shared.output import print_json
 
     lesson = await teacher.look(code, value, unit)
     if as_json:
-        print_json({**_drive_fields(teacher), **_lesson_json(code, lesson)})
+        print_json(
+            LessonDocument(
+                line=teacher.session.line_text,
+                device=teacher.session.device,
+                profile=teacher.session.profile.id,
+                code=code,
+                lesson=str(lesson.kind),
+                text=lesson.text,
+                taught=_scale_field(lesson.scale),
+            )
+        )
     else:
         say(lesson.text)
         if teacher.proposal() == code:
@@ -121,24 +134,40 @@ def _confirm(teacher: Teacher, code: str) -> str:
 
 
 def _tell_change(teacher: Teacher, text: str, *, as_json: bool) -> None:
+    from ..documents.setting_documents import TeachChangeDocument
     from ..shared.output import print_json
 
     if as_json:
-        print_json({**_drive_fields(teacher), "text": text, "reference": teacher.reference or None})
+        print_json(
+            TeachChangeDocument(
+                line=teacher.session.line_text,
+                device=teacher.session.device,
+                profile=teacher.session.profile.id,
+                text=text,
+                reference=teacher.reference or None,
+            )
+        )
     else:
         say(text)
 
 
 def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
     """Report taught scales and begun lessons, of one parameter or of all."""
+    from ..documents.setting_documents import TaughtDocument
     from ..shared.output import print_json
 
     codes = [p.code for p in teacher.family.parameters if teacher.looks(p.code)]
     rows = [code for code in codes if only in ("", code)]
     if as_json:
-        kept = {code: _kept_json(teacher, code) for code in rows}
-        reference = teacher.reference or None
-        print_json({**_drive_fields(teacher), "taught": kept, "reference": reference})
+        print_json(
+            TaughtDocument(
+                line=teacher.session.line_text,
+                device=teacher.session.device,
+                profile=teacher.session.profile.id,
+                taught={code: _taught_field(teacher, code) for code in rows},
+                reference=teacher.reference or None,
+            )
+        )
         return
     for code in rows:
         scale = teacher.scales.get(code)
@@ -155,33 +184,19 @@ def _tell_trouble(teacher: Teacher) -> None:
         say(f"drivepanel: {teacher.trouble}", err=True)
 
 
-def _drive_fields(teacher: Teacher) -> dict[str, Any]:
-    session = teacher.session
-    return {
-        "line": session.line_text,
-        "device": session.device,
-        "profile": session.profile.id,
-    }
+def _taught_field(teacher: Teacher, code: str) -> TaughtField:
+    from ..documents.setting_documents import ReadingField, TaughtField
 
-
-def _lesson_json(code: str, lesson: Lesson) -> dict[str, Any]:
-    return {
-        "code": code,
-        "lesson": str(lesson.kind),
-        "text": lesson.text,
-        "taught": _scale_json(lesson.scale),
-    }
-
-
-def _kept_json(teacher: Teacher, code: str) -> dict[str, Any]:
     looks = [
-        {"raw": look.word, "shown": float(look.shown), "unit": look.unit or None}
+        ReadingField(raw=look.word, shown=float(look.shown), unit=look.unit or None)
         for look in teacher.looks(code)
     ]
-    return {"scale": _scale_json(teacher.scales.get(code)), "looks": looks}
+    return TaughtField(scale=_scale_field(teacher.scales.get(code)), looks=looks)
 
 
-def _scale_json(scale: TaughtScale | None) -> dict[str, Any] | None:
+def _scale_field(scale: TaughtScale | None) -> ScaleField | None:
+    from ..documents.setting_documents import ScaleField
+
     if scale is None:
         return None
-    return {"scale": float(scale.scale), "unit": scale.unit or None, "signed": scale.signed}
+    return ScaleField(scale=float(scale.scale), unit=scale.unit or None, signed=scale.signed)

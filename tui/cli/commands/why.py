@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import click
 
@@ -25,10 +25,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.diagnosis.diagnosis import Diagnosis
 
-
-SICK_COUNTS = (
-    "lost", "damaged", "late", "duplicated", "foreign", "unreached", "behind", "second",
-)  # fmt: skip
+    from ..documents.document import DriveFields
+    from ..documents.why_document import CertaintyText, MeasuredReads, WhyDocument
 
 
 @click.command()
@@ -57,23 +55,23 @@ def why(target: Target, read_only: bool, as_json: bool) -> None:
 
     named = library.load(target.profile_id) if target.profile_id else None
 
-    async def work(opened: OpenLine) -> tuple[Diagnosis, dict[str, Any]]:
+    async def work(opened: OpenLine) -> tuple[Diagnosis, DriveFields | None]:
         return await _requested(opened, target, named)
 
     try:
-        found, about = on_line(target, work, read_only=read_only)
+        found, fields = on_line(target, work, read_only=read_only)
     except LinkSyntaxError:
         raise
     except LineError as error:
-        found, about = _unopened(target, named, error), {}
-    _tell(target, found, about, as_json)
+        found, fields = _unopened(target, named, error), None
+    _tell(target, found, fields, as_json)
     if not found.well:
         raise click.exceptions.Exit(LINE_TROUBLE)
 
 
 async def _requested(
     opened: OpenLine, target: Target, named: Profile | None
-) -> tuple[Diagnosis, dict[str, Any]]:
+) -> tuple[Diagnosis, DriveFields | None]:
     """The diagnosis of a drive on an open line, and how a document about it begins."""
     from tui.session.diagnosis.asking import profile_remembered
     from tui.session.diagnosis.diagnosis import diagnosed
@@ -83,15 +81,15 @@ async def _requested(
     profile = named or await asyncio.to_thread(profile_remembered, line.link, device)
     changed = opened.known.text if opened.known is not None else ""
     found = diagnosed(await examine_line(line, device, profile, changed=changed))
-    about = (
-        await _looked_after(opened, target, profile, found) if found.sight.heard.answered else {}
-    )
-    return found, about
+    fields = None
+    if found.sight.heard.answered:
+        fields = await _looked_after(opened, target, profile, found)
+    return found, fields
 
 
 async def _looked_after(
     opened: OpenLine, target: Target, profile: Profile | None, found: Diagnosis
-) -> dict[str, Any]:
+) -> DriveFields | None:
     """Report the reaction of a drive that was polled and is polled no longer.
 
     On a sick line it is asked once, at the end.
@@ -100,14 +98,14 @@ async def _looked_after(
     from tui.session.drive import DriveSession
     from tui.session.timeout_report import Timeout
 
-    from ..shared.output import drive_json
+    from ..shared.output import drive_fields
     from ..shared.pending_timeouts import look_after
 
     identity: DriveIdentity | None = None
     if profile is None:
         identity = await _identity(opened, target.device, found.sight.identity)
         if identity is None or identity.profile is None:
-            return {}
+            return None
         profile = await asyncio.to_thread(library.load, identity.profile)
     session = DriveSession(opened.line, target.device, profile, identity)
     farewell = look_after(opened, session, target.line_text)
@@ -115,7 +113,7 @@ async def _looked_after(
         await farewell.learn()
     else:
         session.timeout = Timeout(known=False)
-    return drive_json(target.line_text, session)
+    return drive_fields(target.line_text, session)
 
 
 async def _identity(
@@ -146,18 +144,11 @@ def _unopened(target: Target, named: Profile | None, error: Exception) -> Diagno
     return diagnosed(replace(seen, profile=named))
 
 
-def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool) -> None:
+def _tell(target: Target, found: Diagnosis, fields: DriveFields | None, as_json: bool) -> None:
     from ..shared.output import print_json
 
     if as_json:
-        profile = found.sight.profile
-        drive = {
-            "line": target.line_text,
-            "device": target.device,
-            "profile": profile.id if profile is not None else None,
-            "timeout": None,
-        }
-        print_json({**drive, **about, **why_json(found)})
+        print_json(why_document(target.line_text, target.device, fields, found))
         return
     say(found.text)
     if (measure := found.sight.measure) is not None:
@@ -174,44 +165,66 @@ def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool
         say(f"  - {step}", indent=4)
 
 
-def why_json(found: Diagnosis) -> dict[str, Any]:
-    """Return the diagnosis as JSON."""
+def why_document(
+    line_text: str, device: int, fields: DriveFields | None, found: Diagnosis
+) -> WhyDocument:
+    """The diagnosis as a document; `fields` are those of a drive with a session."""
+    from ..documents.parts import HeardField
+    from ..documents.why_document import WhyDocument
+
     sight, heard = found.sight, found.sight.heard
-    late = sight.turnaround
-    return {
-        "rung": found.rung,
-        "answers": found.well,
-        "certainty": found.certainty,
-        "others": list(found.others),
-        "text": found.text,
-        "next": list(found.steps),
-        "measured": _measured_json(found),
-        "seen": {
-            "asked": heard.requested,
-            "answered": heard.answered,
-            "late": heard.late,
-            "echoed": heard.echoed,
-            "damaged": heard.damaged,
-            "garbage_bytes": heard.garbage,
-            "exceptions": list(heard.exceptions),
-            "functions": list(heard.functions),
-            "others": list(heard.others),
-            "framing_errors": sight.errors.framing,
-            "parity_errors": sight.errors.parity,
-            "breaks": sight.errors.breaks,
-            "turnaround_ms": round(late * 1000, 1) if late is not None else None,
-            "latency_timer_ms": sight.port.latency if sight.port is not None else None,
-        },
+    late, profile = sight.turnaround, sight.profile
+    without_session: DriveFields = {
+        "line": line_text,
+        "device": device,
+        "profile": profile.id if profile is not None else None,
+        "timeout": None,
     }
+    return WhyDocument(
+        **(fields or without_session),
+        rung=found.rung,
+        answers=found.well,
+        certainty=cast("CertaintyText", found.certainty),
+        others=list(found.others),
+        text=found.text,
+        next=list(found.steps),
+        measured=_measured_reads(found),
+        seen=HeardField(
+            asked=heard.requested,
+            answered=heard.answered,
+            late=heard.late,
+            echoed=heard.echoed,
+            damaged=heard.damaged,
+            garbage_bytes=heard.garbage,
+            exceptions=list(heard.exceptions),
+            functions=list(heard.functions),
+            others=list(heard.others),
+            framing_errors=sight.errors.framing,
+            parity_errors=sight.errors.parity,
+            breaks=sight.errors.breaks,
+            turnaround_ms=round(late * 1000, 1) if late is not None else None,
+            latency_timer_ms=sight.port.latency if sight.port is not None else None,
+        ),
+    )
 
 
-def _measured_json(found: Diagnosis) -> dict[str, Any] | None:
+def _measured_reads(found: Diagnosis) -> MeasuredReads | None:
     """The counts of the short reads; None where there were none."""
+    from ..documents.why_document import MeasuredReads
+
     measure = found.sight.measure
     if measure is None:
         return None
-    return {
-        "asked": measure.requested,
-        **{name: getattr(measure, name) for name in ("answered", *SICK_COUNTS)},
-        "seconds": round(measure.seconds, 2),
-    }
+    return MeasuredReads(
+        asked=measure.requested,
+        answered=measure.answered,
+        lost=measure.lost,
+        damaged=measure.damaged,
+        late=measure.late,
+        duplicated=measure.duplicated,
+        foreign=measure.foreign,
+        unreached=measure.unreached,
+        behind=measure.behind,
+        second=measure.second,
+        seconds=round(measure.seconds, 2),
+    )

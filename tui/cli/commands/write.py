@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import click
 
@@ -24,8 +24,8 @@ from ..shared.sets import (
     codes_of,
     confirm_option,
     dry_run_option,
-    edit_json,
-    results_json,
+    edit_field,
+    result_fields,
     round_option,
     save_option,
     say_afterwards,
@@ -37,6 +37,17 @@ if TYPE_CHECKING:
     from tui.drive.settings.edits import Edits
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
+
+    from ..documents.parts import EditField, OutcomeText
+
+
+class _Written(TypedDict):
+    """The fields of the document about the results."""
+
+    results: list[EditField]
+    saved: bool
+    after_reset: list[str]
+    unsaved: list[str]
 
 
 @click.command()
@@ -75,7 +86,8 @@ def write(
     in hexadecimal (16#0021). A value that rounding would make 0, or that is half way between two,
     is refused without --round. Limits and scales are written before settings that depend on them.
     """
-    from ..shared.output import drive_json, print_json
+    from ..documents.setting_documents import WriteDocument
+    from ..shared.output import drive_fields, print_json
 
     typed = _pairs(wanted)
     if not dry_run:
@@ -92,8 +104,14 @@ def write(
             codes = codes_of(session, confirmed)
             found, status = await _write(session, edits, codes, telling, save=save)
         if as_json:
-            head = drive_json(target.line_text, session)
-            print_json({**head, "dry_run": dry_run, **found, "messages": messages.texts})
+            print_json(
+                WriteDocument(
+                    **drive_fields(target.line_text, session),
+                    dry_run=dry_run,
+                    **found,
+                    messages=messages.texts,
+                )
+            )
         return status
 
     try:
@@ -144,9 +162,7 @@ async def _staged(
     return edits
 
 
-async def _tell(
-    session: DriveSession, edits: Edits, messages: Messages
-) -> tuple[dict[str, Any], int]:
+async def _tell(session: DriveSession, edits: Edits, messages: Messages) -> tuple[_Written, int]:
     """Show what would be written; the same for JSON, and the exit status."""
     past = await _past_limits(session, edits)
     rows = []
@@ -154,9 +170,9 @@ async def _tell(
         why = past.get(edit.code)
         text = f"write  {edit.code}: {edit.old_text} -> {edit.text}"
         messages.tell(text if why is None else f"refuse {why}")
-        outcome = "would-write" if why is None else "refused"
-        rows.append({**edit_json(edit), "outcome": outcome, "held": edit.old, "text": why or text})
-    found = {"results": rows, "saved": False, "after_reset": [], "unsaved": []}
+        outcome: OutcomeText = "would-write" if why is None else "refused"
+        rows.append(edit_field(edit, outcome=outcome, held=edit.old, text=why or text))
+    found: _Written = {"results": rows, "saved": False, "after_reset": [], "unsaved": []}
     return found, REFUSED_HERE if past else DONE
 
 
@@ -179,7 +195,7 @@ async def _write(
     telling: ResultTelling,
     *,
     save: bool,
-) -> tuple[dict[str, Any], int]:
+) -> tuple[_Written, int]:
     """Write, report each; the results for JSON, and the exit status."""
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import save_to_eeprom
@@ -200,8 +216,8 @@ async def _write(
         say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
     finally:
         close_journal(journal)
-    found = {
-        "results": results_json(done.results),
+    found: _Written = {
+        "results": result_fields(done.results),
         "saved": saved,
         "after_reset": list(done.after_reset),
         "unsaved": [] if saved else list(done.unsaved),

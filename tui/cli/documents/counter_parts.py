@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .parts import DocumentPart
+from .document import DocumentPart
 
 
 class TurnaroundField(DocumentPart):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-import msgspec
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Meta, UnsetType
 
 from tui.bus.api import Contact
 
@@ -17,6 +16,7 @@ from .counter_parts import (
     LoadField,
     OurCountersField,
 )
+from .document import Document, DocumentPart, DriveDocument, TimeoutField
 from .parts import (
     AlarmField,
     ControlField,
@@ -26,58 +26,40 @@ from .parts import (
     ModelField,
     OldTimeoutField,
     StateField,
-    TimeoutField,
     ValueField,
     WatchedValueField,
 )
 
-
-class Document(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """Fields common to all JSON documents."""
-
-    schema: Literal[1]
-    command: str | None
-
-
-class DriveDocument(Document, kw_only=True):
-    """A document about one drive on the LINE as it was typed."""
-
-    line: str
-    device: int
-    profile: str | None
-    timeout: TimeoutField | UnsetType | None = UNSET
-
-
-class ErrorDocument(Document, kw_only=True):
-    """An error that ended the command, or that of one of several drives."""
-
-    error: str
-    status: int
-    line: str | UnsetType = UNSET
-    device: int | UnsetType = UNSET
+PrintedRunEvent = Literal[
+    "control", "reference", "order", "state", "ended", "stopping", "stopped", "left-running"
+]
+HoldEvent = Literal["holding", "lost", "back", "fault"]
+Certainty = Literal["identified", "likely", "unknown"]
 
 
 class ReadDocument(DriveDocument, kw_only=True):
     """`read`: values by code."""
 
-    command: Literal["read"]
+    command: Literal["read"] = "read"
     values: dict[str, ValueField]
 
 
-class CycleTime(msgspec.Struct, forbid_unknown_fields=True):
+class CycleTime(DocumentPart):
     """Seconds from one cycle of a drive to the next."""
 
-    seconds: float
-    """As they were."""
-    wished: float
-    """As `--every` asks for them."""
+    seconds: Annotated[float, Meta(description="As they were.")]
+    wished: Annotated[float, Meta(description="As `--every` asks for them.")]
 
 
-class CycleDocument(DriveDocument, kw_only=True):
+class CycleDocument(Document, kw_only=True):
     """`watch`: one cycle."""
 
-    command: Literal["watch"]
+    command: Literal["watch"] = "watch"
     time: str
+    line: str
+    device: int
+    profile: str | None
+    timeout: TimeoutField | UnsetType | None = UNSET
     values: dict[str, WatchedValueField]
     state: str | None
     direction: str | None
@@ -89,7 +71,7 @@ class CycleDocument(DriveDocument, kw_only=True):
 class IdentityDocument(DriveDocument, kw_only=True):
     """`identify`: who a drive says it is."""
 
-    command: Literal["identify"]
+    command: Literal["identify"] = "identify"
     vendor: str
     reference: str
     version: str
@@ -100,7 +82,7 @@ class IdentityDocument(DriveDocument, kw_only=True):
 class StatusDocument(DriveDocument, kw_only=True):
     """`status`: what a drive does and who commands it."""
 
-    command: Literal["status"]
+    command: Literal["status"] = "status"
     state: StateField
     direction: str | None
     fault: FaultField | None
@@ -121,45 +103,41 @@ class StatusDocument(DriveDocument, kw_only=True):
 class RunDocument(Document, kw_only=True):
     """`run`: one event."""
 
-    command: Literal["run"]
+    command: Literal["run"] = "run"
     time: str
     device: int
-    event: Literal[
-        "control", "reference", "order", "state", "ended", "stopping", "stopped", "left-running"
-    ]
+    event: PrintedRunEvent
     text: str
+    timeout: TimeoutField | UnsetType | None = UNSET
     state: str | UnsetType | None = UNSET
     direction: str | UnsetType | None = UNSET
     fault: str | UnsetType | None = UNSET
     values: dict[str, ValueField | None] | UnsetType = UNSET
     error: str | UnsetType | None = UNSET
-    timeout: TimeoutField | UnsetType | None = UNSET
 
 
 class HoldDocument(Document, kw_only=True):
     """`hold`: one event."""
 
-    command: Literal["hold"]
+    command: Literal["hold"] = "hold"
     time: str
     line: str
     device: int
-    event: Literal["holding", "lost", "back", "fault"]
+    event: HoldEvent
     text: str
     timeout: TimeoutField | UnsetType | None = UNSET
 
 
-class WatchingFamilyField(msgspec.Struct, forbid_unknown_fields=True):
+class WatchingFamilyField(DocumentPart):
     """A family that reacts when polling stops after the first request."""
 
     profile: str
     name: str
-    timeout: str
-    """The parameter that sets its timeout."""
-    sure: bool
-    """True if a document says so."""
+    timeout: Annotated[str, Meta(description="The parameter that sets its timeout.")]
+    sure: Annotated[bool, Meta(description="True if a document says so.")]
 
 
-class LineSettingField(msgspec.Struct, forbid_unknown_fields=True):
+class LineSettingField(DocumentPart):
     """Baud and format of a line."""
 
     baud: int
@@ -169,9 +147,9 @@ class LineSettingField(msgspec.Struct, forbid_unknown_fields=True):
 class ScanFamiliesDocument(Document, kw_only=True):
     """`scan`: who may be there and watches the line, before the first request."""
 
-    command: Literal["scan"]
+    command: Literal["scan"] = "scan"
     line: str
-    event: Literal["families"]
+    event: Literal["families"] = "families"
     families: list[WatchingFamilyField]
     text: str
 
@@ -179,9 +157,9 @@ class ScanFamiliesDocument(Document, kw_only=True):
 class ScanHitDocument(Document, kw_only=True):
     """`scan`: a drive that answered; baud and format are null over a network."""
 
-    command: Literal["scan"]
+    command: Literal["scan"] = "scan"
     line: str
-    event: Literal["hit"]
+    event: Literal["hit"] = "hit"
     device: int
     baud: int | None
     format: str | None
@@ -190,19 +168,22 @@ class ScanHitDocument(Document, kw_only=True):
     version: str
     name: str
     profile: str | None
-    candidates: list[str]
-    """Profiles that may fit, the likeliest first."""
-    sure: Literal["identified", "likely", "unknown"]
-    by: str | None
-    """Source of the identity: a function, or a read; null if unknown."""
+    candidates: Annotated[
+        list[str], Meta(description="Profiles that may fit, the likeliest first.")
+    ]
+    sure: Certainty
+    by: Annotated[
+        str | None,
+        Meta(description="Source of the identity: a function, or a read; null if unknown."),
+    ]
 
 
 class ScanUnclearDocument(Document, kw_only=True):
     """`scan`: bytes from an address that are not an answer; it may be taken twice."""
 
-    command: Literal["scan"]
+    command: Literal["scan"] = "scan"
     line: str
-    event: Literal["unclear"]
+    event: Literal["unclear"] = "unclear"
     device: int
     baud: int | None
     format: str | None
@@ -212,9 +193,9 @@ class ScanUnclearDocument(Document, kw_only=True):
 class ScanSlowDocument(Document, kw_only=True):
     """`scan`: the likely settings are through; those that are left take so many seconds."""
 
-    command: Literal["scan"]
+    command: Literal["scan"] = "scan"
     line: str
-    event: Literal["slow"]
+    event: Literal["slow"] = "slow"
     settings: list[LineSettingField]
     seconds: float
     text: str
@@ -223,26 +204,31 @@ class ScanSlowDocument(Document, kw_only=True):
 class ScanEndDocument(Document, kw_only=True):
     """`scan`: the end; `done` is false where it was ended before."""
 
-    command: Literal["scan"]
+    command: Literal["scan"] = "scan"
     line: str
-    event: Literal["ended"]
+    event: Literal["ended"] = "ended"
     done: bool
     found: int
     addresses: str
-    settings: list[LineSettingField]
-    """Those that were tried, in this order."""
+    settings: Annotated[
+        list[LineSettingField], Meta(description="Those that were tried, in this order.")
+    ]
     not_tried: int
-    held_back: str | None
-    """Why others were not tried; null where nothing kept them back."""
-    remarks: list[str]
-    """Troubles of the line that the search has shown: an echo, refusals of a gateway."""
+    held_back: Annotated[
+        str | None,
+        Meta(description="Why others were not tried; null where nothing kept them back."),
+    ]
+    remarks: Annotated[
+        list[str],
+        Meta(description="Troubles that the search has shown, such as refusals of a gateway."),
+    ]
     text: str
 
 
 class ProveDocument(DriveDocument, kw_only=True):
     """`prove`: the silences between which the drive has reacted, and what is set; times in ms."""
 
-    command: Literal["prove"]
+    command: Literal["prove"] = "prove"
     configured_ms: int
     not_before_ms: int
     not_after_ms: int | None
@@ -260,7 +246,7 @@ class ProveDocument(DriveDocument, kw_only=True):
 class CountersDocument(DriveDocument, kw_only=True):
     """`counters`: what was exchanged with a drive, as counted here and by the drive."""
 
-    command: Literal["counters"]
+    command: Literal["counters"] = "counters"
     counted_by: str | None
     seconds: float
     ours: OurCountersField
@@ -283,12 +269,16 @@ class CommandDocument(DriveDocument, kw_only=True):
     messages: list[str]
 
 
-class StopDocument(DriveDocument, kw_only=True):
+class StopDocument(Document, kw_only=True):
     """`stop`: the result for one drive; a list with --all or several -d."""
 
-    command: Literal["stop"]
+    command: Literal["stop"] = "stop"
+    line: str
+    device: int
+    profile: str | None
+    first: list[FirstWordField] | UnsetType = UNSET
     stopped: bool
     text: str
     status: int
-    first: list[FirstWordField] | UnsetType = UNSET
+    timeout: TimeoutField | UnsetType | None = UNSET
     given_back: str | UnsetType = UNSET

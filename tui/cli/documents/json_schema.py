@@ -1,108 +1,69 @@
 """The JSON Schema of what `--json` prints.
 
-`python -m tui.cli.documents.json_schema` prints it; a copy is docs/cli.schema.json. Tests
-hold what the commands print against it. Fields are added, never renamed, while `schema` stays 1.
+`python -m tui.cli.documents.json_schema` prints it; a copy is docs/cli.schema.json. Fields are
+added, never renamed, while `schema` stays 1. The schema describes output: a field is required
+unless it may be missing.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
+import pkgutil
 import sys
+from typing import Any
 
 import msgspec
 
-from .drive_documents import (
-    CommandDocument,
-    CountersDocument,
-    CycleDocument,
-    ErrorDocument,
-    HoldDocument,
-    IdentityDocument,
-    ProveDocument,
-    ReadDocument,
-    RunDocument,
-    ScanEndDocument,
-    ScanFamiliesDocument,
-    ScanHitDocument,
-    ScanSlowDocument,
-    ScanUnclearDocument,
-    StatusDocument,
-    StopDocument,
-)
-from .listening_documents import HeardExchangeDocument, HeardSummaryDocument
-from .other_documents import (
-    BundleDocument,
-    CheckDocument,
-    InputsDocument,
-    JournalDocument,
-    LinesDocument,
-    PortDocument,
-    ProfileBegun,
-    ProfileDocument,
-    ProfileFolder,
-    ProfileShown,
-    PublishReady,
-    ServeReady,
-    SimulationReady,
-    WiringDocument,
-)
-from .setting_documents import (
-    BackupDocument,
-    BlockChangeDocument,
-    BlockFileDocument,
-    BlocksDocument,
-    CompareDocument,
-    LessonDocument,
-    ReportDocument,
-    RestoreDocument,
-    TaughtDocument,
-    TeachChangeDocument,
-    WriteDocument,
-)
-from .why_document import WhyDocument
+from tui import cli
 
-DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
-    ErrorDocument, ReadDocument, CycleDocument, IdentityDocument, StatusDocument, RunDocument,
-    HoldDocument, ProveDocument,
-    ScanFamiliesDocument, ScanSlowDocument, ScanHitDocument, ScanUnclearDocument, ScanEndDocument,
-    CommandDocument, StopDocument, WriteDocument, RestoreDocument, BackupDocument, ReportDocument,
-    CompareDocument, BlocksDocument,
-    BlockChangeDocument, BlockFileDocument, LessonDocument, TaughtDocument, TeachChangeDocument,
-    PortDocument, ProfileDocument,
-    ProfileShown, WiringDocument, CheckDocument, ProfileBegun, ProfileFolder, SimulationReady,
-    InputsDocument,
-    ServeReady,
-    PublishReady,
-    JournalDocument, LinesDocument, HeardExchangeDocument, HeardSummaryDocument, WhyDocument,
-    CountersDocument,
-    BundleDocument,
-)  # fmt: skip
-"""Every document; a list of them is printed for ports, profiles, checks and several drives."""
+from .document import Document
+
+
+def documents() -> tuple[type[Document], ...]:
+    """Every document of every command, by command and name."""
+    for package in ("documents", "commands"):
+        folder = importlib.import_module(f"{cli.__name__}.{package}")
+        for module in pkgutil.iter_modules(folder.__path__):
+            importlib.import_module(f"{folder.__name__}.{module.name}")
+    forms = [form for form in _subclasses(Document) if not form.__subclasses__()]
+    return tuple(sorted(forms, key=lambda form: (commands_of(form), form.__name__)))
+
+
+def commands_of(form: type[Document]) -> tuple[str, ...]:
+    """The commands that print a document; empty if every command may."""
+    field = next(f for f in msgspec.structs.fields(form) if f.name == "command")
+    found: tuple[str, ...] = getattr(msgspec.inspect.type_info(field.type), "values", ())
+    return tuple(sorted(found))
+
+
+def _subclasses(form: type[Document]) -> list[type[Document]]:
+    return [each for sub in form.__subclasses__() for each in (sub, *_subclasses(sub))]
 
 
 def documents_schema() -> str:
-    """The JSON Schema of one document, as it is committed."""
-    references, parts = msgspec.json.schema_components(DOCUMENTS, ref_template="#/$defs/{name}")
+    """The JSON Schema of all that is printed, as it is committed."""
+    forms = documents()
+    references, parts = msgspec.json.schema_components(forms, ref_template="#/$defs/{name}")
+    for part in parts.values():
+        _require_printed(part)
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Drive Panel, --json",
-        "anyOf": list(references),
+        "anyOf": [*references, {"type": "array", "items": {"anyOf": list(references)}}],
         "$defs": dict(sorted(parts.items())),
     }
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
-def document_of(text: str) -> msgspec.Struct:
-    """The document in a text, as the first of the forms that fit; raises ValueError."""
-    wrong = []
-    for form in DOCUMENTS:
-        try:
-            found: msgspec.Struct = msgspec.json.decode(text, type=form)
-        except msgspec.ValidationError as error:
-            wrong.append(f"{form.__name__}: {error}")
-        else:
-            return found
-    raise ValueError("; ".join(wrong))
+def _require_printed(part: dict[str, Any]) -> None:
+    """Require the fields with a fixed value too: a default in a document is always printed."""
+    fields: dict[str, Any] = part.get("properties", {})
+    fixed = [name for name, field in fields.items() if "default" in field]
+    for name in fixed:
+        del fields[name]["default"]
+    if fixed:
+        part["required"] = [name for name in fields if name in fixed or name in part["required"]]
 
 
 if __name__ == "__main__":

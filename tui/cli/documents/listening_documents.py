@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from .drive_documents import Document
-from .parts import DocumentPart
+from msgspec import Meta
+
+from .document import Document, DocumentPart
 
 HowIdentified = Literal["named", "identified", "remembered", "likely"]
 
@@ -24,17 +25,14 @@ class HeardValueField(DocumentPart):
 class HeardExchangeDocument(Document, kw_only=True):
     """`listen`: one request with its result; `request` and `reply` are hexadecimal."""
 
-    command: Literal["listen"]
-    event: Literal["exchange"]
+    command: Literal["listen"] = "listen"
+    event: Literal["exchange"] = "exchange"
     time: str
     line: str
-    device: int
-    """0 for all devices at once."""
+    device: Annotated[int, Meta(description="0 for all devices at once.")]
     profile: str | None
-    how: HowIdentified | None
-    """Why it is taken for that."""
-    others: list[str]
-    """Profiles that are as likely."""
+    how: Annotated[HowIdentified | None, Meta(description="Why it is taken for that.")]
+    others: Annotated[list[str], Meta(description="Profiles that are as likely.")]
     function: int
     name: str
     answer: Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
@@ -62,15 +60,16 @@ class SilencesField(DocumentPart):
     broken_frames: int
     longest_ms: float
     too_soon: int
-    together: int
-    """Frames that came in one reading with the one before: nothing is known of their silence."""
+    together: Annotated[
+        int,
+        Meta(description="Frames read at once with the one before: their silence is not known."),
+    ]
 
 
 class HeardWriteField(DocumentPart):
     """One parameter that the master writes; `every` is in seconds, null of a single time."""
 
-    commands: bool
-    """True if it decides what the motor does."""
+    commands: Annotated[bool, Meta(description="True if it decides what the motor does.")]
     times: int
     every: float | None
     raw: int
@@ -143,8 +142,8 @@ class HeardDriveField(DocumentPart):
 class HeardSummaryDocument(Document, kw_only=True):
     """`listen`: the summary so far."""
 
-    command: Literal["listen"]
-    event: Literal["summary"]
+    command: Literal["listen"] = "listen"
+    event: Literal["summary"] = "summary"
     time: str
     line: str
     seconds: float
@@ -152,8 +151,12 @@ class HeardSummaryDocument(Document, kw_only=True):
     frames: int
     bytes: int
     load: float | None
-    crossed: int
-    """Requests that began while another waited for its answer: a second master."""
+    crossed: Annotated[
+        int,
+        Meta(
+            description="Requests that began while another waited for its answer: a second master."
+        ),
+    ]
     noise: NoiseField
     silences: SilencesField
     drives: list[HeardDriveField]

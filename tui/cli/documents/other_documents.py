@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
+from msgspec import Meta
 
 from .counter_parts import LastMinuteField
-from .drive_documents import Document
-from .parts import LeftBehindDocument
+from .document import Document, DocumentPart
 
 
 class PortDocument(Document, kw_only=True):
     """`ports`: one port of the list."""
 
-    command: Literal["ports"]
+    command: Literal["ports"] = "ports"
     path: str
     description: str
     holder: str | None
-    lasting: str | None
-    """The link that is this adapter's, or its socket's, for good; null where there is none."""
-    adapter: str | None
-    """USB vendor, product and serial number; null for a port that is not on USB."""
+    lasting: Annotated[
+        str | None,
+        Meta(description="Permanent link of this adapter or its socket; null if there is none."),
+    ]
+    adapter: Annotated[
+        str | None,
+        Meta(
+            description="USB vendor, product and serial number; null for a port that is not on USB."
+        ),
+    ]
 
 
-class NamedLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class NamedLineField(DocumentPart):
     """A line that the settings file names."""
 
     name: str
@@ -33,7 +39,7 @@ class NamedLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     profile: str | None
 
 
-class KnownDriveField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class KnownDriveField(DocumentPart):
     """A drive that answered at an address when its line was used last."""
 
     device: int
@@ -44,7 +50,7 @@ class KnownDriveField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     profile: str | None
 
 
-class KnownLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class KnownLineField(DocumentPart):
     """Stored facts of a line."""
 
     line: str
@@ -52,38 +58,51 @@ class KnownLineField(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     drives: list[KnownDriveField]
 
 
-class LeftOnLineDocument(LeftBehindDocument, kw_only=True):
-    """The same with its place."""
+class LeftOnLineDocument(DocumentPart):
+    """A motor whose program has exited, with its place."""
 
     line: str
     device: int
+    program: str
+    pid: int
+    exited: bool
+    left_running: bool
+    since: str
+    text: str
 
 
-class LineClientDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class LineClientDocument(DocumentPart):
     """A program on a line that is open."""
 
     program: str
     pid: int
-    share: float
-    """Of the line's time, over about 10 s: 1 is all of it."""
+    share: Annotated[
+        float, Meta(description="Of the line's time, over about 10 s: 1 is all of it.")
+    ]
 
 
-class OpenLineDocument(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class OpenLineDocument(DocumentPart):
     """A line that is open, and the process that holds it: `keeper` as a rule."""
 
     line: str
     program: str
     pid: int
-    clients: list[LineClientDocument] | None
-    """The programs on the line; null without an answer of its holder."""
-    last_minute: LastMinuteField | None
-    """Its health; null without an answer, or from a holder of an older version."""
+    clients: Annotated[
+        list[LineClientDocument] | None,
+        Meta(description="The programs on the line; null without an answer of its holder."),
+    ]
+    last_minute: Annotated[
+        LastMinuteField | None,
+        Meta(
+            description="Its health; null without an answer, or from a holder of an older version."
+        ),
+    ]
 
 
 class LinesDocument(Document, kw_only=True):
     """`lines`: the names, what is wrong with the settings file, and what is remembered."""
 
-    command: Literal["lines"]
+    command: Literal["lines"] = "lines"
     settings: str
     faults: list[str]
     lines: list[NamedLineField]
@@ -95,7 +114,7 @@ class LinesDocument(Document, kw_only=True):
 class ProfileDocument(Document, kw_only=True):
     """`profiles`: one of the list."""
 
-    command: Literal["profiles"]
+    command: Literal["profiles"] = "profiles"
     id: str
     name: str
     vendor: str
@@ -105,28 +124,69 @@ class ProfileDocument(Document, kw_only=True):
     remark: str
 
 
-class ProfileShown(msgspec.Struct, kw_only=True):
+class ProfileShown(Document, kw_only=True):
     """`profiles ID`: the profile itself, as profiles/profile.schema.json describes it."""
 
-    schema: Literal[1]
-    command: Literal["profiles"]
+    command: Literal["profiles"] = "profiles"
     profile: dict[str, Any]
-    parameters: list[dict[str, Any]]
+    sources: list[Any]
+    errata: list[Any]
+    identification: dict[str, Any]
+    link: dict[str, Any]
+    addresses: dict[str, Any]
+    functions: list[Any]
+    port_counters: list[Any]
+    reading: dict[str, Any]
+    blocks: list[Any]
+    exceptions: list[Any]
+    charts: list[Any]
+    command_examples: list[Any]
+    references: list[Any]
+    teachable_references: list[Any]
+    faults: dict[str, Any]
+    monitoring: dict[str, Any]
+    channels: dict[str, Any]
+    control_sources: list[Any]
+    communication_fault: dict[str, Any]
+    memory: dict[str, Any]
+    start_up: list[Any]
+    connectors: list[Any]
+    line_rules: list[Any]
+    wiring: dict[str, Any]
+    groups: list[Any]
+    enumerations: list[Any]
+    parameters: list[Any]
+
+
+class WiringRowField(DocumentPart):
+    """One fact about the line of a family."""
+
+    head: str
+    text: str
+    sure: Annotated[str, Meta(description="Certainty of the fact; empty if the manual states it.")]
+    warns: bool
+
+
+class WiringSectionField(DocumentPart):
+    """Facts of one subject."""
+
+    title: str
+    rows: list[WiringRowField]
 
 
 class WiringDocument(Document, kw_only=True):
     """`profiles ID --wiring`."""
 
-    command: Literal["profiles"]
+    command: Literal["profiles"] = "profiles"
     id: str
     name: str
-    sections: list[dict[str, Any]]
+    sections: list[WiringSectionField]
 
 
 class CheckDocument(Document, kw_only=True):
     """`profiles --check`: one file of the list."""
 
-    command: Literal["profiles"]
+    command: Literal["profiles"] = "profiles"
     file: str
     faults: list[str]
 
@@ -134,7 +194,7 @@ class CheckDocument(Document, kw_only=True):
 class ProfileBegun(Document, kw_only=True):
     """`profiles new`."""
 
-    command: Literal["profiles"]
+    command: Literal["profiles"] = "profiles"
     id: str
     from_: str = msgspec.field(name="from")
     file: str
@@ -143,17 +203,24 @@ class ProfileBegun(Document, kw_only=True):
 class ProfileFolder(Document, kw_only=True):
     """`profiles path`."""
 
-    command: Literal["profiles"]
+    command: Literal["profiles"] = "profiles"
     folder: str
+
+
+class SimulatedDriveField(DocumentPart):
+    """A simulated drive."""
+
+    profile: str
+    device: int
 
 
 class SimulationReady(Document, kw_only=True):
     """`simulate`: the line is served."""
 
-    command: Literal["simulate"]
-    event: Literal["ready"]
+    command: Literal["simulate"] = "simulate"
+    event: Literal["ready"] = "ready"
     line: str
-    drives: list[dict[str, str | int]]
+    drives: list[SimulatedDriveField]
 
 
 class ServeReady(Document, kw_only=True):
@@ -162,8 +229,8 @@ class ServeReady(Document, kw_only=True):
     `metrics` is the URL of the metrics, `mqtt` that of the broker with the topic.
     """
 
-    command: Literal["serve"]
-    event: Literal["ready"]
+    command: Literal["serve"] = "serve"
+    event: Literal["ready"] = "ready"
     lines: list[str]
     tcp: str | None
     metrics: str | None
@@ -175,20 +242,20 @@ class ServeReady(Document, kw_only=True):
 class PublishReady(Document, kw_only=True):
     """`publish`: publishing has begun; `mqtt` is the URL of the broker with the topic."""
 
-    command: Literal["publish"]
-    event: Literal["ready"]
+    command: Literal["publish"] = "publish"
+    event: Literal["ready"] = "ready"
     mqtt: str
 
 
 class InputsDocument(Document, kw_only=True):
     """`simulate`: inputs of a drive were set or asked for."""
 
-    command: Literal["simulate"]
-    event: Literal["inputs"]
+    command: Literal["simulate"] = "simulate"
+    event: Literal["inputs"] = "inputs"
     text: str
 
 
-class JournalEntryField(msgspec.Struct, kw_only=True):
+class JournalEntryField(DocumentPart):
     """A write, a trip that was seen, or a proof; `read_back` is what the drive held in the end."""
 
     time: str
@@ -208,7 +275,7 @@ class JournalEntryField(msgspec.Struct, kw_only=True):
     of: str
 
 
-class DamagedLineField(msgspec.Struct, kw_only=True):
+class DamagedLineField(DocumentPart):
     """A damaged line of the journal, with its beginning."""
 
     file: str
@@ -219,7 +286,7 @@ class DamagedLineField(msgspec.Struct, kw_only=True):
 class JournalDocument(Document, kw_only=True):
     """`journal`: what was written to drives from here, oldest first."""
 
-    command: Literal["journal"]
+    command: Literal["journal"] = "journal"
     journal: str
     entries: list[JournalEntryField]
     damaged: list[DamagedLineField]
@@ -228,13 +295,13 @@ class JournalDocument(Document, kw_only=True):
 class BundleDocument(Document, kw_only=True):
     """`bundle`: the file, what is in it, and why other files are not."""
 
-    command: Literal["bundle"]
+    command: Literal["bundle"] = "bundle"
     line: str
     file: str
     bytes: int
     files: list[str]
-    missing: dict[str, str]
-    """Reasons by the name of the file."""
-    omitted: dict[str, int]
-    """Names and passwords that were replaced: places by kind."""
+    missing: Annotated[dict[str, str], Meta(description="Reasons by the name of the file.")]
+    omitted: Annotated[
+        dict[str, int], Meta(description="Names and passwords that were replaced: places by kind.")
+    ]
     messages: list[str]

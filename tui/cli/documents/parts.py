@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-import msgspec
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Meta, UnsetType
+
+from .document import DocumentPart
 
 QualityText = Literal["good", "stale", "bad"]
-
-
-class DocumentPart(msgspec.Struct, forbid_unknown_fields=True):
-    """An object whose every field is listed here."""
+OutcomeText = Literal[
+    "done", "sent", "changed", "not-taken", "drive-refused", "refused", "unknown",
+    "not-sent", "held-back", "waits", "would-write",
+]  # fmt: skip
 
 
 class LeftBehindDocument(DocumentPart):
@@ -38,7 +39,7 @@ class ValueField(DocumentPart):
     unsure: bool | UnsetType = UNSET
 
 
-class WatchedValueField(DocumentPart):
+class WatchedValueField(DocumentPart, kw_only=True):
     """One value of a cycle; `time` is when it was read, null where it never was."""
 
     address: int
@@ -48,18 +49,9 @@ class WatchedValueField(DocumentPart):
     text: str
     taught: bool
     quality: QualityText
+    unsure: bool | UnsetType = UNSET
     time: str | None
     error: str | None
-    unsure: bool | UnsetType = UNSET
-
-
-class TimeoutField(DocumentPart):
-    """The communication timeout of a drive; all null if the drive does not report it."""
-
-    seconds: float | None
-    reaction: str | None
-    fault: str | None
-    begun: bool | None
 
 
 class HeardField(DocumentPart):
@@ -72,16 +64,17 @@ class HeardField(DocumentPart):
     damaged: int
     garbage_bytes: int
     exceptions: list[int]
-    functions: list[int]
-    """Functions that came where another was asked for."""
-    others: list[int]
-    """Addresses that answered in the drive's place."""
+    functions: Annotated[
+        list[int], Meta(description="Functions that came where another was asked for.")
+    ]
+    others: Annotated[list[int], Meta(description="Addresses that answered in the drive's place.")]
     framing_errors: int
     parity_errors: int
     breaks: int
     turnaround_ms: float | None
-    latency_timer_ms: int | None
-    """Of the adapter; null if it does not report one."""
+    latency_timer_ms: Annotated[
+        int | None, Meta(description="Of the adapter; null if it does not report one.")
+    ]
 
 
 class FirstWordField(DocumentPart):
@@ -123,10 +116,7 @@ class EditField(DocumentPart):
     new: str
     new_raw: int
     rounded: bool
-    outcome: Literal[
-        "done", "sent", "changed", "not-taken", "drive-refused", "refused", "unknown",
-        "not-sent", "held-back", "waits", "would-write",
-    ]  # fmt: skip
+    outcome: OutcomeText
     held: int | None
     text: str
 

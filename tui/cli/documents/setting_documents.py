@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Literal
 
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Meta, UnsetType
 
-from .drive_documents import Document, DriveDocument
-from .parts import ComparedSettingField, EditField, PlanItemField
+from .document import Document, DocumentPart, DriveDocument
+from .parts import ComparedSettingField, EditField, PlanItemField, ValueField
 
 
 class WriteDocument(DriveDocument, kw_only=True):
     """`write`: the result of each setting."""
 
-    command: Literal["write"]
+    command: Literal["write"] = "write"
     dry_run: bool
     results: list[EditField]
     saved: bool
@@ -25,7 +25,7 @@ class WriteDocument(DriveDocument, kw_only=True):
 class RestoreDocument(DriveDocument, kw_only=True):
     """`restore`: the plan, and the result of each setting."""
 
-    command: Literal["restore"]
+    command: Literal["restore"] = "restore"
     dry_run: bool
     plan: list[PlanItemField]
     same_rating: bool | None
@@ -40,7 +40,7 @@ class RestoreDocument(DriveDocument, kw_only=True):
 class BackupDocument(DriveDocument, kw_only=True):
     """`backup`: the file, and what could not be read."""
 
-    command: Literal["backup"]
+    command: Literal["backup"] = "backup"
     file: str
     parameters: int
     all: bool
@@ -51,7 +51,7 @@ class BackupDocument(DriveDocument, kw_only=True):
 class ReportDocument(DriveDocument, kw_only=True):
     """`report`: the file."""
 
-    command: Literal["report"]
+    command: Literal["report"] = "report"
     file: str
     parameters: int
     absent: dict[str, str]
@@ -61,7 +61,7 @@ class ReportDocument(DriveDocument, kw_only=True):
 class CompareDocument(Document, kw_only=True):
     """`compare`: rows that differ, all with --all."""
 
-    command: Literal["compare"]
+    command: Literal["compare"] = "compare"
     a: str
     b: str
     profile: str
@@ -69,53 +69,133 @@ class CompareDocument(Document, kw_only=True):
     rows: list[ComparedSettingField]
 
 
+class SlotField(DocumentPart):
+    """One slot of a block."""
+
+    slot: str
+    holds: Annotated[int | None, Meta(description="Raw content of the slot; null if not read.")]
+    code: str | None
+    number: str | None
+    address: int | None
+    raw: int | None
+    text: str
+    direct: Annotated[
+        ValueField | None, Meta(description="The same parameter, read directly; null if not read.")
+    ]
+    verdict: str
+    force: str | None
+    brings: str | None
+
+
+class BlockField(DocumentPart):
+    """One block or scanner with its slots."""
+
+    id: str
+    name: str
+    direction: Literal["read", "write"]
+    address: int
+    effective: str
+    trouble: str | None
+    request: Annotated[str | None, Meta(description="The frame that reads or writes it, in hex.")]
+    slots: list[SlotField]
+
+
+class NeighborReadField(DocumentPart):
+    """One read of neighboring parameters; times in microseconds on the wire."""
+
+    address: int
+    count: int
+    codes: list[str]
+    beside: list[str]
+    us: int
+    one_by_one_us: int
+
+
+class MonitoringTimeField(DocumentPart):
+    """Time of a cycle of the monitoring set on the wire, in microseconds."""
+
+    direct: int
+    with_blocks: int
+
+
 class BlocksDocument(DriveDocument, kw_only=True):
     """`block`: slots and what they bring, or why there are none."""
 
-    command: Literal["block"]
-    blocks: list[dict[str, Any]]
-    monitoring_us: dict[str, int] | UnsetType = UNSET
+    command: Literal["block"] = "block"
+    blocks: list[BlockField]
+    monitoring_us: MonitoringTimeField | UnsetType = UNSET
     why: str | UnsetType = UNSET
-    reads: list[dict[str, Any]] | UnsetType = UNSET
+    reads: list[NeighborReadField] | UnsetType = UNSET
+
+
+class SlotChangeField(DocumentPart):
+    """Mapping of one slot before and after."""
+
+    slot: str
+    old: str
+    new: str
 
 
 class BlockChangeDocument(DriveDocument, kw_only=True):
     """`block` with --dry-run: what would be written."""
 
-    command: Literal["block"]
-    dry_run: Literal[True]
-    changes: list[dict[str, str]]
+    command: Literal["block"] = "block"
+    dry_run: Literal[True] = True
+    changes: list[SlotChangeField]
 
 
 class BlockFileDocument(DriveDocument, kw_only=True):
     """`block save`: the file."""
 
-    command: Literal["block"]
+    command: Literal["block"] = "block"
     file: str
     slots: int
+
+
+class ScaleField(DocumentPart):
+    """Value of one count of a raw word."""
+
+    scale: float
+    unit: str | None
+    signed: Annotated[bool | None, Meta(description="Null until a reading shows it.")]
+
+
+class ReadingField(DocumentPart):
+    """A raw word with the value that the drive's display showed."""
+
+    raw: int
+    shown: float
+    unit: str | None
+
+
+class TaughtField(DocumentPart):
+    """Learned scale of one parameter, with its readings."""
+
+    scale: ScaleField | None
+    looks: list[ReadingField]
 
 
 class LessonDocument(DriveDocument, kw_only=True):
     """`teach` with a VALUE: the result of the reading."""
 
-    command: Literal["teach"]
+    command: Literal["teach"] = "teach"
     code: str
     lesson: str
     text: str
-    taught: dict[str, Any] | None
+    taught: ScaleField | None
 
 
 class TaughtDocument(DriveDocument, kw_only=True):
-    """`teach`: what is taught."""
+    """`teach`: learned scales by code."""
 
-    command: Literal["teach"]
-    taught: dict[str, Any]
+    command: Literal["teach"] = "teach"
+    taught: dict[str, TaughtField]
     reference: str | None
 
 
 class TeachChangeDocument(DriveDocument, kw_only=True):
     """`teach` with --forget, --reference or --no-reference."""
 
-    command: Literal["teach"]
+    command: Literal["teach"] = "teach"
     text: str
     reference: str | None

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-import msgspec
+from msgspec import Meta
 
-from .drive_documents import DriveDocument
+from .document import DocumentPart, DriveDocument
 from .parts import HeardField
 
+CertaintyText = Literal["certain", "likely", "possible"]
 
-class MeasuredReads(msgspec.Struct, forbid_unknown_fields=True):
+
+class MeasuredReads(DocumentPart):
     """Counts of the short reads of a drive that `why` makes; shares are those of `asked`."""
 
     asked: int
@@ -20,25 +22,28 @@ class MeasuredReads(msgspec.Struct, forbid_unknown_fields=True):
     late: int
     duplicated: int
     foreign: int
-    unreached: int
-    """Refusals of a gateway that did not reach the drive: exceptions 0A and 0B."""
+    unreached: Annotated[
+        int,
+        Meta(
+            description="Refusals of a gateway that did not reach the drive: exceptions 0A and 0B."
+        ),
+    ]
     behind: int
-    second: int
-    """Second replies to one request, with other values."""
+    second: Annotated[int, Meta(description="Second replies to one request, with other values.")]
     seconds: float
 
 
 class WhyDocument(DriveDocument, kw_only=True):
     """`why`: the rung that fails, `answers` where none does, in a sentence; what to do next."""
 
-    command: Literal["why"]
+    command: Literal["why"] = "why"
     rung: str
-    answers: bool
-    """True if the drive answers and nothing is wrong: status 0, else 3."""
-    certainty: Literal["certain", "likely", "possible"]
-    others: list[str]
-    """Other possible causes; empty if it is certain."""
+    answers: Annotated[
+        bool, Meta(description="True if the drive answers and nothing is wrong: status 0, else 3.")
+    ]
+    certainty: CertaintyText
+    others: Annotated[list[str], Meta(description="Other possible causes; empty if it is certain.")]
     text: str
     next: list[str]
-    seen: HeardField
     measured: MeasuredReads | None
+    seen: HeardField

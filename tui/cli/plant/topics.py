@@ -9,10 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
-from ..shared.output import JSON_SCHEMA, json_text, minute_json
-from ..shared.watch_outputs import cycle_json
+from tui.bus.api import Contact
+
+from ..documents.counter_parts import LastMinuteField
+from ..documents.document import DocumentPart, TimeoutField
+from ..documents.drive_documents import CycleTime
+from ..documents.parts import WatchedValueField
+from ..shared.output import json_text, last_minute_field
+from ..shared.watch_outputs import cycle_document
 from .broker import level
 
 if TYPE_CHECKING:
@@ -25,6 +31,42 @@ LINE_COUNTS = (
     "requests", "replies", "timeouts", "checksum", "wrong", "exceptions", "repeats", "stale",
     "bytes_out", "bytes_in", "busy_seconds",
 )  # fmt: skip
+
+
+class LineMessage(DocumentPart, kw_only=True):
+    """The state of a line, with its counts."""
+
+    schema: Literal[1] = 1
+    line: str
+    state: str
+    reason: str | None
+    counters: dict[str, int | float]
+    last_minute: LastMinuteField
+
+
+class MessageFault(DocumentPart):
+    """The fault that a drive is in."""
+
+    code: str
+    name: str
+
+
+class DriveMessage(DocumentPart, kw_only=True):
+    """The last cycle of a drive, or why there is none."""
+
+    schema: Literal[1] = 1
+    time: str | None
+    line: str
+    device: int
+    profile: str | None
+    timeout: TimeoutField | None
+    values: dict[str, WatchedValueField]
+    state: str | None
+    direction: str | None
+    error: str | None
+    contact: Contact
+    cycle: CycleTime | None
+    fault: MessageFault | None
 
 
 def status_topic(root: str) -> str:
@@ -60,30 +102,46 @@ def line_messages(root: str, lines: Sequence[LineReport]) -> dict[str, str]:
     }
 
 
-def _line(text: str, state: LineState, counters: LineCounters) -> dict[str, Any]:
+def _line(text: str, state: LineState, counters: LineCounters) -> LineMessage:
     counted = asdict(counters)
-    return {
-        "schema": JSON_SCHEMA,
-        "line": text,
-        "state": state.status.value,
-        "reason": state.reason or None,
-        "counters": {name: counted[name] for name in LINE_COUNTS},
-        "last_minute": minute_json(counters.minute, counters.minute.share),
-    }
+    return LineMessage(
+        line=text,
+        state=state.status.value,
+        reason=state.reason or None,
+        counters={name: counted[name] for name in LINE_COUNTS},
+        last_minute=last_minute_field(counters.minute, counters.minute.share),
+    )
 
 
-def _drive(line: LineReport, drive: DriveStatus) -> dict[str, Any]:
+def _drive(line: LineReport, drive: DriveStatus) -> DriveMessage:
     if drive.session is None or drive.cycle is None:
-        profile = drive.session.profile.id if drive.session is not None else None
-        return {
-            "schema": JSON_SCHEMA, "time": None, "line": line.text, "device": drive.device,
-            "profile": profile, "timeout": None, "values": {}, "state": None, "direction": None,
-            "fault": None, "error": drive.error or "No cycle has ended yet.",
-            "contact": drive.contact, "cycle": None,
-        }  # fmt: skip
+        return DriveMessage(
+            time=None,
+            line=line.text,
+            device=drive.device,
+            profile=drive.session.profile.id if drive.session is not None else None,
+            timeout=None,
+            values={},
+            state=None,
+            direction=None,
+            error=drive.error or "No cycle has ended yet.",
+            contact=drive.contact,
+            cycle=None,
+            fault=None,
+        )
+    cycle = cycle_document(line.text, drive.session, drive.cycle)
     fault = drive.cycle.state.fault
-    return {
-        "schema": JSON_SCHEMA,
-        **cycle_json(line.text, drive.session, drive.cycle),
-        "fault": {"code": fault.code, "name": fault.name} if fault is not None else None,
-    }
+    return DriveMessage(
+        time=cycle.time,
+        line=cycle.line,
+        device=cycle.device,
+        profile=cycle.profile,
+        timeout=cycle.timeout or None,
+        values=cycle.values,
+        state=cycle.state,
+        direction=cycle.direction,
+        error=cycle.error,
+        contact=cycle.contact,
+        cycle=cycle.cycle,
+        fault=MessageFault(code=fault.code, name=fault.name) if fault is not None else None,
+    )

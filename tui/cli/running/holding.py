@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.monitor.look import Look
 
-Tell = Callable[[str, int, str], None]
+    from ..documents.drive_documents import HoldEvent
+
+Tell = Callable[["HoldEvent", int, str], None]
 """Is given an event, a device and a sentence."""
 
 HOLD_POLL_INTERVAL = 0.2
@@ -137,5 +139,5 @@ def _exit_by_signal(ending: Ending) -> None:
         raise click.exceptions.Exit(BY_SIGNAL + ending.number)
 
 
-def _complain(line_name: str, _event: str, _device: int, text: str) -> None:
+def _complain(line_name: str, _event: HoldEvent, _device: int, text: str) -> None:
     complain(f"{line_name}: {text}" if line_name else text)

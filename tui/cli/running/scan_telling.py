@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
@@ -16,6 +16,9 @@ from ..shared.say import say, say_over
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
+
+    from ..documents.document import Document
+    from ..documents.drive_documents import Certainty, ScanEndDocument, ScanHitDocument
 
 SETTING_WIDTH = 10
 INDENT = 3 + 2 + SETTING_WIDTH + 2
@@ -31,7 +34,7 @@ class Hit:
     by: str
 
     @property
-    def sure(self) -> str:
+    def sure(self) -> Certainty:
         """Certainty of the identity: identified, likely, unknown."""
         if self.identity.profile is not None:
             return "identified"
@@ -78,25 +81,32 @@ class ScanTelling:
             return
         reported = f"{text} Drives found are polled until this command ends."
         if self._as_json:
+            from ..documents.drive_documents import ScanFamiliesDocument, WatchingFamilyField
+
             rows = [
-                {"profile": f.id, "name": f.name, "timeout": f.code, "sure": f.sure} for f in found
+                WatchingFamilyField(profile=f.id, name=f.name, timeout=f.code, sure=f.sure)
+                for f in found
             ]
-            self._print({"event": "families", "families": rows, "text": reported})
+            self._print(ScanFamiliesDocument(line=self._line, families=rows, text=reported))
         self.note(reported)
 
     def slow(self, settings: Sequence[LineSetting], seconds: float, text: str) -> None:
         """The likely settings are through; those that are left take long."""
         if self._as_json:
-            rows = [_setting_json(setting) for setting in settings]
+            from ..documents.drive_documents import LineSettingField, ScanSlowDocument
+
+            rows = [LineSettingField(baud=item.baud, format=item.format) for item in settings]
             self._print(
-                {"event": "slow", "settings": rows, "seconds": round(seconds, 1), "text": text}
+                ScanSlowDocument(
+                    line=self._line, settings=rows, seconds=round(seconds, 1), text=text
+                )
             )
         self.note(text)
 
     def hit(self, hit: Hit) -> None:
         """A drive has answered."""
         if self._as_json:
-            self._print({"event": "hit", **hit_json(hit)})
+            self._print(hit_document(self._line, hit))
             return
         self._clear()
         where = str(hit.setting) if hit.setting else ""
@@ -107,9 +117,17 @@ class ScanTelling:
     def unclear(self, setting: LineSetting | None, result: ScanResult) -> None:
         """Report bytes from an address that are not an answer."""
         if self._as_json:
-            where = _setting_json(setting)
-            reported = {"event": "unclear", "device": result.device, **where, "text": result.error}
-            self._print(reported)
+            from ..documents.drive_documents import ScanUnclearDocument
+
+            self._print(
+                ScanUnclearDocument(
+                    line=self._line,
+                    device=result.device,
+                    baud=setting.baud if setting else None,
+                    format=setting.format if setting else None,
+                    text=result.error,
+                )
+            )
         twice = "" if result.by == LEFT_ALONE else ", perhaps twice"
         self.note(f"{result.error} The address is taken{twice}.")
 
@@ -127,11 +145,11 @@ class ScanTelling:
         self._clear()
         say(f"drivepanel: {text}", err=True)
 
-    def ended(self, reported: dict[str, Any]) -> None:
-        """The end; its text is said by the one who ends."""
+    def ended(self, document: Callable[[str], ScanEndDocument]) -> None:
+        """Print the document of the end for the LINE, with --json; the caller says its text."""
         self._clear()
         if self._as_json:
-            self._print({"event": "ended", **reported})
+            self._print(document(self._line))
 
     def _clear(self) -> None:
         """Take the line of progress away."""
@@ -140,34 +158,32 @@ class ScanTelling:
             say_over("", last=False)
             self._drawn = ""
 
-    def _print(self, reported: dict[str, Any]) -> None:
+    def _print(self, document: Document) -> None:
         from ..shared.output import print_json
 
         self._clear()
-        print_json({"line": self._line, **reported}, compact=True)
+        print_json(document, compact=True)
 
 
-def hit_json(hit: Hit) -> dict[str, Any]:
-    """A drive that answered, as it appears in JSON."""
-    who = hit.identity
-    return {
-        "device": who.device,
-        **_setting_json(hit.setting),
-        "vendor": who.vendor,
-        "reference": who.reference,
-        "version": who.version,
-        "name": who.name,
-        "profile": who.profile,
-        "candidates": list(who.candidates),
-        "sure": hit.sure,
-        "by": hit.by or None,
-    }
+def hit_document(line_text: str, hit: Hit) -> ScanHitDocument:
+    """A drive that answered."""
+    from ..documents.drive_documents import ScanHitDocument
 
-
-def _setting_json(setting: LineSetting | None) -> dict[str, Any]:
-    if setting is None:
-        return {"baud": None, "format": None}
-    return {"baud": setting.baud, "format": setting.format}
+    who, setting = hit.identity, hit.setting
+    return ScanHitDocument(
+        line=line_text,
+        device=who.device,
+        baud=setting.baud if setting else None,
+        format=setting.format if setting else None,
+        vendor=who.vendor,
+        reference=who.reference,
+        version=who.version,
+        name=who.name,
+        profile=who.profile,
+        candidates=list(who.candidates),
+        sure=hit.sure,
+        by=hit.by or None,
+    )
 
 
 def hit_text(hit: Hit) -> str:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tui.session.connect.addresses import addresses_text
 
 from ..commands.orders import complain
 from ..shared.errors import DONE
-from ..shared.pending_timeouts import timeout_json
+from ..shared.pending_timeouts import timeout_field
 from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.command.first_stop import SentFirst
     from tui.session.drive import DriveSession
+
+    from ..documents.drive_documents import StopDocument
+    from ..documents.parts import FirstWordField
 
 
 class StopTelling:
@@ -24,22 +27,24 @@ class StopTelling:
     def __init__(self, line_text: str, *, as_json: bool) -> None:
         self.as_json = as_json
         self._line_text = line_text
-        self.documents: list[dict[str, Any]] = []
-        self._first: dict[int, list[dict[str, Any]]] = {}
+        self.documents: list[StopDocument] = []
+        self._first: dict[int, list[FirstWordField]] = {}
 
     def sent_first(self, device: int, sent: Sequence[SentFirst], says: str) -> None:
         """Report the word sent before a drive was identified, and its answer."""
+        from ..documents.parts import FirstWordField
+
         for sent_word in sent:
             if not self.as_json:
                 with suppress(OSError):
                     say(f"Device {device}: sent first {sent_word.text}; {says}.")
         self._first[device] = [
-            {
-                "address": sent_word.what.address,
-                "word": sent_word.what.word,
-                "families": [family.id for family in sent_word.what.families],
-                "answer": sent_word.answer,
-            }
+            FirstWordField(
+                address=sent_word.what.address,
+                word=sent_word.what.word,
+                families=[family.id for family in sent_word.what.families],
+                answer=sent_word.answer,
+            )
             for sent_word in sent
         ]
 
@@ -51,7 +56,7 @@ class StopTelling:
             with suppress(OSError):  # a reader that went away must not end the other stops
                 say(text)
         self._keep(session.device, session.profile.id, text, DONE)
-        self.documents[-1]["timeout"] = timeout_json(timeout_now(session))
+        self.documents[-1].timeout = timeout_field(timeout_now(session))
 
     def failed(self, device: int, profile: str | None, text: str, status: int) -> None:
         """A motor is not known to be at standstill."""
@@ -71,10 +76,21 @@ class StopTelling:
         """The control of the one drive was given back to its terminals."""
         if not self.as_json:
             say(text)
-        self.documents[-1]["given_back"] = text
+        self.documents[-1].given_back = text
 
     def _keep(self, device: int, profile: str | None, text: str, status: int) -> None:
-        reported: dict[str, Any] = {"line": self._line_text, "device": device, "profile": profile}
-        if (sent := self._first.get(device)) is not None:
-            reported["first"] = sent
-        self.documents.append({**reported, "stopped": not status, "text": text, "status": status})
+        from msgspec import UNSET
+
+        from ..documents.drive_documents import StopDocument
+
+        self.documents.append(
+            StopDocument(
+                line=self._line_text,
+                device=device,
+                profile=profile,
+                first=self._first.get(device, UNSET),
+                stopped=not status,
+                text=text,
+                status=status,
+            )
+        )

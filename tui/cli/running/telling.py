@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tui.session.reading import with_text
 
 from ..commands.orders import complain
-from ..shared.drive_status import shown_values, values_json
-from ..shared.pending_timeouts import timeout_json
+from ..shared.drive_status import shown_fields, shown_values
+from ..shared.pending_timeouts import timeout_field
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.monitor.snapshot import Snapshot
+
+    from ..documents.drive_documents import PrintedRunEvent
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""
@@ -54,7 +56,7 @@ class RunTelling:
         values = shown_values(self._session.profile, with_text(latest.readings))
         return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
 
-    def report(self, event: str, text: str) -> None:
+    def report(self, event: PrintedRunEvent, text: str) -> None:
         """Print one line, or one JSON object a line, about an event."""
         self._print(event, text)
 
@@ -62,25 +64,33 @@ class RunTelling:
         """Print it on standard error."""
         complain(text)
 
-    def _print(self, event: str, text: str, latest: Snapshot | None = None) -> None:
+    def _print(self, event: PrintedRunEvent, text: str, latest: Snapshot | None = None) -> None:
+        from msgspec.structs import replace
+
         from tui.session.monitor.timeout import timeout_now
 
-        from ..shared.output import document, iso_time, json_text
+        from ..documents.drive_documents import RunDocument
+        from ..shared.output import iso_time, json_text
 
         now = time.time()
         if not self._as_json:
             self._say(f"{time.strftime('%H:%M:%S', time.localtime(now))}  {text}")
             return
-        data: dict[str, Any] = {"time": iso_time(now), "device": self._session.device}
-        data |= {"event": event, "text": text}
-        data["timeout"] = timeout_json(timeout_now(self._session))
+        document = RunDocument(
+            time=iso_time(now),
+            device=self._session.device,
+            event=event,
+            text=text,
+            timeout=timeout_field(timeout_now(self._session)),
+        )
         if latest is not None:
             state = latest.state
-            data |= {
-                "state": None if latest.error else state.kind,
-                "direction": None if latest.error else state.direction,
-                "fault": state.fault.code if state.fault and not latest.error else None,
-                "values": values_json(self._session.profile, with_text(latest.readings)),
-                "error": latest.error or None,
-            }
-        self._say(json_text(document(data)))
+            document = replace(
+                document,
+                state=None if latest.error else state.kind,
+                direction=None if latest.error else state.direction,
+                fault=state.fault.code if state.fault and not latest.error else None,
+                values=shown_fields(self._session.profile, with_text(latest.readings)),
+                error=latest.error or None,
+            )
+        self._say(json_text(document))

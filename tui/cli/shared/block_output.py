@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .say import say
 
@@ -13,6 +12,8 @@ if TYPE_CHECKING:
     from tui.drive.blocks.wire_cost import Stretch
     from tui.session.blocks.mapping import BlockView, Slot
     from tui.session.drive import DriveSession
+
+    from ..documents.setting_documents import BlockField, NeighborReadField, SlotField
 
 HEADINGS = ("Slot", "Mapped to", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
 COLUMNS_LEFT_OUT = ("Wire address", "Number", "Name")
@@ -27,16 +28,17 @@ def show_blocks(
     session: DriveSession, line_text: str, views: list[BlockView], *, as_json: bool
 ) -> None:
     """Print the blocks of a drive, what they bring, and what they spare on the line."""
-    from .output import console, print_json
+    from ..documents.setting_documents import BlocksDocument, MonitoringTimeField
+    from .output import console, drive_fields, print_json
 
     costs = _costs(session, views)
     if as_json:
         print_json(
-            {
-                **_head(session, line_text),
-                "blocks": [view_json(session, view) for view in views],
-                "monitoring_us": {"direct": costs[0], "with_blocks": costs[1]},
-            }
+            BlocksDocument(
+                **drive_fields(line_text, session),
+                blocks=[block_field(session, view) for view in views],
+                monitoring_us=MonitoringTimeField(direct=costs[0], with_blocks=costs[1]),
+            )
         )
         return
     out = console()
@@ -53,12 +55,6 @@ def show_blocks(
         f"The monitoring set takes {costs[0] / 1000:.1f} ms a cycle on the wire read directly,"
         f" {costs[1] / 1000:.1f} ms with this assignment."
     )
-
-
-def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
-    from .output import drive_json
-
-    return drive_json(line_text, session)
 
 
 def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
@@ -82,38 +78,41 @@ def _frame(session: DriveSession, view: BlockView) -> str:
     return hex_text(block_request(session.profile, session.device, inputs, outputs))
 
 
-def view_json(session: DriveSession, view: BlockView) -> dict[str, Any]:
-    """The object of one block."""
+def block_field(session: DriveSession, view: BlockView) -> BlockField:
+    """One block with its slots."""
+    from ..documents.setting_documents import BlockField
+
     block = view.block
-    return {
-        "id": block.id,
-        "name": block.name,
-        "direction": block.direction,
-        "address": block.address,
-        "effective": block.effective,
-        "trouble": view.trouble or None,
-        "request": _frame(session, view) or None,
-        "slots": [_slot_json(slot) for slot in view.slots],
-    }
+    return BlockField(
+        id=block.id,
+        name=block.name,
+        direction=block.direction,
+        address=block.address,
+        effective=block.effective,
+        trouble=view.trouble or None,
+        request=_frame(session, view) or None,
+        slots=[_slot_field(slot) for slot in view.slots],
+    )
 
 
-def _slot_json(slot: Slot) -> dict[str, Any]:
-    from .output import reading_json
+def _slot_field(slot: Slot) -> SlotField:
+    from ..documents.setting_documents import SlotField
+    from .output import value_field
 
     parameter = slot.parameter
-    return {
-        "slot": slot.code,
-        "holds": slot.raw,
-        "code": parameter.code if parameter else None,
-        "number": parameter.number if parameter else None,
-        "address": parameter.address if parameter else None,
-        "raw": slot.word,
-        "text": slot.text,
-        "direct": reading_json(slot.direct) if slot.direct else None,
-        "verdict": str(slot.verdict),
-        "force": str(slot.force) or None,
-        "brings": slot.brings or None,
-    }
+    return SlotField(
+        slot=slot.code,
+        holds=slot.raw,
+        code=parameter.code if parameter else None,
+        number=parameter.number if parameter else None,
+        address=parameter.address if parameter else None,
+        raw=slot.word,
+        text=slot.text,
+        direct=value_field(slot.direct) if slot.direct else None,
+        verdict=str(slot.verdict),
+        force=str(slot.force) or None,
+        brings=slot.brings or None,
+    )
 
 
 def _table(session: DriveSession, view: BlockView, width: int) -> Table:
@@ -193,14 +192,16 @@ def show_neighbors(session: DriveSession, line_text: str, *, as_json: bool) -> N
     from tui.session.blocks.mapping import wire_timing
     from tui.session.monitor.rates import monitoring_codes
 
-    from .output import print_json
+    from ..documents.setting_documents import BlocksDocument
+    from .output import drive_fields, print_json
 
     codes = monitoring_codes(session.profile)
     found = stretches(session.profile, codes, wire_timing(session))
     text = no_blocks(session.profile)
     if as_json:
-        reads = [stretch_json(stretch) for stretch in found]
-        print_json({**_head(session, line_text), "blocks": [], "why": text, "reads": reads})
+        fields = drive_fields(line_text, session)
+        reads = [_neighbor_field(stretch) for stretch in found]
+        print_json(BlocksDocument(**fields, blocks=[], why=text, reads=reads))
         return
     say(text)
     for stretch in found:
@@ -212,13 +213,14 @@ def show_neighbors(session: DriveSession, line_text: str, *, as_json: bool) -> N
         )
 
 
-def stretch_json(stretch: Stretch) -> Mapping[str, Any]:
-    """The object of one read of neighbors."""
-    return {
-        "address": stretch.request.address,
-        "count": stretch.request.count,
-        "codes": list(stretch.brings),
-        "beside": list(stretch.beside),
-        "us": stretch.cost,
-        "one_by_one_us": stretch.alone,
-    }
+def _neighbor_field(stretch: Stretch) -> NeighborReadField:
+    from ..documents.setting_documents import NeighborReadField
+
+    return NeighborReadField(
+        address=stretch.request.address,
+        count=stretch.request.count,
+        codes=list(stretch.brings),
+        beside=list(stretch.beside),
+        us=stretch.cost,
+        one_by_one_us=stretch.alone,
+    )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tui.drive.control_taking import ControlTaking
     from tui.session.drive import DriveSession
+
+    from ..documents.parts import ControlField
 
 TAKE_OPTION = "run --take-control"
 GIVE_BACK_OPTION = "stop --give-back --arm"
@@ -21,17 +23,18 @@ def taking_of(session: DriveSession) -> ControlTaking | None:
     return control_taking(session.profile, session.image.raws)
 
 
-def control_json(session: DriveSession) -> dict[str, Any] | None:
-    """Return the holder of the control and the commands that change it; null if a drive has
-    none."""
+def control_field(session: DriveSession) -> ControlField | None:
+    """Holder of the control, and the commands that change it; None if a drive has no control."""
+    from ..documents.parts import ControlField
+
     found = taking_of(session)
     if found is None:
         return None
-    return {
-        "taken": found.taken,
-        "take": TAKE_OPTION if found.can_take else None,
-        "give_back": GIVE_BACK_OPTION if found.can_give_back else None,
-    }
+    return ControlField(
+        taken=found.taken,
+        take=TAKE_OPTION if found.can_take else None,
+        give_back=GIVE_BACK_OPTION if found.can_give_back else None,
+    )
 
 
 def control_row(session: DriveSession) -> list[tuple[str, str]]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from .output import JSON_SCHEMA, drive_json
-
 if TYPE_CHECKING:
     from tui.session.bundle.subject import DriveDocuments
     from tui.session.counters.watch import CountersNow
     from tui.session.diagnosis.diagnosis import Diagnosis
     from tui.session.drive import DriveSession
+
+    from ..documents.document import Document
 
 
 def drive_documents() -> DriveDocuments:
@@ -22,23 +22,28 @@ def drive_documents() -> DriveDocuments:
 
 
 def _why(line: str, device: int, session: DriveSession | None, found: Diagnosis) -> dict[str, Any]:
-    from ..commands.why import why_json
+    from ..commands.why import why_document
+    from .output import drive_fields
 
-    profile = found.sight.profile
-    about = {
-        "line": line,
-        "device": device,
-        "profile": profile.id if profile is not None else None,
-        "timeout": None,
-    }
-    about |= drive_json(line, session) if session is not None else {}
-    return {"schema": JSON_SCHEMA, "command": "why", **about, **why_json(found)}
+    fields = drive_fields(line, session) if session is not None else None
+    return as_object(why_document(line, device, fields, found))
 
 
 def _counters(
     line: str, session: DriveSession, found: CountersNow, sent: Mapping[str, int]
 ) -> dict[str, Any]:
-    from ..commands.counters import counters_json
+    from ..commands.counters import counters_document
+    from .output import drive_fields
 
-    about = {"schema": JSON_SCHEMA, "command": "counters", **drive_json(line, session)}
-    return {**about, **counters_json(found), "test": dict(sent), "reset": False}
+    fields = drive_fields(line, session)
+    return as_object(
+        counters_document(fields, found, sent["frames"], sent["answered"], reset=False)
+    )
+
+
+def as_object(document: Document) -> dict[str, Any]:
+    """A document as a plain object."""
+    import msgspec
+
+    found: dict[str, Any] = msgspec.to_builtins(document)
+    return found

@@ -6,17 +6,17 @@ import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.patience import patience
 
-from .control import control_json, control_row
+from .control import control_field, control_row
 from .errors import DONE, LINE_TROUBLE
-from .fault_output import FaultFinding, alarm_json, fault_json, fault_rows, find_out
+from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
 from .read_until import read_until
-from .watch_rows import watch_json, watch_text
+from .watch_rows import watch_field, watch_text
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from tui.session.drive_state import DriveState
     from tui.session.reading import Reading
     from tui.session.timeout_report import Timeout, TimeoutWatch
+
+    from ..documents.drive_documents import StatusDocument
+    from ..documents.parts import ValueField
 
 log = logging.getLogger(__name__)
 
@@ -208,47 +211,50 @@ def _refused(session: DriveSession) -> str:
     return state_refusal(session.profile, chart, "forward", raws)
 
 
-def status_json(line_text: str, status: Status) -> dict[str, Any]:
-    """The object that `status --json` prints."""
-    from .output import drive_json
-    from .pending_timeouts import timeout_json
+def status_document(line_text: str, status: Status) -> StatusDocument:
+    """The document of `status`."""
+    from ..documents.drive_documents import StatusDocument
+    from ..documents.parts import LeftBehindDocument, StateField
+    from .output import drive_fields
+    from .pending_timeouts import timeout_field
 
-    state, watch = status.state, status.watch
-    return {
-        **drive_json(line_text, status.session),
-        "timeout": timeout_json(status.timeout),
-        "state": {"id": state.id, "name": state.name, "kind": state.kind},
-        "direction": state.direction,
-        "fault": fault_json(state, status.finding),
-        "alarms": [bit.name for bit in state.alarms],
-        "alarm": alarm_json(status.finding),
-        "commanded_by": status.channels["Commanded by"] or None,
-        "reference_from": status.channels["Reference from"] or None,
-        "switched_by": list(status.switches),
-        "commandable": not status.refused,
-        "why_not": status.refused or None,
-        "control": control_json(status.session),
-        "watch": watch_json(watch),
-        "left_behind": status.left.as_json() if status.left else None,
-        "values": values_json(status.session.profile, status.readings),
-        "unread": list(status.unread),
-    }
+    state = status.state
+    fields = drive_fields(line_text, status.session)
+    fields["timeout"] = timeout_field(status.timeout)
+    return StatusDocument(
+        **fields,
+        state=StateField(id=state.id, name=state.name, kind=state.kind),
+        direction=state.direction,
+        fault=fault_field(state, status.finding),
+        alarms=[bit.name for bit in state.alarms],
+        alarm=alarm_field(status.finding),
+        commanded_by=status.channels["Commanded by"] or None,
+        reference_from=status.channels["Reference from"] or None,
+        switched_by=list(status.switches),
+        commandable=not status.refused,
+        why_not=status.refused or None,
+        control=control_field(status.session),
+        watch=watch_field(status.watch),
+        left_behind=LeftBehindDocument(**status.left.fields()) if status.left else None,
+        values=shown_fields(status.session.profile, status.readings),
+        unread=list(status.unread),
+    )
 
 
-def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
+def shown_fields(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, ValueField | None]:
     """Return the SHOWN values by quantity; null if the family lacks it or it was not read.
 
     Taught scales are stored there by their code.
     """
-    from .output import reading_json
+    from .output import value_field
 
-    values: dict[str, Any] = {}
+    values: dict[str, ValueField | None] = {}
     for quantity in SHOWN_QUANTITIES:
         parameter = profile.quantity(quantity)
         reading = readings.get(parameter.code) if parameter else None
-        values[quantity] = reading_json(reading) if reading is not None else None
+        values[quantity] = value_field(reading) if reading is not None else None
     for code in profile.taught:
-        values[code] = reading_json(readings[code]) if code in readings else None
+        values[code] = value_field(readings[code]) if code in readings else None
     return values
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from .errors import DONE, failure_of
 from .options import Target
-from .output import print_json
+from .output import command_name, print_json
 from .say import say
 
-Work = Callable[[Target], Awaitable[tuple[dict[str, Any], int]]]
-"""Work for one drive: reports its lines, returns its JSON and exit status."""
+if TYPE_CHECKING:
+    from ..documents.document import Document, ErrorDocument
+
+Work = Callable[[Target], Awaitable[tuple["Document", int]]]
+"""Work for one drive: reports its lines, returns its document and exit status."""
 
 
 async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool = True) -> int:
@@ -22,11 +25,12 @@ async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool 
     where there is one drive only.
     """
     targets = target.each()
-    documents: list[dict[str, Any]] = []
+    documents: list[Document] = []
     worst = DONE
     for item in targets:
         if len(targets) > 1 and titled and not as_json:
             say(f"Device {item.device}:")
+        document: Document
         try:
             document, status = await work(item)
         except Exception as error:
@@ -41,18 +45,28 @@ async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool 
     return worst
 
 
-def failed(target: Target, text: str, status: int, line_name: str = "") -> dict[str, Any]:
-    """Report what is wrong with one of several drives; the same as an object.
+def failed(target: Target, text: str, status: int, line_name: str = "") -> ErrorDocument:
+    """Report what is wrong with one of several drives; the same as a document.
 
     `line_name` is what its line is called where there are several.
     """
+    from ..documents.document import ErrorDocument
+
     where = f"{line_name}: " if line_name else ""
     who = "" if text.startswith(f"Device {target.device}") else f"Device {target.device}: "
     say(f"drivepanel: {where}{who}{text}", err=True)
-    return {"line": target.line_text, "device": target.device, "error": text, "status": status}
+    return ErrorDocument(
+        command=command_name(),
+        line=target.line_text,
+        device=target.device,
+        error=text,
+        status=status,
+    )
 
 
-def failed_line(line_text: str, line_name: str, text: str, status: int) -> dict[str, Any]:
-    """Report what is wrong with one of several lines; the same as an object, without a device."""
+def failed_line(line_text: str, line_name: str, text: str, status: int) -> ErrorDocument:
+    """Report what is wrong with one of several lines; the same as a document without a device."""
+    from ..documents.document import ErrorDocument
+
     say(f"drivepanel: {line_name}: {text}", err=True)
-    return {"line": line_text, "error": text, "status": status}
+    return ErrorDocument(command=command_name(), line=line_text, error=text, status=status)

@@ -63,11 +63,14 @@ def plain_errors(*, as_json: bool) -> Iterator[None]:
             raise Failure("Ended by Ctrl-C.", INTERRUPTED) from error
     except click.ClickException as error:
         if as_json:
-            from .output import print_json
+            from ..documents.document import ErrorDocument
+            from .output import command_name, print_json
 
             with suppress(OSError):
-                text = error.format_message()
-                print_json({"error": text, "status": error.exit_code}, compact=True)
+                document = ErrorDocument(
+                    command=command_name(), error=error.format_message(), status=error.exit_code
+                )
+                print_json(document, compact=True)
         raise
 
 

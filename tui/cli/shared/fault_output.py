@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 from tui.drive.fault_reset import reset_codes, reset_follows
 from tui.drive.hints import (
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from tui.drive.profile.schema import Hint
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
+
+    from ..documents.parts import AlarmField, ExcludedPart, FaultField, LookField, ResetField
 
 RESET_BY = "a fault reset"
 
@@ -85,78 +87,86 @@ async def find_out(
     return None
 
 
-def fault_json(state: DriveState, found: FaultFinding | None) -> dict[str, Any] | None:
-    """The fault that a drive is in, with what it points at; null where it is in none."""
+class _AdviceFields(TypedDict):
+    """The fields of an advice."""
+
+    causes: list[str]
+    checks: list[str]
+    ruled_out: list[ExcludedPart]
+    look_at: list[LookField]
+    confidence: str | None
+    source: str | None
+
+
+def fault_field(state: DriveState, found: FaultFinding | None) -> FaultField | None:
+    """The fault that a drive is in, with what it points at; None if it is in no fault."""
+    from ..documents.parts import FaultField
+
     fault = state.fault
     if fault is None and state.kind != "fault":
         return None
-    reported: dict[str, Any] = {
-        "raw": fault.raw if fault else None,
-        "code": fault.code if fault else None,
-        "name": fault.name if fault else None,
-    }
-    hint = found.hint if found is not None and not found.alarm else None
-    return {
-        **reported,
-        **_advice_json(found if hint else None),
-        "look_at": _look_at_json(found) if found and hint else [],
-        "confidence": hint.confidence if hint else None,
-        "source": hint.source if hint else None,
-        "reset": _reset_json(found) if found else None,
-    }
+    return FaultField(
+        raw=fault.raw if fault else None,
+        code=fault.code if fault else None,
+        name=fault.name if fault else None,
+        **_advice_fields(found if found is not None and not found.alarm else None),
+        reset=_reset_field(found) if found else None,
+    )
 
 
-def alarm_json(found: FaultFinding | None) -> dict[str, Any] | None:
-    """The first alarm of a drive without a fault, with what it points at; null where none is."""
+def alarm_field(found: FaultFinding | None) -> AlarmField | None:
+    """The first alarm of a drive without a fault, with what it points at; None without one."""
+    from ..documents.parts import AlarmField
+
     if found is None or not found.alarm:
         return None
-    hint = found.hint
-    return {
-        "name": found.alarm,
-        **_advice_json(found),
-        "look_at": _look_at_json(found) if hint else [],
-        "confidence": hint.confidence if hint else None,
-        "source": hint.source if hint else None,
-    }
+    return AlarmField(name=found.alarm, **_advice_fields(found))
 
 
-def _advice_json(found: FaultFinding | None) -> dict[str, Any]:
+def _advice_fields(found: FaultFinding | None) -> _AdviceFields:
+    from ..documents.parts import ExcludedPart
+
+    hint = found.hint if found is not None else None
     left = found.advice if found is not None else None
     return {
         "causes": list(left.probable) if left else [],
         "checks": list(left.check) if left else [],
         "ruled_out": [
-            {"text": advice.text, "code": advice.code, "reason": advice.reason}
-            for advice in left.excluded
-        ]
-        if left
-        else [],
+            ExcludedPart(text=advice.text, code=advice.code, reason=advice.reason)
+            for advice in (left.excluded if left else ())
+        ],
+        "look_at": _look_fields(found) if found is not None else [],
+        "confidence": hint.confidence if hint else None,
+        "source": hint.source if hint else None,
     }
 
 
-def _look_at_json(found: FaultFinding) -> list[dict[str, Any]]:
-    from .output import reading_json
+def _look_fields(found: FaultFinding) -> list[LookField]:
+    from ..documents.parts import LookField
+    from .output import value_field
 
-    rows = []
+    fields = []
     for look in found.hint.look_at if found.hint else ():
         reading = found.readings.get(look.code)
-        value = reading_json(reading) if reading is not None else None
-        row = {"code": look.code, "name": found.profile[look.code].name, "why": look.why}
-        rows.append({**row, "value": value})
-    return rows
+        value = value_field(reading) if reading is not None else None
+        name = found.profile[look.code].name
+        fields.append(LookField(code=look.code, name=name, why=look.why, value=value))
+    return fields
 
 
-def _reset_json(found: FaultFinding) -> dict[str, Any]:
+def _reset_field(found: FaultFinding) -> ResetField:
     from tui.drive.profile.schema import FaultHelp
 
+    from ..documents.parts import ResetField
+
     help_ = found.hint if isinstance(found.hint, FaultHelp) else None
-    return {
-        "way": help_.reset if help_ else None,
-        "confidence": "practice",
-        "possible_now": found.ready,
-        "wait_s": help_.wait_s if help_ else None,
-        "follows": found.follows(),
-    }
+    return ResetField(
+        way=help_.reset if help_ else None,
+        confidence="practice",
+        possible_now=found.ready,
+        wait_s=help_.wait_s if help_ else None,
+        follows=found.follows(),
+    )
 
 
 def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:

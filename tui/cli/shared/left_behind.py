@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import StateKind
     from tui.session.drive import DriveSession
     from tui.session.starts.record import StartRecord
+
+
+class LeftBehindFields(TypedDict):
+    """The fields that `status` and `lines` print."""
+
+    program: str
+    pid: int
+    exited: bool
+    left_running: bool
+    since: str
+    text: str
 
 
 class LeftBehind(NamedTuple):
@@ -32,8 +43,8 @@ class LeftBehind(NamedTuple):
         """Return the program that started it, and the advice."""
         return f"{self.text[0].upper()}{self.text[1:]}. {self.advice(line_text)}"
 
-    def as_json(self) -> dict[str, Any]:
-        """The object that `status` and `lines` print."""
+    def fields(self) -> LeftBehindFields:
+        """The fields of a document."""
         record = self.record
         return {
             "program": record.program,

@@ -6,10 +6,9 @@ import json
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from datetime import UTC, datetime
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
 
@@ -24,9 +23,9 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.reading import Reading
 
-JSON_SCHEMA = 1
-"""Version of all that `--json` prints: fields are added to it, none is taken out or renamed."""
-JsonObject = Mapping[str, Any]
+    from ..documents.counter_parts import LastMinuteField
+    from ..documents.document import Document, DocumentPart, DriveFields
+    from ..documents.parts import QualityText, ValueField
 
 COLUMNS = {
     "Code": False,
@@ -51,19 +50,22 @@ PIPE_WIDTH = 200
 """Width of a table that goes to a file or another program, in characters."""
 
 
-def print_json(data: JsonObject | Sequence[JsonObject], *, compact: bool = False) -> None:
+def print_json(reported: Document | Sequence[Document], *, compact: bool = False) -> None:
     """Print one document, or a list of them, on standard output, at once."""
-    reported = document(data) if isinstance(data, Mapping) else [document(row) for row in data]
     sys.stdout.write(json_text(reported, compact=compact) + "\n")
     sys.stdout.flush()
 
 
-def document(data: JsonObject) -> dict[str, Any]:
-    """The object with what every one begins with: version of the schema, and the command."""
-    return {"schema": JSON_SCHEMA, "command": _command(), **data}
+def json_text(reported: DocumentPart | Sequence[DocumentPart], *, compact: bool = True) -> str:
+    """JSON that a terminal may be given: every character that could command one is escaped."""
+    import msgspec
+
+    # not msgspec.json: names of files may have bytes that are not UTF-8
+    found = msgspec.to_builtins(reported)
+    return escaped_json(json.dumps(found, ensure_ascii=False, indent=None if compact else 2))
 
 
-def _command() -> str | None:
+def command_name() -> str | None:
     """The name of the command that was called; None where the words name none."""
     context = click.get_current_context(silent=True)
     while context is not None and context.parent is not None and context.parent.parent is not None:
@@ -73,47 +75,45 @@ def _command() -> str | None:
     return context.invoked_subcommand if context.parent is None else context.info_name
 
 
-def json_text(data: object, *, compact: bool = True) -> str:
-    """JSON that a terminal may be given: every character that could command one is escaped."""
-    return escaped_json(json.dumps(data, ensure_ascii=False, indent=None if compact else 2))
-
-
-def readings_json(
-    line: str, session: DriveSession, readings: Mapping[str, Reading]
-) -> dict[str, Any]:
-    """The object that `read` and `watch` print."""
-    values = {code: reading_json(reading) for code, reading in readings.items()}
-    return {**drive_json(line, session), "values": values}
-
-
-def drive_json(line: str, session: DriveSession) -> dict[str, Any]:
-    """Which drive, on which line as it was typed: how every document about one begins."""
+def drive_fields(line: str, session: DriveSession) -> DriveFields:
+    """The first fields of a document about a drive, with its line as it was typed."""
     from tui.session.monitor.timeout import timeout_now
 
-    from .pending_timeouts import timeout_json
+    from .pending_timeouts import timeout_field
 
-    about = {"line": line, "device": session.device, "profile": session.profile.id}
-    return {**about, "timeout": timeout_json(timeout_now(session))}
+    return {
+        "line": line,
+        "device": session.device,
+        "profile": session.profile.id,
+        "timeout": timeout_field(timeout_now(session)),
+    }
 
 
-def reading_json(reading: Reading) -> dict[str, Any]:
+def value_field(reading: Reading) -> ValueField:
     """One value; `raw` and `value` are null where there is none.
 
     The value of a name or a bit word is its raw number. `unsure` is there where no document says
     what so high a raw value means.
     """
+    from msgspec import UNSET
+
+    from ..documents.parts import ValueField
+
+    return ValueField(
+        address=reading.parameter.address,
+        raw=reading.raw,
+        value=_number(reading),
+        unit=reading.unit,
+        text=reading.text,
+        taught=reading.value.taught if reading.value else False,
+        quality=cast("QualityText", str(reading.quality)),
+        unsure=True if reading.value is not None and reading.value.unsure else UNSET,
+    )
+
+
+def _number(reading: Reading) -> int | float | None:
     number = reading.value.number if reading.value else None
-    value = reading.raw if number is None else plain_number(number)
-    return {
-        "address": reading.parameter.address,
-        "raw": reading.raw,
-        "value": value,
-        "unit": reading.unit,
-        "text": reading.text,
-        "taught": reading.value.taught if reading.value else False,
-        "quality": str(reading.quality),
-        **({"unsure": True} if reading.value is not None and reading.value.unsure else {}),
-    }
+    return reading.raw if number is None else plain_number(number)
 
 
 def plain_number(number: Decimal) -> int | float:
@@ -240,6 +240,10 @@ def _remark(reading: Reading) -> str:
     return reading.physical.display if reading.physical else ""
 
 
-def minute_json(minute: LastMinute, share: float | None) -> dict[str, Any]:
+def last_minute_field(minute: LastMinute, share: float | None) -> LastMinuteField:
     """The last minute of a line or a drive, with its share of good replies."""
-    return {"share": None if share is None else round(share, 4), **asdict(minute)}
+    from dataclasses import asdict
+
+    from ..documents.counter_parts import LastMinuteField
+
+    return LastMinuteField(share=None if share is None else round(share, 4), **asdict(minute))

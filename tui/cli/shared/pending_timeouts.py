@@ -7,7 +7,7 @@ import logging
 import shlex
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tui.session.patience import patience
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.timeout_report import Timeout
+
+    from ..documents.document import TimeoutField
 
 TOLD_WITHIN = 3.0
 """Seconds in which a drive reports its timeout at the end of a command, on a quick line."""
@@ -99,21 +101,23 @@ def hold_text(session: DriveSession, line_text: str) -> str:
     return " ".join(words)
 
 
-def timeout_json(found: Timeout) -> dict[str, Any] | None:
+def timeout_field(found: Timeout) -> TimeoutField | None:
     """The object `timeout` of every command: null where a drive has none or it is off.
 
     Its fields are null if the drive does not report it.
     """
+    from ..documents.document import TimeoutField
+
     if not found.known:
-        return {"seconds": None, "reaction": None, "fault": None, "begun": None}
+        return TimeoutField(seconds=None, reaction=None, fault=None, begun=None)
     if (watch := found.watch) is None:
         return None
-    return {
-        "seconds": watch.timeout,
-        "reaction": watch.reaction.name if watch.reaction else None,
-        "fault": watch.fault or None,
-        "begun": watch.active,
-    }
+    return TimeoutField(
+        seconds=watch.timeout,
+        reaction=watch.reaction.name if watch.reaction else None,
+        fault=watch.fault or None,
+        begun=watch.active,
+    )
 
 
 def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> PolledDrive:

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import click
 
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.read.upload import Upload
     from tui.session.settings.applied import Result
+
+    from ..documents.parts import EditField, OutcomeText
 
 _REGISTER = re.compile(r", register \d+")
 OUTAGE = 20.0
@@ -219,30 +221,35 @@ class ResultTelling:
         return Failure(text, INTERRUPTED)
 
 
-def results_json(results: Iterable[Result]) -> list[dict[str, Any]]:
-    """Return the result of each edit."""
+def result_fields(results: Iterable[Result]) -> list[EditField]:
+    """The result of each edit."""
     return [
-        {
-            **edit_json(result.edit),
-            "outcome": result.outcome.name.lower().replace("_", "-"),
-            "held": result.held,
-            "text": result.text,
-        }
+        edit_field(
+            result.edit,
+            outcome=cast("OutcomeText", result.outcome.name.lower().replace("_", "-")),
+            held=result.held,
+            text=result.text,
+        )
         for result in results
     ]
 
 
-def edit_json(edit: Edit) -> dict[str, Any]:
-    """One edit: values with their units as texts, and raw."""
-    return {
-        "code": edit.code,
-        "typed": edit.typed or None,
-        "old": edit.old_text or None,
-        "old_raw": edit.old,
-        "new": edit.text,
-        "new_raw": edit.new,
-        "rounded": edit.rounded,
-    }
+def edit_field(edit: Edit, *, outcome: OutcomeText, held: int | None, text: str) -> EditField:
+    """One edit with its result: values with their units as texts, and raw."""
+    from ..documents.parts import EditField
+
+    return EditField(
+        code=edit.code,
+        typed=edit.typed or None,
+        old=edit.old_text or None,
+        old_raw=edit.old,
+        new=edit.text,
+        new_raw=edit.new,
+        rounded=edit.rounded,
+        outcome=outcome,
+        held=held,
+        text=text,
+    )
 
 
 def status_of_results(results: Iterable[Result]) -> int:

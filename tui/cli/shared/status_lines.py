@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tui.drive.plain import plain
 
 from .drive_status import (
     Status,
     drive_in_a_line,
-    status_json,
+    status_document,
     status_of_drive,
     status_table,
 )
@@ -28,6 +28,8 @@ from .watch_outputs import LabelsNeeded
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
+
+    from ..documents.document import Document
 
 LEFT_INDENT = 5
 STATUS_TITLES = 18
@@ -55,7 +57,7 @@ class LineField:
     """State of one line."""
 
     found: list[Status] = field(default_factory=list)
-    documents: list[dict[str, Any]] = field(default_factory=list)
+    documents: list[Document] = field(default_factory=list)
     worst: int = DONE
 
 
@@ -144,4 +146,4 @@ async def _read_drive(opened: OpenLine, wish: LineWish, drive: Target, reported:
         return
     reported.found.append(status)
     reported.worst = max(reported.worst, status.status)
-    reported.documents.append(status_json(wish.text, status))
+    reported.documents.append(status_document(wish.text, status))

@@ -6,12 +6,19 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from tui.session.reading import Reading, with_text
 
 from .csv_files import CsvFile
-from .output import console, drive_json, iso_time, print_json, readings_json, readings_table
+from .output import (
+    console,
+    drive_fields,
+    iso_time,
+    print_json,
+    readings_table,
+    value_field,
+)
 from .say import say
 
 if TYPE_CHECKING:
@@ -20,6 +27,9 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.monitor.snapshot import Snapshot
+
+    from ..documents.drive_documents import CycleDocument
+    from ..documents.parts import WatchedValueField
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,30 +87,44 @@ class JsonOutput:
 
     def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as an object."""
-        print_json(cycle_json(drive.line_text, drive.session, snapshot), compact=True)
+        print_json(cycle_document(drive.line_text, drive.session, snapshot), compact=True)
         if snapshot.error and drive not in self._in_trouble:
             where = f"{drive.line_name}: " if self._several.lines else ""
             say(f"drivepanel: {where}{snapshot.error}", err=True)
         (self._in_trouble.add if snapshot.error else self._in_trouble.discard)(drive)
 
 
-def cycle_json(line_text: str, session: DriveSession, snapshot: Snapshot) -> dict[str, Any]:
-    """The object of one cycle: values with their own times, state, direction and error."""
-    values = readings_json(line_text, session, with_text(snapshot.readings))["values"]
-    for code, reading in snapshot.readings.items():
-        read_at = snapshot.wall - (snapshot.time - reading.time)
-        values[code]["time"] = None if reading.raw is None else iso_time(read_at)
-        values[code]["error"] = reading.error or None
-    return {
-        "time": iso_time(snapshot.wall),
-        **drive_json(line_text, session),
-        "values": values,
-        "state": known_state(snapshot.state),
-        "direction": snapshot.state.direction,
-        "error": snapshot.error or None,
-        "contact": snapshot.contact,
-        "cycle": {"seconds": round(snapshot.period, 3), "wished": snapshot.wished},
-    }
+def cycle_document(line_text: str, session: DriveSession, snapshot: Snapshot) -> CycleDocument:
+    """One cycle: values with their own times, state, direction and error."""
+    from ..documents.drive_documents import CycleDocument, CycleTime
+
+    return CycleDocument(
+        time=iso_time(snapshot.wall),
+        **drive_fields(line_text, session),
+        values={
+            code: _cycle_value(snapshot, read)
+            for code, read in with_text(snapshot.readings).items()
+        },
+        state=known_state(snapshot.state),
+        direction=snapshot.state.direction,
+        error=snapshot.error or None,
+        contact=snapshot.contact,
+        cycle=CycleTime(seconds=round(snapshot.period, 3), wished=snapshot.wished),
+    )
+
+
+def _cycle_value(snapshot: Snapshot, reading: Reading) -> WatchedValueField:
+    """One value, with the time at which it was read."""
+    from msgspec.structs import asdict
+
+    from ..documents.parts import WatchedValueField
+
+    read_at = snapshot.wall - (snapshot.time - reading.time)
+    return WatchedValueField(
+        **asdict(value_field(reading)),
+        time=None if reading.raw is None else iso_time(read_at),
+        error=reading.error or None,
+    )
 
 
 def known_state(state: DriveState) -> str | None:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tui.session.timeout_report import TimeoutWatch
 
+    from ..documents.parts import OldTimeoutField
 
-def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
+
+def watch_field(watch: TimeoutWatch | None) -> OldTimeoutField | None:
     """A drive's watch over the line; null where it has none."""
+    from ..documents.parts import OldTimeoutField
+
     if watch is None:
         return None
-    return {
-        "timeout_s": watch.timeout,
-        "reaction": watch.reaction.name if watch.reaction else None,
-        "does": watch.reaction.does if watch.reaction else None,
-        "begun": watch.active,
-    }
+    return OldTimeoutField(
+        timeout_s=watch.timeout,
+        reaction=watch.reaction.name if watch.reaction else None,
+        does=watch.reaction.does if watch.reaction else None,
+        begun=watch.active,
+    )
 
 
 def watch_text(watch: TimeoutWatch | None) -> str:

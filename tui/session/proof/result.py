@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from tui.drive.profile.schema import Reaction
 
@@ -71,24 +70,3 @@ class ProofResult:
         if not self.bracket.holds(self.configured):
             return f"{self.configured:g} s are set."
         return f"the fault should be {self.expected_fault or 'none'}."
-
-    def json(self) -> dict[str, Any]:
-        """The figures, in whole ms; null where there is none."""
-        bracket = self.bracket
-        return {
-            "configured_ms": _ms(self.configured),
-            "not_before_ms": _ms(bracket.not_before),
-            "not_after_ms": _ms(bracket.not_after),
-            "measured_ms": _ms(bracket.measured),
-            "reaction": self.reaction.name if self.reaction else None,
-            "seen": self.seen or None,
-            "fault": self.fault or None,
-            "turning": self.turning,
-            "as_set": self.as_set,
-            "text": self.text,
-            "changed": self.changed or None,
-        }
-
-
-def _ms(seconds: float | None) -> int | None:
-    return None if seconds is None else round(1000 * seconds)
