@@ -57,6 +57,24 @@ def test_every_contract_of_the_design_is_in_the_configuration() -> None:
     assert present <= named
 
 
+def test_registered_screens_do_not_know_each_other() -> None:
+    """A screen that the contract does not name is in the same layer as those that it names."""
+    import grimp
+    import tomli
+
+    from tui.screens.keys.screens import PACKAGES
+
+    linter = tomli.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    (layers,) = (c["layers"] for c in linter["contracts"] if "Layers of the screens" in c["name"])
+    packages = {f"tui.screens.{package}" for package in PACKAGES}
+    split = [{name.strip() for name in layer.split("|")} for layer in layers]
+    at = next(at for at, layer in enumerate(split) if layer & packages)
+    assert split[at] <= packages
+    split[at] = packages
+    found = grimp.build_graph("tui").find_illegal_dependencies_for_layers(tuple(split))
+    assert {str(dependency) for dependency in found} == set()
+
+
 @pytest.mark.parametrize(
     ("arguments", "unwanted"),
     [
@@ -106,6 +124,9 @@ def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> No
     assert "tui.screens.connection.screen" in loaded
     assert not loaded & {"pymodbus", "msgspec", "tui.bus.line", "tui.bus.link", "tui.simulator"}
     assert not loaded & {"click", "tui.screens.dialogs.question"}
+    assert "tui.screens.frames.registration" in loaded
+    screens = {name for name in loaded if re.fullmatch(r"tui\.screens\.\w+\.screen", name)}
+    assert screens == {"tui.screens.connection.screen"}
     # to make one takes ten times as long as a named tuple
     assert set(data_classes.split()) <= {"OpenLine"}
     assert not loaded & {

@@ -24,8 +24,10 @@ from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.frame_list import FEW
 from tui.screens.frames.heard import HeardScreen
 from tui.screens.frames.screen import FramesScreen
+from tui.screens.keys.action import OPENING
 from tui.screens.keys.help import HelpScreen
-from tui.screens.keys.table import ACTIONS, EVERYWHERE, OPENING
+from tui.screens.keys.screens import EVERYWHERE
+from tui.screens.keys.table import ACTIONS
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.opening import OpeningScreen

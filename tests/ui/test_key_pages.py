@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tui.screens.keys.action import EVERYWHERE, KEY_NAMES
+from tui.screens.keys.action import KEY_NAMES
 from tui.screens.keys.pages import EVERY_SCREEN, TABLE, key_table, with_tables, write_pages
-from tui.screens.keys.table import ACTIONS, PLACES
+from tui.screens.keys.screens import EVERYWHERE, SCREENS
+from tui.screens.keys.table import ACTIONS
 
 PAGES = sorted((Path(__file__).resolve().parents[2] / "docs" / "screens").glob("*.md"))
 MAKE = "python -m tui.screens.keys.pages docs/screens"
@@ -69,8 +70,10 @@ def test_every_action_is_reported_in_its_words() -> None:
 
 def test_the_screens_stand_by_their_digits() -> None:
     index = (PAGES[0].parent / "README.md").read_text("utf-8")
-    for screen, key, name in PLACES:
-        assert f"| {key} | [{name}]({screen}.md) |" in index
+    for screen in SCREENS:
+        row = f"| {screen.digit or screen.key} | [{screen.title}]({screen.name}.md) |"
+        assert (row in index) is bool(screen.about)
+        assert not screen.about or (PAGES[0].parent / f"{screen.name}.md").is_file()
 
 
 def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:

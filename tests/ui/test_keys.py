@@ -21,17 +21,9 @@ from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.screens.command.control import Control
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.keys.action import Action
-from tui.screens.keys.table import (
-    ACTIONS,
-    CONNECTION,
-    EVERYWHERE,
-    LISTENING,
-    OPENING,
-    PLACES,
-    elsewhere,
-    keys_line,
-)
+from tui.screens.keys.action import CONNECTION, LISTENING, OPENING, Action
+from tui.screens.keys.screens import EVERYWHERE, TABBED
+from tui.screens.keys.table import ACTIONS, elsewhere, keys_line
 from tui.screens.monitor.commands import order_keys
 from tui.screens.parameters.screen import ParametersScreen
 from tui.widgets.palette import ATTENTION
@@ -132,7 +124,7 @@ def test_keys_have_a_meaning_on_their_screen() -> None:
     assert elsewhere("monitor", "Y", "Y") == ""
 
 
-KEY_OF = {name: key for name, key, _ in PLACES}
+KEY_OF = {tab.name: tab.digit for tab in TABBED}
 OVER = {"messages": "m", "wiring": "I"}
 """Screens that are none of the seven places, and their keys."""
 

@@ -15,7 +15,9 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.frames.frame_view import frame_line
-from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, screen_actions
+from tui.screens.keys.action import CONNECTION, MONITOR
+from tui.screens.keys.screens import EVERYWHERE
+from tui.screens.keys.table import keys_line, screen_actions
 from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
 from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_words
 from tui.screens.monitor.commands import order_keys

@@ -11,7 +11,8 @@ from tests.drive.test_fault_reset import BY_TERMINALS
 from tui.drive.fault_reset import not_in_command
 from tui.drive.profile import library
 from tui.screens.frame import TABS, message_lines
-from tui.screens.keys.table import MONITOR, PLACES
+from tui.screens.keys.action import MONITOR
+from tui.screens.keys.screens import TABBED
 from tui.session.command.commander import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
@@ -155,12 +156,12 @@ def test_a_long_name_of_a_line_hides_nothing_that_is_reported_it() -> None:
 
 
 @pytest.mark.parametrize("width", [60, 72, 79, 80, 120])
-@pytest.mark.parametrize("chosen", [place for place, _, _ in PLACES])
+@pytest.mark.parametrize("chosen", [tab.name for tab in TABBED])
 def test_every_tab_has_its_key_and_fits(width: int, chosen: str) -> None:
     marks = {"parameters": ("●12", ATTENTION), "faults": ("■", FAULT), "line": ("■", FAULT)}
     line = tabs_line(TABS, chosen, marks, width)
     assert line.cell_len <= width
-    assert [tab.key for tab in TABS] == [key for _, key, _ in PLACES]
+    assert [tab.key for tab in TABS] == [tab.digit for tab in TABBED]
     for tab in TABS:
         assert f"{tab.key} " in line.plain
     assert any(span.style == CURSOR for span in line.spans)

@@ -26,29 +26,16 @@ from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import FrameView, Said, Tab, message_line, strip_line, tabs_line
 
 from .keys.action import (
-    BLOCKS,
-    CONNECTION,
-    FAULTS,
     FRAMES,
     LISTENING,
-    MONITOR,
-    PARAMETERS,
-    SOURCES,
 )
+from .keys.screens import TABBED
 from .keys.table import once_closed, stop_keys
 
 if TYPE_CHECKING:
     from .app_port import Panel
 
-TABS: tuple[Tab, ...] = (
-    Tab(CONNECTION, "1", "Line", "Line", 2),
-    Tab(MONITOR, "2", "Monitor", "Mon"),
-    Tab(PARAMETERS, "3", "Parameters", "Par", 3),
-    Tab(BLOCKS, "4", "Scanner", "Scan", 3),
-    Tab(FAULTS, "5", "Faults", "Flt", 3),
-    Tab(SOURCES, "6", "Control", "Ctl"),
-    Tab(FRAMES, "7", "Frames", "Frm"),
-)
+TABS = tuple(Tab(tab.name, tab.digit, tab.title, tab.narrow, tab.mark_cells) for tab in TABBED)
 SAID_STYLES: dict[str, Style] = {
     "fault": FAULT,
     "failed": FAULT,

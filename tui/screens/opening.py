@@ -13,7 +13,8 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, STRONG
 
 from .base import PanelScreen
-from .keys.table import OPENING, bindings
+from .keys.action import OPENING
+from .keys.table import bindings
 
 if TYPE_CHECKING:
     from .app_port import Panel

@@ -5,20 +5,15 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-from textual.screen import Screen
-
 from .app_port import Panel
 from .keys.action import (
-    BLOCKS,
     CONNECTION,
-    FAULTS,
-    FRAMES,
     MESSAGES,
     MONITOR,
     PARAMETERS,
-    SOURCES,
     WIRING,
 )
+from .keys.screens import SCREENS
 
 if TYPE_CHECKING:
     from textual.widget import AwaitMount
@@ -29,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class Places(Panel):
-    """Keys 1 to 7, and those that open the drive or the screen they need."""
+    """Keys of the screens, and those that open the drive or the screen they need."""
 
     chosen: DriveConsole | None = None
 
@@ -81,18 +76,19 @@ class Places(Panel):
         """Show a screen of a drive, above its Monitor; callers that need it there await it."""
         from .monitor.screen import MonitorScreen
 
-        if place == SOURCES and not console.session.profile.data.control_sources:
-            self.tell(
-                f"Who commands drive {console.device} is set at its keypad; t takes the control,"
-                " g gives it back, where it has a word for that."
-            )
+        registered = next(screen for screen in SCREENS if screen.name == place)
+        if why := registered.refusal(console):
+            self.tell(why)
             return None
         below = self.screen_stack[1] if len(self.screen_stack) > 1 else None
         if not isinstance(below, MonitorScreen) or below.console is not console:
             self.show_monitor(console)
         while len(self.screen_stack) > 2:
             self.pop_screen()
-        return self.push_screen(_made(place, console)) if place != MONITOR else None
+        if place == MONITOR or registered.create is None:
+            return None
+        shown: AwaitMount = self.push_screen(registered.create(console))
+        return shown
 
     def action_step_drive(self, step: int) -> None:
         """The same screen of the next or previous drive found on the line."""
@@ -198,31 +194,3 @@ class Places(Panel):
             work()
         elif otherwise:
             self.tell(otherwise)
-
-
-def _made(place: str, console: DriveConsole) -> Screen[None]:
-    """A screen of a drive; each is imported when it is first looked at."""
-    if place == PARAMETERS:
-        from .parameters.screen import ParametersScreen
-
-        return ParametersScreen(console)
-    if place == BLOCKS:
-        from .blocks.screen import BlocksScreen
-
-        return BlocksScreen(console)
-    if place == FAULTS:
-        from .faults.screen import FaultsScreen
-
-        return FaultsScreen(console)
-    if place == SOURCES:
-        from .control.screen import ControlSourceScreen
-
-        return ControlSourceScreen(console)
-    if place == WIRING:
-        from .wiring.screen import WiringScreen
-
-        return WiringScreen(console)
-    assert place == FRAMES
-    from .frames.screen import FramesScreen
-
-    return FramesScreen(console)

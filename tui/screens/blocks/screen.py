@@ -25,7 +25,8 @@ from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule, wrapped
 from tui.widgets.lines import Lines
 
-from ..keys.table import BLOCKS, bindings
+from ..keys.action import BLOCKS
+from ..keys.table import bindings
 from .block_keys import BlockKeys
 
 LINES_BESIDE_SLOTS = 16

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.widgets import Input, OptionList
 
-from ..keys.table import CONNECTION, bindings
+from ..keys.action import CONNECTION
+from ..keys.table import bindings
 from .diagnosis_target import DiagnosisTarget
 from .other_settings import OtherSettings
 

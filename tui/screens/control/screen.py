@@ -23,7 +23,8 @@ from tui.widgets.palette import FAINT, PLAIN, STRONG
 from tui.widgets.plain import entry
 
 from ..command.command_keys import OrderKeys
-from ..keys.table import SOURCES, bindings
+from ..keys.action import SOURCES
+from ..keys.table import bindings
 from .proving import ask_to_prove, begin_proof, silence_line, warning_lines
 from .view import change_lines, diagram, left_lines, note_lines, now_lines
 

@@ -21,7 +21,8 @@ from tui.widgets.lines import Lines
 
 from ..command.command_keys import OrderKeys
 from ..dialogs.files import fault_of_new
-from ..keys.table import FAULTS, bindings
+from ..keys.action import FAULTS
+from ..keys.table import bindings
 from .doctor import doctor_lines
 from .doctor_view import DoctorView
 from .view import record_lines, stored_lines, stored_text

@@ -9,7 +9,8 @@ from rich.text import Text
 
 from tui.session.listening.background import HeardLine
 
-from ..keys.table import LISTENING, bindings
+from ..keys.action import LISTENING
+from ..keys.table import bindings
 from .frame_list import FrameListScreen
 from .heard_view import heard_lines
 

@@ -13,7 +13,8 @@ from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
 
 from ..app_port import Panel
-from ..keys.table import FRAMES, bindings
+from ..keys.action import FRAMES
+from ..keys.table import bindings
 from .counter_keys import CounterKeys
 from .frame_list import FrameListScreen
 

@@ -1,8 +1,16 @@
-"""Actions of the panel, and the names of the screens."""
+"""Registration of a screen: its names, its key, its actions."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from tui.drive.reset_text import MAY_START
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
 
 CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
@@ -11,19 +19,6 @@ OPENING = "opening"
 """Monitor while its drive is not known yet."""
 LISTENING = "listening"
 """Frames of others, on a line on which nothing is sent."""
-EVERYWHERE = (
-    CONNECTION,
-    MONITOR,
-    FRAMES,
-    SOURCES,
-    FAULTS,
-    PARAMETERS,
-    BLOCKS,
-    MESSAGES,
-    WIRING,
-    OPENING,
-    LISTENING,
-)
 
 KEY_NAMES = {
     "escape": "Esc",
@@ -49,7 +44,8 @@ class Action(NamedTuple):
     """One or two words for the line of keys; none if it is not in the line."""
     help: str
     """A sentence for the help screen and the palette."""
-    screens: tuple[str, ...] = EVERYWHERE
+    screens: tuple[str, ...] = ()
+    """Names of the screens on which it works; the table of actions fills them in."""
     app: bool = False
     """True for an action of the app, False for one of the screen."""
     first: bool = False
@@ -68,6 +64,48 @@ ActionRow = tuple[str, str, str, str]
 """An action as its table writes it: id, keys, label, help."""
 
 
-def on(screens: tuple[str, ...], *rows: ActionRow) -> tuple[Action, ...]:
-    """The actions of some screens, in the order of their rows."""
-    return tuple(Action(*row, screens=screens) for row in rows)
+def key_rows(*actions: ActionRow) -> tuple[Action, ...]:
+    """The actions of a screen in the order of their rows."""
+    return tuple(Action(*row) for row in actions)
+
+
+ARMING = key_rows(
+    ("arm", "a", "arm", "Arm this drive for 60 s; each key press restarts the 60 s."),
+    ("disarm", "A", "", "Disarm this drive."),
+    ("answer_request", "G", "", "Answer a program that requests this drive. Asks first."),
+)
+"""Actions of every screen that writes to the drive: its class is derived from `ArmingKeys`."""
+RESET_HELP = f"Reset the fault. Needs arming; asks first. {MAY_START}"
+RESET_FAULT = Action("reset", "x", "reset", RESET_HELP)
+TEACH = Action("teach", "L", "", "Learn the scale of a raw value from the drive's display.")
+
+
+class Registration(NamedTuple):
+    """One screen: lists, tabs, keys, help, palette and pages of the docs are made from it.
+
+    Its module imports no screen: the panel starts before most screens are needed.
+    """
+
+    title: str
+    """Its name on the panel. In lowercase it is the name in the code and of the page."""
+    actions: tuple[Action, ...]
+    """Its own actions: in this order they are in the key bar and in the help."""
+    about: str = ""
+    """Its content in a few words, for docs/screens; empty for a screen that has no page."""
+    digit: str = ""
+    """The key that opens it from everywhere; it then has a tab, and `create`."""
+    key: str = ""
+    """The key of the panel that opens it, if it has no digit."""
+    narrow: str = ""
+    """Its name in a tab of a narrow terminal."""
+    mark_cells: int = 0
+    """Cells of its tab for a mark, such as the number of staged values."""
+    create: Callable[[DriveConsole], Screen[None]] | None = None
+    """Creates the screen on a drive; imports it when called."""
+    refusal: Callable[[DriveConsole], str] = lambda console: ""
+    """Reason why it cannot be shown for a drive; empty if it can."""
+
+    @property
+    def name(self) -> str:
+        """The name of the screen in the code."""
+        return self.title.lower()

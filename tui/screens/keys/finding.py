@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .action import Action
-from .table import ACTIONS
+from .table import ACTIONS, screen_actions
 
 NAME_WORDS = 3
 """Words of an action's help that count as its name."""
@@ -52,15 +52,16 @@ class FoundAction:
         return self.action.help.removesuffix(".")
 
 
-def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[FoundAction]:
+def find(query: str, screen: str) -> list[FoundAction]:
     """The actions in which every word of the query occurs, best first; those of `screen` are here.
 
-    Without a query what can be done here is listed, in the order of the table.
+    Without a query what can be done here is listed, in the order of the screen's registration.
     """
     words = query.split()
     found: dict[tuple[str, str], FoundAction] = {}
-    for action in actions:
-        here = screen in action.screens
+    others = (action for action in ACTIONS if screen not in action.screens)
+    for action in (*screen_actions(screen), *others):
+        here = not action.screens or screen in action.screens
         if _is_left_out(action, words, here=here):
             continue
         marks = [_mark(action, screen, word, here=here) for word in words]

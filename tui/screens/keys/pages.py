@@ -7,22 +7,35 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 
 from tui.drive.small_file import read_small_text
 
 from .action import KEY_NAMES, Action
-from .table import ACTIONS
+from .screens import SCREENS
+from .table import APP_ACTIONS, STOP_ACTIONS
 
 EVERY_SCREEN = "every screen"
 """Heading of the app's own actions in a page."""
+INDEX = re.compile(r"(<!-- screens -->\n).*?(<!-- end of screens -->)", re.DOTALL)
 TABLE = re.compile(r"(<!-- keys of (?P<of>[a-z ]+) -->\n).*?(<!-- end of keys -->)", re.DOTALL)
 
 
 def with_tables(text: str) -> str:
-    """A page with its tables of keys as the actions are now."""
+    """A page with the present tables of keys and of screens."""
+    text = INDEX.sub(lambda found: f"{found[1]}{screen_table()}{found[2]}", text)
     return TABLE.sub(lambda found: f"{found[1]}{key_table(found['of'])}{found[3]}", text)
+
+
+def screen_table() -> str:
+    """The screens that have a page, in Markdown, each with the key that opens it."""
+    rows = [
+        f"| {screen.digit or screen.key} | [{screen.title}]({screen.name}.md) | {screen.about} |"
+        for screen in SCREENS
+        if screen.about
+    ]
+    return "\n".join(["", "| key | screen | content |", "|---|---|---|", *rows, ""]) + "\n"
 
 
 def key_table(of: str) -> str:
@@ -46,12 +59,11 @@ def _keys(action: Action) -> str:
     return " or ".join(key_text(key) for key in action.keys.split(","))
 
 
-def _actions(of: str) -> Iterator[Action]:
+def _actions(of: str) -> Sequence[Action]:
     """Those of a screen alone, or those of the app and the stops, which every screen has."""
-    for action in ACTIONS:
-        everywhere = action.app or action.first
-        if everywhere if of == EVERY_SCREEN else not everywhere and of in action.screens:
-            yield action
+    if of == EVERY_SCREEN:
+        return (*STOP_ACTIONS, *APP_ACTIONS)
+    return next(screen.actions for screen in SCREENS if screen.name == of)
 
 
 def write_pages(folder: Path) -> None:

@@ -1,47 +1,25 @@
-"""Every action of the panel in one place: its key, its words, the screens it belongs to.
+"""Every action of the panel: those of the registered screens, and those of every screen.
 
-Bindings, the line of keys, the help screen and the command palette are made from this table.
+Bindings, the key bar, the help screen and the palette are made from this table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from textual.binding import Binding, BindingType
 
 from tui.widgets.drawing import KeyLabel, fitting
 
-from .action import (
-    BLOCKS,
-    CONNECTION,
-    EVERYWHERE,
-    FAULTS,
-    FRAMES,
-    LISTENING,
-    MESSAGES,
-    MONITOR,
-    OPENING,
-    PARAMETERS,
-    SOURCES,
-    WIRING,
-    Action,
-    on,
-)
-from .block_actions import BLOCK_ACTIONS
-from .monitor_actions import COMMAND_ACTIONS, TEACH_ACTIONS, WATCH_ACTIONS
-from .parameter_actions import PARAMETER_ACTIONS
+from .action import Action
+from .screens import EVERYWHERE, SCREENS, TABBED
 
-app_action = partial(Action, app=True)
-stops = partial(Action, app=True, first=True)
+app_action = partial(Action, screens=EVERYWHERE, app=True)
+stops = partial(Action, screens=EVERYWHERE, app=True, first=True)
 STOP = "Stop the open drive on its ramp; all drives if none is open. Not while typing text."
 STOP_ANYWHERE = "Stop the open drive on its ramp, even while typing text."
 STOP_ALL = "Stop all drives of all open lines on their ramps."
-ARM = "Arm this drive for 60 s; each key press restarts the 60 s."
-PROVE = "Test the drive's reaction to a communication loss. Needs arming; asks first."
-GIVE_DRIVE = "Answer a program that requests this drive. Asks first."
-ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
-OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 WHILE_OPENING: tuple[KeyLabel, ...] = (("leave", "Esc", "cancel"), ("help", "?", "help"))
 """Keys that mean something while a line is being opened, besides those that stop."""
 NEVER_DROPPED = ("stop_by_space", "help")
@@ -54,113 +32,26 @@ WHILE_TYPING: tuple[KeyLabel, ...] = (
 """Keys of the whole panel other than letters."""
 STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
 """Labels of the stop key if it stops every drive, or none."""
-WRITE_SOURCE = "Write the chosen configuration. Needs arming and standstill; asks first."
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
 OPEN = "Open a file: compare a parameter set, or propose an assignment."
 FIND = "Find a parameter by code, name, address or value; works on every screen."
 WIRING_HELP = "Show wiring and warnings of the family: pins, line rules, LEDs, commands, errata."
-SCAN_SETTINGS = "Scan at other baud rates and formats, likely ones first. Asks first."
 WHY = "Diagnose why a drive does not answer, and show the next steps."
 HEAR = "Listen to a line with another master; send nothing. Asks first."
 ACCEPT = "Accept the changed line: another adapter, or other drives. Asks first."
 BUNDLE = "Bundle everything about the line in one file, for a colleague."
 EEPROM = "Save the settings to the drive's EEPROM, if it needs that. Needs arming; asks first."
 
-PLACES: tuple[tuple[str, str, str], ...] = (
-    (CONNECTION, "1", "Line"),
-    (MONITOR, "2", "Monitor"),
-    (PARAMETERS, "3", "Parameters"),
-    (BLOCKS, "4", "Scanner"),
-    (FAULTS, "5", "Faults"),
-    (SOURCES, "6", "Control"),
-    (FRAMES, "7", "Frames"),
-)
-"""The screens, each with its key everywhere, and how it is called."""
-
-ACTIONS: tuple[Action, ...] = (
+STOP_ACTIONS: tuple[Action, ...] = (
     stops("stop_by_space", "space", "STOP", STOP),
     stops("stop", "f12", "", STOP_ANYWHERE),
     stops("stop_all", "f9", "", STOP_ALL),
-    *on(
-        (CONNECTION,),
-        ("open_chosen", "enter", "open", "Open the line or drive under the cursor."),
-        ("scan", "s", "search", "Scan the addresses for drives; drives already found stay."),
-        ("addresses", "c", "range", "Change the addresses to scan: 1-31, or 1,3,5-7."),
-        ("type_line", "n", "line", "Type a line to open: serial, TCP, RTU over TCP, simulated."),
-        ("stop_scan", "escape", "", "Leave the field, then end the scan."),
-        ("scan_settings", "", "", SCAN_SETTINGS),
-        ("refresh_lines", "", "", "Update the list of serial ports."),
-        ("disconnect", "", "", "Close the line. Asks first if a drive reacts to that."),
+)
+APP_ACTIONS: tuple[Action, ...] = (
+    *(
+        app_action(f"goto({screen.name!r})", screen.digit, "", f"Go to {screen.title}.")
+        for screen in TABBED
     ),
-    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("arm", "a", "arm", ARM)),
-    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("disarm", "A", "", "Disarm this drive.")),
-    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("answer_request", "G", "", GIVE_DRIVE)),
-    *COMMAND_ACTIONS,
-    *on((SOURCES,), ("prove", "P", "prove", PROVE)),
-    Action("write_chosen", "enter", "write", WRITE_SOURCE, (SOURCES,), bound=False),
-    *on(
-        (FAULTS,),
-        ("open", "enter", "open", "Open the parameter, or show that fault of the history."),
-        ("move(-1)", "up", "", "Move up."),
-        ("move(1)", "down", "", "Move down."),
-        ("other_page", "tab", "trip", "Switch between the fault and the seconds before the trip."),
-        ("move_record(1)", "left", "", "Show older values of the record."),
-        ("move_record(-1)", "right", "", "Show newer values of the record."),
-        ("leave", "escape", "", "Return from the history to the present fault, then to Monitor."),
-    ),
-    *on((SOURCES,), ("leave", "escape", "back", "Go back to Monitor.")),
-    *PARAMETER_ACTIONS,
-    *TEACH_ACTIONS,
-    *BLOCK_ACTIONS,
-    *WATCH_ACTIONS,
-    *on(
-        (FRAMES, LISTENING),
-        ("hold", "h", "hold", "Pause or resume the list."),
-        ("other_page", "tab", "page", "Show the next page: values, bytes, counters or summary."),
-        ("only", "O", "only", "Filter the frames by drive, function or error: 2 read error."),
-        ("find_frame", "j", "", "Find frames by drive, function, error or text."),
-        ("scroll(-1)", "up", "", "Show older frames; pauses the list."),
-        ("scroll(1)", "down", "", "Show newer frames."),
-        ("scroll(-10)", "pageup", "", "Go back ten frames."),
-        ("scroll(10)", "pagedown", "", "Go forward ten frames."),
-    ),
-    *on(
-        (FRAMES,),
-        (
-            "reset_counters",
-            "C",
-            "",
-            "Restart the counts of this panel; other programs keep theirs.",
-        ),
-        (
-            "reset_drive_counters",
-            "Z",
-            "",
-            "Set the drive's own counters to 0. Needs arming; asks first.",
-        ),
-        ("leave", "escape", "back", "Clear the filter, then return to Monitor."),
-    ),
-    *on((LISTENING,), ("leave", "escape", "end", "Clear the filter, then end listening.")),
-    *on(
-        (MESSAGES,),
-        ("scroll(-1)", "up", "", "Show newer messages."),
-        ("scroll(1)", "down", "older", "Show older messages."),
-        ("scroll(-10)", "pageup", "", "Go to newer messages, ten lines."),
-        ("scroll(10)", "pagedown", "", "Go to older messages, ten lines."),
-        ("leave", "escape", "back", "Go back."),
-    ),
-    *on((OPENING,), ("leave", "escape", "Line", "Cancel the opening, or go to Line.")),
-    *on(
-        (WIRING,),
-        ("scroll(-1)", "up", "", "Scroll up one line."),
-        ("scroll(1)", "down", "scroll", "Scroll down one line."),
-        ("page(-1)", "pageup", "", "Scroll up one page."),
-        ("page(1)", "pagedown", "", "Scroll down one page."),
-        ("section(1)", "tab", "next", "Go to the next section."),
-        ("section(-1)", "shift+tab", "", "Go to the previous section."),
-        ("leave", "escape", "back", "Go back."),
-    ),
-    *(app_action(f"goto({place!r})", key, "", f"Go to {name}.") for place, key, name in PLACES),
     app_action("step_drive(-1)", "[", "", "Go to the previous drive on this line."),
     app_action("step_drive(1)", "]", "", "Go to the next drive on this line."),
     app_action("find", "/", "", FIND),
@@ -180,6 +71,23 @@ ACTIONS: tuple[Action, ...] = (
         "quit", "q,ctrl+q", "leave", "Leave the panel. Asks first if that has consequences."
     ),
 )
+"""Actions of every screen, after its own."""
+
+
+def _actions() -> Iterator[Action]:
+    """Yield the actions of all screens, one that several have once."""
+    yield from STOP_ACTIONS
+    where: dict[Action, list[str]] = {}
+    for screen in SCREENS:
+        for action in screen.actions:
+            where.setdefault(action, []).append(screen.name)
+    for action, screens in where.items():
+        yield action._replace(screens=tuple(screens))
+    yield from APP_ACTIONS
+
+
+ACTIONS = tuple(_actions())
+"""Every action of the panel."""
 
 
 def bindings(screen: str | None) -> list[BindingType]:
@@ -194,17 +102,18 @@ def bindings(screen: str | None) -> list[BindingType]:
             tooltip=action.help,
             priority=action.first,
         )
-        for action in ACTIONS
-        if action.bound
-        and action.keys
-        and action.app == (screen is None)
-        and (screen is None or screen in action.screens)
+        for action in ((*STOP_ACTIONS, *APP_ACTIONS) if screen is None else _own(screen))
+        if action.bound and action.keys
     ]
 
 
 def screen_actions(screen: str) -> list[Action]:
     """Actions that work on a screen: the stop first, then the screen's own and the app's."""
-    return [action for action in ACTIONS if screen in action.screens]
+    return [*STOP_ACTIONS, *_own(screen), *APP_ACTIONS]
+
+
+def _own(screen: str) -> tuple[Action, ...]:
+    return next(registered.actions for registered in SCREENS if registered.name == screen)
 
 
 def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
@@ -262,7 +171,7 @@ def elsewhere(screen: str, key: str, character: str | None = None) -> str:
     if not found:
         return ""
     first = found[0]
-    names = {place: f"{name} ({digit})" for place, digit, name in PLACES}
+    names = {tab.name: f"{tab.title} ({tab.digit})" for tab in TABBED}
     where = [names[a.screens[0]] for a in found if a.screens[0] in names] or ["another screen"]
     if len(set(where)) == 1:
         return f"{first.shown} has a meaning on {where[0]}: {first.help}"
@@ -277,30 +186,3 @@ def once_closed(screen: str, key: str, character: str | None = None) -> str:
     if here is not None:
         return f"{here.shown} works once this is closed (Esc): {here.help}"
     return elsewhere(screen, key, character)
-
-
-__all__ = [
-    "ACTIONS",
-    "BLOCKS",
-    "CONNECTION",
-    "EVERYWHERE",
-    "FAULTS",
-    "FRAMES",
-    "LISTENING",
-    "MESSAGES",
-    "MONITOR",
-    "OPENING",
-    "PARAMETERS",
-    "SOURCES",
-    "STOPS_ALL",
-    "STOPS_NOBODY",
-    "WIRING",
-    "Action",
-    "bindings",
-    "keys_line",
-    "once_closed",
-    "opening_line",
-    "screen_actions",
-    "stop_keys",
-    "typing_line",
-]

@@ -14,7 +14,8 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 
 from ..base import PanelScreen
-from ..keys.table import MESSAGES, bindings
+from ..keys.action import MESSAGES
+from ..keys.table import bindings
 
 EVENT_STYLES = {"failed": FAULT, "refused": ALARM, "error": FAULT, "stop": STRONG, "done": PLAIN}
 EVENT_TIME_WIDTH = 10

@@ -20,7 +20,7 @@ from tui.widgets.palette import FAINT
 
 from ..command.command_keys import OrderKeys
 from ..command.control import hindrance
-from ..keys.monitor_actions import COMMAND_ACTIONS
+from .registration import COMMAND_ACTIONS
 from .run_line import STEPS, Purpose, RunLine, limits, proposed, run_lines
 
 OTHER_STOP_KEYS = frozenset(item.keys for item in COMMAND_ACTIONS if item.id.startswith("stop_as("))

@@ -19,7 +19,8 @@ from tui.widgets.palette import STALE
 from tui.widgets.strip import FrameView
 
 from ..frame import SELDOM
-from ..keys.table import MONITOR, bindings, keys_line
+from ..keys.action import MONITOR
+from ..keys.table import bindings, keys_line
 from .arrange import Arrangement, arrange
 from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words, word_parts
 from .commands import order_keys

@@ -27,7 +27,8 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY
 from tui.widgets.plain import Plain
 
-from ..keys.table import PARAMETERS, bindings
+from ..keys.action import PARAMETERS
+from ..keys.table import bindings
 from .set_keys import SetKeys
 from .stage_keys import StageKeys
 from .write_keys import WriteKeys

@@ -17,7 +17,8 @@ from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 
 from ..base import PanelScreen
-from ..keys.table import WIRING, bindings
+from ..keys.action import WIRING
+from ..keys.table import bindings
 from .view import section_tops, trouble_sections, wiring_lines
 
 

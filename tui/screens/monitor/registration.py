@@ -1,10 +1,15 @@
-"""Actions of the Monitor screen: action, keys, label in the line of keys, help."""
+"""Registration of Monitor, and of the screen that is shown until its drive is known."""
 
 from __future__ import annotations
 
-from tui.drive.reset_text import MAY_START
+from typing import TYPE_CHECKING
 
-from .action import FAULTS, MONITOR, PARAMETERS, on
+from ..keys.action import ARMING, RESET_FAULT, TEACH, Registration, key_rows
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
 
 RUN = "Run forward. Opens the run line; Enter runs. Needs arming."
 REVERSE = "Run reverse. Opens the run line; Enter runs. Needs arming."
@@ -19,23 +24,18 @@ HAND_BACK = (
     "Return control to the terminals. Needs arming; asks first."
     " A run command active there starts the motor."
 )
-TEACH = "Learn the scale of a raw value from the drive's display."
 GIVE_BY = "Set the reference by a preset with a learned scale, or end that. Asks first."
 TAKE_OVER = "Take over a motor whose program has ended; sends nothing. Needs arming."
-
-RESET_HELP = f"Reset the fault. Needs arming; asks first. {MAY_START}"
 INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V."
 
 COMMAND_ACTIONS = (
-    *on(
-        (MONITOR,),
+    *key_rows(
         ("run_line('forward')", "r", "run", RUN),
         ("run_line('reverse')", "v", "reverse", REVERSE),
         ("run_line('reference')", "f", "ref", REFER),
     ),
-    *on((MONITOR, FAULTS), ("reset", "x", "reset", RESET_HELP)),
-    *on(
-        (MONITOR,),
+    RESET_FAULT,
+    *key_rows(
         (
             "step_reference(1)",
             "up",
@@ -61,17 +61,46 @@ COMMAND_ACTIONS = (
         ("inputs", "l", "", INPUTS),
     ),
 )
-TEACH_ACTIONS = (
-    *on((MONITOR, PARAMETERS), ("teach", "L", "", TEACH)),
-    *on((MONITOR,), ("reference_by", "R", "", GIVE_BY)),
-)
-WATCH_ACTIONS = on(
-    (MONITOR,),
-    ("next_word", "tab", "", "Show the next status word with all its bits."),
-    ("trend_window(-1)", "<", "", "Shorten the time window of the trend: 10 min, 60 s, 10 s."),
-    ("trend_window(1)", ">", "", "Lengthen the time window of the trend."),
-    ("leave", "escape", "", "Go back to Line."),
-    ("change_rate(1)", "", "", "Poll twice as often."),
-    ("change_rate(-1)", "", "", "Poll half as often."),
-    ("rating", "", "", "Enter the rated current, if the drive gives its current in %."),
+"""Actions that command the drive."""
+
+
+def create_monitor(console: DriveConsole) -> Screen[None]:
+    """Create the screen on a drive."""
+    from .screen import MonitorScreen
+
+    return MonitorScreen(console)
+
+
+REGISTERED = (
+    Registration(
+        title="Monitor",
+        about="the state of the motor; commands",
+        digit="2",
+        narrow="Mon",
+        create=create_monitor,
+        actions=(
+            *ARMING,
+            *COMMAND_ACTIONS,
+            TEACH,
+            *key_rows(
+                ("reference_by", "R", "", GIVE_BY),
+                ("next_word", "tab", "", "Show the next status word with all its bits."),
+                (
+                    "trend_window(-1)",
+                    "<",
+                    "",
+                    "Shorten the time window of the trend: 10 min, 60 s, 10 s.",
+                ),
+                ("trend_window(1)", ">", "", "Lengthen the time window of the trend."),
+                ("leave", "escape", "", "Go back to Line."),
+                ("change_rate(1)", "", "", "Poll twice as often."),
+                ("change_rate(-1)", "", "", "Poll half as often."),
+                ("rating", "", "", "Enter the rated current, if the drive gives its current in %."),
+            ),
+        ),
+    ),
+    Registration(
+        title="Opening",
+        actions=key_rows(("leave", "escape", "Line", "Cancel the opening, or go to Line.")),
+    ),
 )

@@ -1,0 +1,61 @@
+"""Registration of Scanner: what the panel lists, and the keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..keys.action import ARMING, Registration, key_rows
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
+
+
+def create_blocks(console: DriveConsole) -> Screen[None]:
+    """Create the screen on a drive."""
+    from .screen import BlocksScreen
+
+    return BlocksScreen(console)
+
+
+REGISTERED = (
+    Registration(
+        title="Scanner",
+        about="indirect blocks, or the communication scanner",
+        digit="4",
+        narrow="Scan",
+        mark_cells=3,
+        create=create_blocks,
+        actions=(
+            *ARMING,
+            *key_rows(
+                ("pick", "enter", "pick", "Choose the parameter that the slot is mapped to."),
+                ("best", "p", "best", "Propose the assignment that saves most time for Monitor."),
+                (
+                    "write",
+                    "w",
+                    "write",
+                    "Write the proposed slots. Needs arming and standstill; asks first.",
+                ),
+                ("other_table", "tab,left,right", "", "Switch between inputs and outputs."),
+                ("move(-1)", "up", "", "Move up one slot."),
+                ("move(1)", "down", "", "Move down one slot."),
+                ("shift(1)", "+", "", "Propose to move the mapping one slot down."),
+                ("shift(-1)", "-", "", "Propose to move the mapping one slot up."),
+                ("clear", "delete", "", "Propose to clear the slot."),
+                ("undo", "u,U", "", "Discard the proposals."),
+                ("verify", "V", "", "Compare each slot with direct reads."),
+                ("factory", "", "", "Propose the factory assignment."),
+                (
+                    "exchange",
+                    "X",
+                    "",
+                    "Write values through the output slots. Needs arming; asks first.",
+                ),
+                ("words", "", "", "Choose the four user words."),
+                ("leave", "escape", "", "Go back to Monitor."),
+            ),
+        ),
+    ),
+)

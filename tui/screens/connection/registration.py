@@ -1,0 +1,32 @@
+"""Registration of Line: what the panel lists, and the keys."""
+
+from __future__ import annotations
+
+from ..keys.action import Registration, key_rows
+
+SCAN_SETTINGS = "Scan at other baud rates and formats, likely ones first. Asks first."
+
+REGISTERED = (
+    Registration(
+        title="Line",
+        about="lines, and the drives that answer on one",
+        digit="1",
+        narrow="Line",
+        mark_cells=2,
+        actions=key_rows(
+            ("open_chosen", "enter", "open", "Open the line or drive under the cursor."),
+            ("scan", "s", "search", "Scan the addresses for drives; drives already found stay."),
+            ("addresses", "c", "range", "Change the addresses to scan: 1-31, or 1,3,5-7."),
+            (
+                "type_line",
+                "n",
+                "line",
+                "Type a line to open: serial, TCP, RTU over TCP, simulated.",
+            ),
+            ("stop_scan", "escape", "", "Leave the field, then end the scan."),
+            ("scan_settings", "", "", SCAN_SETTINGS),
+            ("refresh_lines", "", "", "Update the list of serial ports."),
+            ("disconnect", "", "", "Close the line. Asks first if a drive reacts to that."),
+        ),
+    ),
+)

@@ -1,0 +1,50 @@
+"""Registration of Control: what the panel lists, the keys, and for which drives it is shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..keys.action import ARMING, Action, Registration, key_rows
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
+
+PROVE = "Test the drive's reaction to a communication loss. Needs arming; asks first."
+WRITE_SOURCE = "Write the chosen configuration. Needs arming and standstill; asks first."
+
+
+def create_control(console: DriveConsole) -> Screen[None]:
+    """Create the screen on a drive."""
+    from .screen import ControlSourceScreen
+
+    return ControlSourceScreen(console)
+
+
+def no_sources(console: DriveConsole) -> str:
+    """The reason why a drive has no such screen; empty if it has one."""
+    if console.session.profile.data.control_sources:
+        return ""
+    return (
+        f"Who commands drive {console.device} is set at its keypad; t takes the control,"
+        " g gives it back, where it has a word for that."
+    )
+
+
+REGISTERED = (
+    Registration(
+        title="Control",
+        about="the control source, and the reaction to a communication loss",
+        digit="6",
+        narrow="Ctl",
+        create=create_control,
+        refusal=no_sources,
+        actions=(
+            *ARMING,
+            *key_rows(("prove", "P", "prove", PROVE)),
+            Action("write_chosen", "enter", "write", WRITE_SOURCE, bound=False),
+            *key_rows(("leave", "escape", "back", "Go back to Monitor.")),
+        ),
+    ),
+)

@@ -1,0 +1,55 @@
+"""Registration of Faults: what the panel lists, and the keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..keys.action import ARMING, RESET_FAULT, Registration, key_rows
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
+
+
+def create_faults(console: DriveConsole) -> Screen[None]:
+    """Create the screen on a drive."""
+    from .screen import FaultsScreen
+
+    return FaultsScreen(console)
+
+
+REGISTERED = (
+    Registration(
+        title="Faults",
+        about="the present fault with its causes and remedies, the history,"
+        " the seconds before a trip",
+        digit="5",
+        narrow="Flt",
+        mark_cells=3,
+        create=create_faults,
+        actions=(
+            *ARMING,
+            RESET_FAULT,
+            *key_rows(
+                ("open", "enter", "open", "Open the parameter, or show that fault of the history."),
+                ("move(-1)", "up", "", "Move up."),
+                ("move(1)", "down", "", "Move down."),
+                (
+                    "other_page",
+                    "tab",
+                    "trip",
+                    "Switch between the fault and the seconds before the trip.",
+                ),
+                ("move_record(1)", "left", "", "Show older values of the record."),
+                ("move_record(-1)", "right", "", "Show newer values of the record."),
+                (
+                    "leave",
+                    "escape",
+                    "",
+                    "Return from the history to the present fault, then to Monitor.",
+                ),
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,70 @@
+"""Registration of Frames, and of its mode for a line that is only monitored."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..keys.action import Registration, key_rows
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
+
+
+LISTING = key_rows(
+    ("hold", "h", "hold", "Pause or resume the list."),
+    ("other_page", "tab", "page", "Show the next page: values, bytes, counters or summary."),
+    ("only", "O", "only", "Filter the frames by drive, function or error: 2 read error."),
+    ("find_frame", "j", "", "Find frames by drive, function, error or text."),
+    ("scroll(-1)", "up", "", "Show older frames; pauses the list."),
+    ("scroll(1)", "down", "", "Show newer frames."),
+    ("scroll(-10)", "pageup", "", "Go back ten frames."),
+    ("scroll(10)", "pagedown", "", "Go forward ten frames."),
+)
+"""Actions of both."""
+
+
+def create_frames(console: DriveConsole) -> Screen[None]:
+    """Create the screen on a drive."""
+    from .screen import FramesScreen
+
+    return FramesScreen(console)
+
+
+REGISTERED = (
+    Registration(
+        title="Frames",
+        about="requests and replies on the line",
+        digit="7",
+        narrow="Frm",
+        create=create_frames,
+        actions=(
+            *LISTING,
+            *key_rows(
+                (
+                    "reset_counters",
+                    "C",
+                    "",
+                    "Restart the counts of this panel; other programs keep theirs.",
+                ),
+                (
+                    "reset_drive_counters",
+                    "Z",
+                    "",
+                    "Set the drive's own counters to 0. Needs arming; asks first.",
+                ),
+                ("leave", "escape", "back", "Clear the filter, then return to Monitor."),
+            ),
+        ),
+    ),
+    Registration(
+        title="Listening",
+        about="the traffic of other masters and their drives; a mode of Frames",
+        key="H",
+        actions=(
+            *LISTING,
+            *key_rows(("leave", "escape", "end", "Clear the filter, then end listening.")),
+        ),
+    ),
+)
