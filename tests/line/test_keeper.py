@@ -357,7 +357,7 @@ def test_the_next_keeper_polls_for_the_programs_of_a_killed_one() -> None:
             times: list[float] = []
 
             def note(snapshot: Snapshot) -> None:
-                if monitor._steady.came is not None and not snapshot.error:
+                if monitor._steady.received is not None and not snapshot.error:
                     times.append(snapshot.readings["ETA"].time)
 
             monitor.listen(note)

@@ -256,7 +256,8 @@ class Monitor:
         self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
     ) -> dict[str, Reading]:
         """All readings of one cycle; the state's details as soon as it changes."""
-        found = await self._steady.read((*rates.fast, *turn))
+        codes, received = (*rates.fast, *turn), self._steady.received
+        found = await self.reader.read(codes, priority=Priority.POLL, polled=received)
         self._using = self.reader.using
         if set(rates.changing) <= set(turn):
             return found

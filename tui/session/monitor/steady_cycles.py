@@ -1,11 +1,10 @@
-"""The cycles of a monitor that the process which holds the line reads for it."""
+"""Cycles of a monitor that the keeper of the line reads for it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from tui.bus.api import Priority
 from tui.bus.errors import RequestRefused
 from tui.bus.poll_plan import (
     MOST_READS,
@@ -22,14 +21,14 @@ from ..read.rotation import Rotation
 from ..reading import Reading
 
 PATIENCE, PATIENCE_CYCLES = 5.0, 3
-"""Seconds, and cycles, without one from there after which the drive is read from here again."""
+"""Seconds, and cycles, without a cycle from the keeper after which this program reads the drive."""
 
 LONGEST_STEADY = 10.0
-"""Seconds of a period up to which cycles are read there: the way between costs longer ones nothing,
-and from here each can be left out at the last moment."""
+"""Longest period in seconds of cycles that the keeper reads. For longer ones a message a request
+costs nothing, and this program can skip each at the last moment."""
 
 Turns = tuple[tuple[str, ...], ...]
-"""The seldom values of each cycle, until all had their turn."""
+"""The slow values of each cycle, until each has been read once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +41,9 @@ class SteadyPlan:
 
 
 class SteadyCycles:
-    """Has the line's holder read a drive while each cycle is like the one before.
+    """Has the keeper read a drive while the cycles stay the same.
 
-    A program that holds its line itself reads from here: nothing is between. Lives in the line's
-    loop.
+    A program that holds its line itself reads the drive itself. Used in the line's loop only.
     """
 
     def __init__(self, session: DriveSession, reader: Reader) -> None:
@@ -53,71 +51,63 @@ class SteadyCycles:
         self._device = session.device
         self._clock = session.clock
         self._reader = reader
-        self._of: SteadyPlan | None = None
+        self._plan: SteadyPlan | None = None
         self._turns: Turns = ()
         self._reads: Sequence[PlannedTurn] = ()
         self._shift = self._next = 0
-        """The turn with which the subscription has begun, and the one after the last that came."""
+        """The first turn of the subscription, and the turn after the last one received."""
         self._subscription: Subscription | None = None
         self._unfit = False
-        """True if this plan is not one to be carried out there."""
-        self.came: PolledTurn | None = None
-        """The cycle that has come; None if this one is to be read from here."""
+        """True if the keeper cannot carry out this plan."""
+        self.received: PolledTurn | None = None
+        """The cycle received from the keeper; None if this program reads the cycle."""
 
     def turn(self, due: Rotation, seldom: tuple[str, ...]) -> tuple[str, ...]:
-        """The seldom values of the present cycle."""
-        if self.came is None or due.owes:
+        """The slow values of the current cycle."""
+        if self.received is None or due.owes:
             return due.turn(seldom, self._reader.groups)
-        index = (self.came.turn + self._shift) % len(self._turns)
+        index = (self.received.turn + self._shift) % len(self._turns)
         self._next = index + 1
         return due.set_turn(self._turns[index])
 
-    async def read(self, codes: Iterable[str]) -> dict[str, Reading]:
-        """The readings of the present cycle; what did not come from there is read from here."""
-        self._reader.polled = self.came
-        try:
-            return await self._reader.read(codes, priority=Priority.POLL)
-        finally:
-            self._reader.polled = None
-
     @property
     def begun(self) -> float:
-        """When the present cycle begins, or was begun (monotonic)."""
-        came = self.came
-        return self._clock.monotonic() if came is None else self._clock.line_time(came.begun)
+        """Start of the current cycle, in seconds of the monotonic clock."""
+        cycle = self.received
+        return self._clock.monotonic() if cycle is None else self._clock.line_time(cycle.begun)
 
     def ended(self, readings: Iterable[Reading]) -> float:
-        """When the present cycle ended: with its last reply, if that was read there (monotonic)."""
-        if self.came is None:
+        """End of the current cycle: with its last reply, if the keeper read it (monotonic)."""
+        if self.received is None:
             return self._clock.monotonic()
         times = (reading.time for reading in readings)
-        return max((self._clock.line_time(self.came.ended), *times))
+        return max((self._clock.line_time(self.received.ended), *times))
 
     async def next(self, plan: SteadyPlan, due: Rotation, at: float) -> bool:
-        """Wait for a cycle from there; False if the next one is to be read from here then."""
-        last, self.came = self.came, None
+        """Wait for a cycle of the keeper; False if this program must read the next one."""
+        last, self.received = self.received, None
         if (carrier := self._line.pace.carrier) is None:
             self.end()
             return False
-        if self._unfit and plan == self._of:
+        if self._unfit and plan == self._plan:
             return False
         stays = self._subscription is not None and not self._subscription.ended
-        if not stays or plan != self._of or (last is not None and last.differs):
+        if not stays or plan != self._plan or (last is not None and last.differs):
             self._follow(carrier, plan, due.turns(plan.seldom, self._reader.groups), at)
         if self._subscription is None:
             return False
         wait = max(PATIENCE, PATIENCE_CYCLES * plan.period * self._line.pace.stretch)
-        self.came = await self._subscription.next(wait)
-        if self.came is None:
+        self.received = await self._subscription.next(wait)
+        if self.received is None:
             self.end()
-        return self.came is not None
+        return self.received is not None
 
     def _follow(self, carrier: PollCarrier, plan: SteadyPlan, turns: Turns, at: float) -> None:
-        """Have this plan carried out there, if it is not yet."""
+        """Have the keeper carry out this plan, if it does not yet."""
         reads = [self._reader.planned((*plan.fast, *turn)) for turn in turns]
         shift = self._next % len(turns)
-        subscription, before = self._subscription, self._of
-        self._of, self._turns = plan, turns
+        subscription, before = self._subscription, self._plan
+        self._plan, self._turns = plan, turns
         same = before is not None and (reads, plan.period) == (self._reads, before.period)
         if same and subscription is not None and not subscription.ended:
             return
@@ -127,16 +117,16 @@ class SteadyCycles:
         if not fits:
             return
         self._reads, self._shift = reads, shift
-        # the seldom values go on with the turn after the last one
+        # slow values continue with the turn after the last one, so that none is read twice
         wanted = PollPlan(self._device, (*reads[shift:], *reads[:shift]), plan.period, at)
         try:
             self._subscription = carrier.subscribe(wanted)
         except RequestRefused:
-            self._unfit = True  # each read tells why
+            self._unfit = True  # a read of this program reports the reason
 
     def end(self) -> None:
-        """Have nothing read there any more."""
-        self.came = None
+        """End the subscription."""
+        self.received = None
         if self._subscription is not None:
             self._subscription.end()
             self._subscription = None

@@ -39,9 +39,9 @@ class Reader:
     using: str = ""
     """Name of the block or scanner that the last poll read, if it read one."""
     max_age: float = 0.0
-    """A poll takes what was read for another program up to so many seconds ago."""
-    polled: PolledTurn | None = None
-    """A poll takes the replies that the process which holds the line has read for it."""
+    """Age in seconds up to which a poll uses what was read for another program."""
+    _polled: PolledTurn | None = None
+    """Replies that the keeper has read for the current poll."""
     _met: set[str] = field(default_factory=set)
     """Unconfirmed words that this drive has answered."""
     _plans: KeptPlans = field(init=False)
@@ -67,9 +67,22 @@ class Reader:
         return self.session.profile
 
     async def read(
-        self, codes: Iterable[str], *, priority: Priority = Priority.OPERATOR_READ
+        self,
+        codes: Iterable[str],
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+        polled: PolledTurn | None = None,
     ) -> dict[str, Reading]:
-        """Readings by code, in the order asked for."""
+        """Return readings by code, in the order of `codes`.
+
+        A poll uses the replies that the keeper has read for it (`polled`), and reads the rest.
+        """
+        if polled is not None:
+            self._polled = polled
+            try:
+                return await self.read(codes, priority=priority)
+            finally:
+                self._polled = None
         wanted = list(dict.fromkeys(codes))
         await self._read_sources(wanted, priority)
         found = await self._take(frozenset(wanted), priority)
@@ -263,9 +276,9 @@ class Reader:
 
     def _polled_reply(self, request: ReadRequest, priority: Priority, since: float) -> Reply | None:
         """Return the reply already read for this poll: nothing older. Raises the line's errors."""
-        if self.polled is None or priority < Priority.POLL:
+        if self._polled is None or priority < Priority.POLL:
             return None
-        return self.polled.take(planned_read(request), self._known_since(request, since))
+        return self._polled.take(planned_read(request), self._known_since(request, since))
 
     def _known_since(self, request: ReadRequest, since: float) -> float:
         """When what a request reads was last read or written, or `since` if that is later."""
