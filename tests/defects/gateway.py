@@ -42,7 +42,7 @@ DEFECTS = (
     ),
     Defect(
         "host-floods-stops",
-        "tui/session/gateway/host_turns.py",
+        "tui/session/gateway/line.py",
         "DECIDING: 1, STOPPING: 1}",
         "DECIDING: 1000, STOPPING: 1000}",
         "Stops that one host repeats delay the stop of another.",
@@ -50,7 +50,7 @@ DEFECTS = (
     ),
     Defect(
         "stops-wait-for-reads",
-        "tui/session/gateway/host_turns.py",
+        "tui/session/gateway/line.py",
         "self._shared(host, DECIDING, codes, read)",
         "self._shared(host, STOPPING, codes, read)",
         "A stop waits for the reads before all other stops of its host.",
@@ -58,7 +58,7 @@ DEFECTS = (
     ),
     Defect(
         "host-floods-reads",
-        "tui/session/gateway/host_turns.py",
+        "tui/session/gateway/line.py",
         "READS_EACH_HOST = 8",
         "READS_EACH_HOST = 1000",
         "The reads of one host delay those of another.",
@@ -318,7 +318,7 @@ DEFECTS = (
     ),
     Defect(
         "foreign-stop-voids-what-follows-it",
-        "tui/session/gateway/in_turn.py",
+        "tui/session/gateway/line.py",
         "for pending_write in self._pending[at:]:",
         "for pending_write in self._pending[at : at + 1]:",
         "A client's requests after its stop are refused as if they came before it.",

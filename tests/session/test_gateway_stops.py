@@ -21,8 +21,7 @@ from tui.bus.schedule import back_to_back
 from tui.drive.profile import library
 from tui.session.gateway.drives import CHART_READ_EACH
 from tui.session.gateway.gateway import Gateway
-from tui.session.gateway.host_turns import HostTurns
-from tui.session.gateway.line import GatewayLine
+from tui.session.gateway.line import GatewayLine, HostTurns
 from tui.session.gateway.rules import GatewayRules, unit_map
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation

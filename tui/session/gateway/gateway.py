@@ -40,8 +40,7 @@ from tui.bus.gateway.talk import TcpClient
 from tui.drive.errors import DriveError
 
 from ..command.stop_report import StopSummary
-from .in_turn import PendingWrite
-from .line import GatewayLine
+from .line import GatewayLine, PendingWrite
 from .rules import GatewayRules
 from .writes import GatewayWrite
 

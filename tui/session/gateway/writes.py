@@ -42,8 +42,7 @@ from ..drive import DriveSession
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import parameter_entry
-from .in_turn import PendingWrite
-from .line import GatewayLine
+from .line import GatewayLine, PendingWrite
 from .rules import GatewayRules
 
 log = logging.getLogger(__name__)
