@@ -8,7 +8,7 @@ from tui.bus.fake import FakeLine
 from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
-from tui.session.sharing.leaving import peer_effect_text
+from tui.session.sharing.handover import peer_effect_text
 from tui.session.starts.keeper import StartKeeper
 
 WATCH = Program("watch", "watch", 78)

@@ -75,7 +75,7 @@ class Leaving(Panel):
     ) -> list[str]:
         """Which motors run, what each drive does left alone, and what others on its line do."""
         from tui.session.monitor.timeout import left_alone_text
-        from tui.session.sharing.leaving import peer_effect_text
+        from tui.session.sharing.handover import peer_effect_text
 
         reported = []
         for session in sessions:

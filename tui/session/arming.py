@@ -41,7 +41,8 @@ class Arming:
         self._clock = clock
         self._until: float | None = None
         self._span = ARMED_FOR
-        self._why = ""
+        self.why_disarmed = ""
+        """Why arming ended without a command; empty if it did not."""
         self.times = 0
         """Number of times it was armed."""
         self.trouble: Callable[[], str] = str
@@ -62,7 +63,7 @@ class Arming:
             raise CommandedElsewhere(why)
         if self._device is not None:
             self._line.facts.leases.arm(self._device, _finite(seconds), self._care())
-        self._span, self._why = seconds, ""
+        self._span, self.why_disarmed = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds
 
@@ -76,7 +77,7 @@ class Arming:
     def disarm(self, why: str = "") -> None:
         """Let no write through any more."""
         self._until = None
-        self._why = why
+        self.why_disarmed = why
         if self._device is not None:
             self._line.facts.release(self._device)
             self._line.facts.leases.disarm(self._device)
@@ -113,14 +114,9 @@ class Arming:
         """True if writes are let through now."""
         return self.armed_for is not None
 
-    @property
-    def why_disarmed(self) -> str:
-        """Why arming ended without a command, or nothing."""
-        return self._why
-
     def refusal(self) -> str:
         """Why nothing may be written now; empty where it may."""
-        return "" if self.armed else self._why or "Not armed. Press a to arm this drive."
+        return "" if self.armed else self.why_disarmed or "Not armed. Press a to arm this drive."
 
 
 def _finite(seconds: float) -> float | None:

@@ -112,25 +112,21 @@ class CommandHistory:
 
     def __init__(self, session: DriveSession) -> None:
         self._session = session
-        self._wanted: Reference | None = None
+        self.wanted: Reference | None = None
+        """The reference that was given last; None after the drive has reset it."""
         self.reference_text = ""
         """The result of the last reference that was given, for a person."""
         self._written: dict[str, int] = {}
         self._written_under = 0
         """The count of stops under which they were written."""
 
-    @property
-    def wanted(self) -> Reference | None:
-        """The reference that was given last."""
-        return self._wanted
-
     def note_reference(self, reference: Reference, text: str) -> None:
         """A reference was given; `text` is the result, for a person."""
-        self._wanted, self.reference_text = reference, text
+        self.wanted, self.reference_text = reference, text
 
     def forget_reference(self) -> None:
         """The drive has put it back: nothing may send it again."""
-        self._wanted = None
+        self.wanted = None
 
     def note_command(self, code: str, word: int) -> None:
         """A command word was written: it is watched from now on."""

@@ -32,8 +32,7 @@ from ..drive import DriveSession
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Permit, Stopped
-from .applied import Applied, EditOutcome, Result, WriteProgress
-from .link_change import LinkChange, link_change
+from .applied import Applied, EditOutcome, LinkChange, Result, WriteProgress, link_change
 from .write import NotTaken, Writer, device_refusal
 
 LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)

@@ -25,11 +25,10 @@ from ..drive_state import DriveState
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Outcome, OutcomeKind, Permit, Task
-from .applied import Applied, Result
+from .applied import Applied, LinkChange, Result
 from .apply import apply_edits
 from .eeprom import factory_reset, save_to_eeprom
 from .favorites import Marks, load_marks, save_marks
-from .link_change import LinkChange
 from .staging import Staging
 from .watched_values import WatchedValues
 

@@ -25,9 +25,8 @@ from ..paths import state_folder
 from ..read.upload import ReadProgress, Upload, setting_codes
 from ..stored import store_json, stored_json
 from ..work import Permit
-from .applied import Applied, Result, WriteProgress
+from .applied import Applied, LinkChange, Result, WriteProgress
 from .apply import apply_edits
-from .link_change import LinkChange
 
 PASSES = 5
 """Most planning passes: writing some settings changes others."""
