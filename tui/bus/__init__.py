@@ -1,1 +1,1 @@
-"""The shared line: one owner of a Modbus line, asked by everybody else. Knows no drive."""
+"""The shared line: one owner of a Modbus line, which serves all requests. Knows no drive."""

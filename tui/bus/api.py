@@ -75,8 +75,7 @@ class ModbusLine(Protocol):
     """
 
     held: str
-    """Why nothing but a stop is written until a person says otherwise, as a sentence; empty
-    where that is not so."""
+    """Reason, as a sentence, if only stops are written until a person confirms; else empty."""
 
     @property
     def link(self) -> Link:
@@ -100,7 +99,8 @@ class ModbusLine(Protocol):
 
     @property
     def state(self) -> LineState:
-        """State of the line; if it cannot be used now, why and when it is tried again."""
+        """State of the line; if it is unusable, with the reason and the time of the next
+        attempt."""
 
     @property
     def counters(self) -> LineCounters:
@@ -114,13 +114,14 @@ class ModbusLine(Protocol):
         """Start the line; with `wait` return once connected, or raise after so many seconds."""
 
     def close(self) -> None:
-        """Close the line for good; what waits fails with LineClosed. May be called twice."""
+        """Close the line; requests that wait fail with LineClosed. May be called twice."""
 
     def describe(self, device: int, limits: Limits) -> None:
-        """Set what a device may be sent; nobody's device gets one word and no write."""
+        """Set the requests that a device accepts; an undescribed one gets reads of one word
+        only."""
 
     def device_state(self, device: int) -> DeviceState:
-        """Return what the line knows about a device."""
+        """Return the line's knowledge of a device."""
 
     async def read(
         self,
@@ -135,9 +136,10 @@ class ModbusLine(Protocol):
     ) -> Reply:
         """Read `count` registers by function 3, or input registers by 4.
 
-        What was read for another program up to `max_age` seconds ago is taken in its place.
-        `within` is in how many seconds from the end of the request the answer is to begin, where
-        perhaps nobody is there; without, the line goes by what it knows of the device.
+        A value that another program read up to `max_age` seconds ago is used instead. `within` is
+        the timeout in seconds, from the end of the request to the start of the reply, for an
+        address that may have no device. By default it follows from the line's knowledge of the
+        device.
         """
 
     async def write(
@@ -194,7 +196,7 @@ class ModbusLine(Protocol):
         *,
         priority: Priority = Priority.OPERATOR_READ,
     ) -> int:
-        """Ask by function 8; returns the data word of the answer."""
+        """Send a request of function 8; returns the data word of the reply."""
 
     async def broadcast(
         self,

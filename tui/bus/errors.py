@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 
 class LineError(Exception):
-    """Something about a line is wrong; the text says what happened and what to do next."""
+    """A problem of a line; the text says what happened and what to do next."""
 
 
 OUTCOME_UNKNOWN = " The write may or may not have taken effect. Read the register before retrying."
-"""Ends the text of an error after a write that may have been taken."""
+"""End of an error's text after a write that may have taken effect."""
 
 
 def strip_outcome_note(error: LineError) -> str:
@@ -37,7 +37,7 @@ class NotShared(LineError):
 
 
 class PortMissing(LineError):
-    """A serial port is not there; `ports` are those that are."""
+    """A serial port does not exist; `ports` are the existing ones."""
 
     def __init__(self, path: str, ports: Sequence[str] = ()) -> None:
         self.path = path
@@ -47,7 +47,7 @@ class PortMissing(LineError):
 
 
 class PortRefused(LineError):
-    """A serial port is there but cannot be opened: no permission, or settings it does not take."""
+    """A serial port exists but cannot be opened: no permission, or settings it does not support."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
@@ -63,7 +63,7 @@ class LineClosed(LineError):
 
 
 class LineLost(LineError):
-    """The line went away or cannot be reached; it is retried automatically."""
+    """The line was lost or cannot be reached; it is opened again automatically."""
 
 
 class LineBehind(LineLost):
@@ -96,13 +96,13 @@ class Superseded(LineError):
 
 
 class RequestRefused(LineError):
-    """A request that was never sent: past the device's limits, or the line is read-only."""
+    """A request that was not sent: it is beyond the device's limits, or the line is read-only."""
 
 
 class ExchangeError(LineError):
-    """A request was sent and not answered as it should be.
+    """A request was sent, but no valid reply came.
 
-    `device` is the id asked, `function` the function code, `address` the first register (0 for
+    `device` is the address, `function` the function code, `address` the first register (0 for
     functions without one).
     """
 
@@ -121,7 +121,7 @@ _WITH_ADDRESS = frozenset({3, 4, 6, 16, 23})
 
 
 class NoAnswer(ExchangeError):
-    """Nothing came back in time, or the device is being left alone for `retry_in` seconds."""
+    """No reply came in time, or the device is not polled for another `retry_in` seconds."""
 
     def __init__(
         self,
@@ -156,7 +156,7 @@ class ChecksumFault(ExchangeError):
 
 
 class WrongReply(ExchangeError):
-    """A whole answer came back that does not belong to the request; it was thrown away."""
+    """A whole reply came that does not belong to the request; it was discarded."""
 
     def __init__(
         self, device: int, function: int, address: int, detail: str = "", received: bytes = b""
@@ -185,14 +185,14 @@ class BytesSwapped(ExchangeError):
 
 
 class DeviceException(ExchangeError):
-    """The device refused the request with a Modbus exception `code`; `meaning` says why."""
+    """The device refused the request with a Modbus exception `code`; `meaning` explains it."""
 
     def __init__(
         self, device: int, function: int, address: int, code: int, meaning: str = ""
     ) -> None:
         self.code = code
         self.meaning = meaning
-        # a sentence of a profile has its point already
+        # a sentence from a profile already ends with a full stop
         why = f": {meaning.rstrip('.')}" if meaning else ""
         super().__init__(
             device,
@@ -204,4 +204,4 @@ class DeviceException(ExchangeError):
 
 
 HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)
-"""Failures that waiting does not end."""
+"""Failures that do not end by waiting."""

@@ -80,14 +80,14 @@ class FakeLine:
         self.pace = Pace()
         self.facts = SharedState()
         self.devices = {n: FakeDevice(n, words) for n, words in (registers or {}).items()}
-        """Those that are there; may be added to, and replaced by some of another kind."""
+        """The devices; may be extended, and replaced by other implementations."""
         self.requests: list[Request] = []
-        """All that was sent, in order; not what was refused before."""
+        """All requests that were sent, in order; not the refused ones."""
         self.limits: dict[int, Limits] = {}
         """Arguments of describe()."""
         self.state = LineState(LineStatus.CONNECTED, "", clock())
         self.counters = LineCounters()
-        """Nothing is counted here, see `requests`; may be set."""
+        """Never changed by the line, see `requests`; may be set."""
         self.trace: tuple[Frame, ...] = ()
         """No frames are made; may be set."""
         self._clock = clock
@@ -98,10 +98,10 @@ class FakeLine:
     def fail_read(
         self, device: int, address: int | None, error: LineError | int, *, times: float = math.inf
     ) -> None:
-        """Let reads that hold an address fail, of any address for None.
+        """Make reads of an address fail; None stands for any address.
 
-        An int is the code of the exception with which the device refuses. So many requests fail,
-        one after another; 0 takes the failures of that address back.
+        An int is the code of the exception with which the device refuses. `times` requests fail,
+        one after another; 0 cancels the failures of that address.
         """
         self.devices[device].fail("read", PlannedFailure(error, address, times))
 
@@ -114,9 +114,9 @@ class FakeLine:
         times: float = math.inf,
         taken: bool = False,
     ) -> None:
-        """Let writes fail, see fail_read; if `taken` the device holds the words anyway.
+        """Make writes fail, see fail_read; if `taken`, the device stores the words anyway.
 
-        RequestRefused, Superseded, LineBusy and the like are raised without anything being sent.
+        RequestRefused, Superseded, LineBusy and the like are raised before the request is sent.
         """
         self.devices[device].fail("write", PlannedFailure(error, address, times, taken))
 
@@ -127,11 +127,11 @@ class FakeLine:
         self.devices[device].fail("identify", PlannedFailure(error, None, times))
 
     def delay(self, device: int, seconds: float) -> None:
-        """Let each answer of a device take so long."""
+        """Delay each reply of a device."""
         self.devices[device].seconds = seconds
 
     def silence(self, device: int, silent: bool = True) -> None:
-        """Let a device answer nothing any more, or answer again."""
+        """Make a device silent, or let it answer again."""
         self.devices[device].silent = silent
 
     def become(self, status: LineStatus, reason: str = "") -> None:
@@ -145,14 +145,14 @@ class FakeLine:
         """It is open from the beginning."""
 
     def close(self) -> None:
-        """Close the line for good, and end what works on it."""
+        """Close the line, and end its workers."""
         if self.state.status is not LineStatus.CLOSED:
             self.become(LineStatus.CLOSED)
         for worker in self._workers:
             worker.cancel()
 
     def describe(self, device: int, limits: Limits) -> None:
-        """Set what a device may be sent."""
+        """Set the requests that a device accepts."""
         self.limits[device] = limits
 
     def device_state(self, device: int) -> DeviceState:
@@ -260,7 +260,7 @@ class FakeLine:
         return self._clock()
 
     def send_prepared(self, writes: Sequence[PreparedWrite], ended: Callable[[str], None]) -> None:
-        """Let the devices take finished frames."""
+        """Have the devices carry out finished frames."""
         for write in writes:
             self.requests.append(write.request)
             device = self._device(write.request.device)
@@ -279,14 +279,14 @@ class FakeLine:
     # One exchange
 
     def _device(self, device: int) -> FakeDevice:
-        """The device; one that was not told of is silent."""
+        """The device; an unknown one is silent."""
         if device not in self.devices:
             self.devices[device] = FakeDevice(device)
             self.devices[device].silent = True
         return self.devices[device]
 
     def _check(self, request: Request, limits: Limits, priority: Priority) -> None:
-        """Refuse what a real line would not send."""
+        """Refuse a request that a real line would not send."""
         held = "" if priority is Priority.STOP else self.held
         if reason := send_refusal(request, limits, read_only=self.read_only, held=held):
             raise RequestRefused(reason)
@@ -318,7 +318,7 @@ class FakeLine:
         try:
             if not device.silent and (failure is None or failure.taken):
                 done = carry_out()
-            # the device has it by now, whoever waits for the answer
+            # the device has it by now, even if the caller no longer waits
             await asyncio.sleep(device.seconds)
             if error is not None:
                 raise error

@@ -1,4 +1,4 @@
-"""A device on a fake line: its registers, what goes wrong with it, what the line sees of it."""
+"""A device on a fake line: its registers, its planned failures, its state on the line."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ UNKNOWN_FUNCTION, UNKNOWN_ADDRESS = 1, 2
 
 @dataclass(slots=True)
 class PlannedFailure:
-    """A planned failure; `times` is how often it still happens, `taken` whether the words
-    arrive."""
+    """A planned failure; `times` is its remaining number, `taken` is True if the words arrive."""
 
     error: LineError | int
     address: int | None
@@ -44,14 +43,14 @@ class PlannedFailure:
 
 
 class FakeDevice:
-    """Registers in a dictionary; replace `held` and `take` for one with a will of its own."""
+    """Registers in a dictionary; replace `held` and `take` for another behavior."""
 
     def __init__(self, number: int, words: Mapping[int, int] | None = None) -> None:
         self.number = number
         self.words = dict(words or {})
-        """The registers: what a read finds, and where a write goes."""
+        """The registers, by address."""
         self.identity: Mapping[int, bytes] | None = None
-        """Objects of function 43/14; None where it does not know the function."""
+        """Objects of function 43/14; None if the device does not support the function."""
         self.called: bytes | None = None
         """Reply to function 17; None if the device does not know the function."""
         self.silent = False
@@ -76,19 +75,19 @@ class FakeDevice:
         self.words.update(zip(span, values, strict=True))
 
     def objects(self) -> IdentificationObjects:
-        """Return its identity. Raises DeviceException where it does not know the function."""
+        """Return its identity. Raises DeviceException if it does not support the function."""
         if self.identity is None:
             raise refusal(self.number, Identify.function, 0, UNKNOWN_FUNCTION)
         return IdentificationObjects(1, self.identity)
 
     def own_words(self) -> IdentificationObjects:
-        """Return its own name. Raises DeviceException where it does not know the function."""
+        """Return its own name. Raises DeviceException if it does not support the function."""
         if self.called is None:
             raise refusal(self.number, ReportId.function, 0, UNKNOWN_FUNCTION)
         return IdentificationObjects(0, {REFERENCE: self.called})
 
     def fail(self, kind: str, failure: PlannedFailure) -> None:
-        """Let something go wrong, in the place of what was to go wrong with that address."""
+        """Plan a failure; it replaces an earlier one of the same address."""
         wanted = self._failures.setdefault(kind, [])
         wanted[:] = [
             planned_failure
@@ -131,7 +130,7 @@ def refusal(device: int, function: int, address: int, code: int) -> DeviceExcept
 
 
 def _span(request: Request) -> range:
-    """The registers that a failure may be meant for; those written where some are."""
+    """The registers by which a failure is found: the written ones, if there are any."""
     match request:
         case Read(address=address, count=count):
             return range(address, address + count)

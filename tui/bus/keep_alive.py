@@ -37,7 +37,7 @@ class KeepAlive(msgspec.Struct, frozen=True, tag=True):
     address: RegisterAddress = 0
     count: Annotated[int, Meta(ge=1, le=MOST_WORDS)] = 1
     function: Literal[3, 4, 43] = 3
-    """3 and 4 read registers; 43 asks for its identification."""
+    """3 and 4 read registers; 43 reads the identification."""
     until: MonotonicTime | None = None
     """Not beyond this time (monotonic); 0 ends it."""
 
@@ -72,7 +72,7 @@ class KeepAlives:
             self._say(alive)
 
     def let_go(self, device: int) -> None:
-        """Have a device kept alive no more."""
+        """End the keep-alive reads of a device for this program."""
         if (alive := self.kept.get((self._me, device))) is not None:
             self._say(msgspec.structs.replace(alive, until=0.0))
 
@@ -83,7 +83,7 @@ class KeepAlives:
     # Of all
 
     def hear(self, program: str, alive: KeepAlive) -> None:
-        """A program has a device kept alive, or no more."""
+        """Note that a program wants a device kept alive, or no longer."""
         with self._lock:
             kept = {key: each for key, each in self.kept.items() if key != (program, alive.device)}
             if alive.until != 0.0:
@@ -92,7 +92,7 @@ class KeepAlives:
         self.changed()
 
     def end(self, program: str) -> None:
-        """A program is on the line no more."""
+        """Forget the devices of a program that has left the line."""
         with self._lock:
             rest = {key: alive for key, alive in self.kept.items() if key[0] != program}
             self.kept = MappingProxyType(rest)

@@ -1,7 +1,7 @@
 """Which program may write to which device: until when, and under which count of stops.
 
-The process that holds the line checks it just before the bytes are sent, whatever a program that
-hangs, or was suspended, believes of itself.
+The process that holds the line checks it just before the bytes are sent. It does not rely on the
+programs, which may hang or have been suspended.
 """
 
 from __future__ import annotations
@@ -68,11 +68,11 @@ class WriteLeases:
         return WriteLease(self._stops.stamp(device), until, care)
 
     def stay_armed(self, device: int, seconds: float | None) -> None:
-        """Write on to a device that this program has armed, for so many seconds."""
+        """Extend the lease of a device that this program has armed, to so many seconds from now."""
         if seconds is None:
             return
         until, mine = time.monotonic() + seconds + LEASE_RENEWED_EVERY, (self._me, device)
-        with self._lock:  # one that ended just now stays ended
+        with self._lock:  # a lease that has just ended stays ended
             lease = self._leases.get(mine)
             if lease is None or not lease.until or until - lease.until < LEASE_RENEWED_EVERY:
                 return
@@ -80,7 +80,8 @@ class WriteLeases:
         self._say(device, WriteLease(lease.stamp, until))
 
     def disarm(self, device: int) -> None:
-        """Write to a device no more; the next holder of the line learns how to stop it still."""
+        """End this program's lease; the next holder of the line still learns how to stop the
+        device."""
         lease = self._leases.get((self._me, device))
         if lease is not None and not lease.has_ended:
             self.grant(self._me, device, replace(lease, until=LEASE_ENDED))
@@ -108,7 +109,7 @@ class WriteLeases:
         return lease
 
     def end(self, program: str, device: int | None = None) -> None:
-        """Let a program write no more, to any device unless one is named."""
+        """End the leases of a program, of all devices unless one is named."""
         with self._lock:
             rest = {
                 key: lease

@@ -37,9 +37,9 @@ STANDARD_EXCEPTIONS: Mapping[int, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """An area that may be read or written as a block although single words are the rule.
+    """An area that may be read or written as a block on a device of single words.
 
-    From `min_words` to `max_words` words; with `fixed_start` only from `address` on, else
+    A block has `min_words` to `max_words` words. With `fixed_start` it begins at `address`, else
     anywhere inside the `max_words` words that begin there.
     """
 
@@ -78,7 +78,7 @@ class Limits:
     max_read_4: RegisterCount = 1
     """Words of one read by function 4."""
     answers_all: bool = False
-    """True if it refuses what it does not have; else it may be silent, as to a longer read."""
+    """True if it refuses unknown registers; else it may be silent, also to a longer read."""
     exceptions: Annotated[Mapping[ByteValue, Text], Meta(max_length=256)] = field(
         default_factory=lambda: STANDARD_EXCEPTIONS
     )

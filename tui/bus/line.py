@@ -110,12 +110,13 @@ class Line:
         self._engine.start(wait)
 
     def close(self) -> None:
-        """Close the line for good; what waits fails with LineClosed. May be called twice."""
+        """Close the line; requests that wait fail with LineClosed. May be called twice."""
         self._engine.close()
 
     @property
     def state(self) -> LineState:
-        """State of the line; if it cannot be used now, why and when it is tried again."""
+        """State of the line; if it is unusable, with the reason and the time of the next
+        attempt."""
         return self._engine.state
 
     @property
@@ -133,11 +134,11 @@ class Line:
         return self._engine.devices
 
     def describe(self, device: int, limits: Limits) -> None:
-        """Set what a device may be sent; a device that nobody described gets CAUTIOUS."""
+        """Set the requests that a device accepts; the default is CAUTIOUS."""
         self._devices.describe(device, limits)
 
     def device_state(self, device: int) -> DeviceState:
-        """Return what the line knows about a device."""
+        """Return the line's knowledge of a device."""
         return self._devices.state(device)
 
     async def read(
@@ -210,7 +211,7 @@ class Line:
         *,
         priority: Priority = Priority.OPERATOR_READ,
     ) -> int:
-        """Ask by function 8; returns the data word of the answer."""
+        """Send a request of function 8; returns the data word of the reply."""
         return diagnostic_of((await self._ask(Diagnose(device, subfunction, data), priority)).pdu)
 
     async def identify(
@@ -256,9 +257,9 @@ class Line:
             self._engine.send_prepared(writes, ended)
 
     def spawn(self, work: ThreadWork, name: str) -> Worker:
-        """Run a coroutine in the line's own loop, where no screen can hold it up.
+        """Run a coroutine in the line's own loop, where no screen can delay it.
 
-        The line must be open. It is cancelled when the line is closed. Raises LineClosed.
+        The line must be open. The coroutine is canceled when the line is closed. Raises LineClosed.
         """
         return self._engine.spawn(work, name)
 

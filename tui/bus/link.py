@@ -33,7 +33,7 @@ class SerialLink:
     baud: int = 19200
     format: str = "8E1"
     timeout: float | None = None
-    """Longest wait for a reply in seconds, where a person has set it."""
+    """Longest wait for a reply in seconds, if a person has set it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,19 +65,19 @@ Link = SerialLink | TcpLink | RtuTcpLink
 
 @dataclass(frozen=True, slots=True)
 class UsualSettings:
-    """Settings of a serial line where a text names none."""
+    """Settings of a serial line if a text names none."""
 
     baud: int = 19200
     format: str = "8E1"
 
 
 def parse_link(text: str, usual: UsualSettings | None = None) -> Link:
-    """The link that a person typed; `usual` are the settings where none are named.
+    """The link that a person typed; `usual` are the settings if none are named.
 
-    Takes `serial:PATH[,BAUD[,FORMAT]]`, a bare port (`/dev/ttyUSB0`, `COM3`, any path that
-    exists), `tcp:HOST[:PORT]` and `rtu-tcp:HOST:PORT`, with IPv6 hosts in brackets, each with
-    `,timeout=SECONDS` behind it (0.02..30) where a drive or a gateway is slow, and `tcp:` with
-    `,unit=255` or `,unit=0` if the gateway answers only that unit. Raises LinkSyntaxError.
+    Accepts `serial:PATH[,BAUD[,FORMAT]]`, a bare port (`/dev/ttyUSB0`, `COM3`, any path that
+    exists), `tcp:HOST[:PORT]` and `rtu-tcp:HOST:PORT`, with IPv6 hosts in brackets. Each may end
+    with `,timeout=SECONDS` (0.02..30) if a drive or a gateway is slow, and `tcp:` with `,unit=255`
+    or `,unit=0` if the gateway answers only that unit. Raises LinkSyntaxError.
     """
     text = rest = text.strip()
     options: dict[str, str] = {}
@@ -144,7 +144,7 @@ def _serial(text: str, rest: str, usual: UsualSettings) -> SerialLink:
     if len(settings) > 2:
         raise LinkSyntaxError(f"{text}: too many settings. Write {FORMS}.")
     baud = settings[0] if settings else str(usual.baud)
-    # by its length first: more digits can be pasted than int() takes
+    # check the length first: int() fails on very long numbers
     if not (re.fullmatch("[0-9]{1,9}", baud) and 50 <= int(baud) <= 4_000_000):
         raise LinkSyntaxError(f"{text}: {baud!r} is not a baud rate. Write one such as 19200.")
     format_ = settings[1].upper() if len(settings) > 1 else usual.format
@@ -197,7 +197,7 @@ def _bracketed(host: str) -> str:
 
 
 _BEHIND_A_SERVER = FAST, "8E1"
-"""The rate behind a device server is not known here; RTU over TCP counts as this."""
+"""The rate behind a device server is unknown; RTU over TCP counts as this."""
 
 
 def character_time(link: Link) -> float:

@@ -1,4 +1,4 @@
-"""A serial line that is listened to while others talk on it; nothing is ever sent."""
+"""A serial line that is only monitored while others use it; nothing is ever sent."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class ListeningLine:
 
     @property
     def character(self) -> float:
-        """Seconds that a byte takes; 0 where bytes take none."""
+        """Seconds of one byte on the wire; 0 if bytes take no time."""
         return character_time(self.link) if self.has_times else 0.0
 
     @property
     def silence(self) -> float:
-        """Seconds of silence that have to lie between two frames."""
+        """Least seconds of silence between two frames."""
         return silence(self.link)
 
     def __enter__(self) -> Self:
@@ -65,11 +65,11 @@ class ListeningLine:
         self._give_back()
 
     def read(self, wait: float) -> bytes:
-        """Bytes that have come; empty where none do within `wait` seconds. Raises LineLost."""
+        """The received bytes; empty if none came within `wait` seconds. Raises LineLost."""
         return self._port.read(wait) if self._port is not None else b""
 
     def _own(self) -> None:
-        """Keep every other drivepanel from the line, as an owner does that takes nobody in."""
+        """Keep every other drivepanel from the line, like an owner that admits no client."""
         if self._lock is None or self._place is None:
             return
         with suppress(OSError):  # without a lock the port itself is locked

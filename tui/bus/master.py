@@ -35,12 +35,12 @@ class Sending:
 
 
 StrayKind = Literal["late", "copy", ""]
-"""A frame beside the awaited reply: a late reply, a second copy of one, or not known."""
+"""Origin of a frame that is not the awaited reply: a late reply, a copy of one, or unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A stretch of received bytes: a whole frame of anybody, or bytes that form none."""
+    """A part of the received bytes: a whole frame of any device, or bytes that form none."""
 
     data: bytes
     whole: bool
@@ -65,7 +65,7 @@ class ResultKind(Enum):
     WRONG = "wrong"
     NOTHING = "nothing"
     UNSURE = "unsure"
-    """One copy of the request came back: its answer, or the adapter's echo."""
+    """One copy of the request came back: it is the reply, or the adapter's echo."""
 
 
 @dataclass(slots=True)
@@ -82,13 +82,13 @@ class ExchangeResult:
     instead: Piece | None = None
     """Over Modbus TCP: the reply of this transaction, if it is not that of its request."""
     resynchronised: bool = False
-    """True if the reply was found behind or between other bytes."""
+    """True if the reply was found after or between other bytes."""
     recognized: bool = False
-    """Of damaged bytes: whether they are surely what is left of the reply."""
+    """True if damaged bytes are certainly the rest of the reply."""
     sent: float = 0.0
     """When the last byte of the request left."""
     end: float = 0.0
-    """When the last byte came, or the time was up."""
+    """When the last byte came, or the timeout ended."""
     turnaround: float = 0.0
     """Seconds from the end of the request to the start of its reply."""
 
@@ -109,9 +109,9 @@ class Master(Protocol):
     """One opened line, one request at a time."""
 
     echo: bool | None
-    """True if the adapter repeats what is sent, None while not known."""
+    """True if the adapter repeats what is sent; None until that is known."""
     failure: LineLost | None
-    """Why the line cannot be used any more."""
+    """Reason if the line can no longer be used."""
 
     async def quiet(self) -> None:
         """Wait until the next request may be sent. Raises LineLost."""

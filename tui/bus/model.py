@@ -1,4 +1,4 @@
-"""Values that a line shows and takes: priorities, states, replies, counters, timing."""
+"""Values of a line's interface: priorities, states, replies, counters, timing."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class Priority(IntEnum):
     POLL = 4
     BACKGROUND = 5
     PATIENT = 6
-    """Background work that waits longer for an answer, for a slow or a disturbed device."""
+    """Background work with a longer timeout, for a slow or a disturbed device."""
 
 
 class LineStatus(Enum):
-    """True if the line can be used now."""
+    """Status of a line; it can be used only while CONNECTED."""
 
     CLOSED = "closed"
     CONNECTING = "connecting"
@@ -51,10 +51,10 @@ class LineState:
 
     status: LineStatus
     reason: Text
-    """One sentence for a person, empty when there is nothing to say."""
+    """One sentence for a person; empty if there is nothing to report."""
     since: MonotonicTime
     next_try: MonotonicTime | None = None
-    """When a lost line is tried again."""
+    """Time of the next attempt on a lost line."""
 
 
 Contact = Literal["answers", "not_polled", "silent", "refused", "damaged", "swapped"]
@@ -95,9 +95,9 @@ class DeviceState:
     heard: MonotonicTime | None
     """When its last reply ended, on the line's clock; None before the first."""
     lateness: Seconds = 0.0
-    """Seconds by which a reply came after its timeout, the longest; fades with those in time."""
+    """Longest delay of a reply after its timeout in seconds; decreases with replies in time."""
     copies_within: Seconds = 0.0
-    """Seconds after a reply in which it may come once more; 0 where none ever came twice."""
+    """Seconds after a reply in which a second copy may come; 0 if none ever did."""
     refused: bool = False
     """True if its last reply was a refusal."""
 
@@ -119,7 +119,7 @@ class Reply:
     """Registers that the reply contains, if it contains any."""
     time: float
     pdu: bytes = b""
-    """Function and data as they came; empty where nobody answers a broadcast."""
+    """Function and data as received; empty for a broadcast, which no device answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +139,10 @@ ExceptionCounts = Annotated[Mapping[ByteValue, Number], Meta(max_length=256)]
 
 @dataclass(frozen=True, slots=True)
 class LastMinute:
-    """Replies of the last minute; those that a search for drives awaits do not count.
+    """Replies of the last minute, without those to a search for drives.
 
     A missed reply is `lost` once the drive answers again, after one or two misses or within 5 s.
-    Until then, and while the drive stays silent, it is `silent`: a trouble of the drive alone.
+    Until then, and while the drive stays silent, it is `silent`: a problem of the drive alone.
     """
 
     good: Number = 0
@@ -151,7 +151,7 @@ class LastMinute:
     silent: Number = 0
     """Missed by a drive that has not answered since; of a device only, not of a line."""
     damaged: Number = 0
-    """Replies that came damaged, or as that to another request."""
+    """Damaged replies, and replies to another request."""
     foreign: Number = 0
     """Frames of another master or an unknown device; of a line only."""
     strays: Number = 0
@@ -192,7 +192,7 @@ class DeviceCounters:
     """Refusals by their code."""
     bytes_out: Number = 0
     bytes_in: Number = 0
-    """Bytes that came while its reply was due, strange ones too."""
+    """Bytes that came while its reply was due, including unrelated ones."""
     busy_seconds: Seconds = 0.0
     turnarounds: TurnaroundBars = (0,) * _BARS
     """Replies by their turnaround: up to each edge, and beyond the last."""
@@ -206,29 +206,28 @@ class LineCounters:
     requests: Number = 0
     replies: Number = 0
     timeouts: Number = 0
-    """Requests without an answer, to devices that have answered or that were requested on
-    purpose."""
+    """Unanswered requests to devices that have answered before or that a person requested."""
     searched: Number = 0
-    """Requests of a search without an answer: nobody was known to be there."""
+    """Unanswered requests of a search, to addresses without a known device."""
     checksum: Number = 0
     wrong: Number = 0
     exceptions: Number = 0
     resyncs: Number = 0
-    """Replies found behind or between bytes that did not belong to them."""
+    """Replies found after or between bytes that did not belong to them."""
     stale: Number = 0
-    """Whole frames that came when none was due, and were thrown away."""
+    """Whole frames that came when none was due; they were discarded."""
     bytes_out: Number = 0
     bytes_in: Number = 0
     busy_seconds: Seconds = 0.0
     framing: Number = 0
-    """Characters that the port saw without their stop bit; 0 too if it does not report them."""
+    """Characters without a stop bit; 0 if the port does not report them."""
     parity: Number = 0
     breaks: Number = 0
     overruns: Number = 0
     repeats: Number = 0
     """Requests that were sent again."""
     programs: ProgramShares = field(default_factory=dict)
-    """The share of the line's time that each program had of late, by its id."""
+    """Recent share of the line's time, by the id of the program."""
     devices: Annotated[Mapping[DeviceId, DeviceCounters], Meta(max_length=MOST_DEVICES)] = field(
         default_factory=dict
     )
@@ -246,10 +245,10 @@ class Timing:
     scan_timeout: float = 0.4
     """Timeout of background requests to a device that never answered yet."""
     patient_timeout: float = 0.8
-    """The same where it is asked once more."""
+    """The same for a second attempt."""
     late_reply: float = 2.0
-    """Seconds after a request in which its reply may still come; a request whose reply could be
-    mistaken for it is held back until then."""
+    """Seconds after a request in which its reply may still come. Until then, a request is held
+    back if that reply could be mistaken for its own."""
     turnaround_delay: float = 0.1
     """Quiet time after a broadcast."""
     retries: int = 1
@@ -264,8 +263,8 @@ class Timing:
     frame_gap_tcp: float = 0.08
     """The same for RTU over TCP."""
     wire_time: bool | None = None
-    """True if bytes take the time of their baud, so that a reply which began before its request
-    was over is another's. None: on every serial port except a pseudo-terminal."""
+    """True if bytes take the time of their baud: then a reply that began before the end of its
+    request belongs to another request. None: on every serial port except a pseudo-terminal."""
     probes: bool = True
     """True if a drive must prove that its replies belong to their requests before they count."""
     queue_length: int = 256

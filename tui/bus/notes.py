@@ -24,13 +24,13 @@ MOST_NOTE, MOST_NOTES = 1 << 14, 1 << 21
 NOTES_A_LOOK = 50
 """Notes that a new holder is given at a time: they are not as urgent as a stop."""
 NOTE_COSTS = 200
-"""Bytes that a note takes beside its data, about."""
+"""Bytes of a note besides its data, approximately."""
 
 
 class LineNote(msgspec.Struct, frozen=True, tag=True):
-    """Something about a device, 0 for the line, that the next program is to find.
+    """Information about a device, 0 for the line, for the next program.
 
-    Without data it asks for the notes of its device and kind.
+    Without data it requests the notes of its device and kind.
     """
 
     device: DeviceId
@@ -41,7 +41,7 @@ class LineNote(msgspec.Struct, frozen=True, tag=True):
 class Notes:
     """The notes of one line: in its holder those of all programs, elsewhere this program's own.
 
-    What they say is the business of who leaves them. May be used from any thread.
+    Their content is known to their writers only. May be used from any thread.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Notes:
         self._size = 0
 
     def leave(self, note: LineNote) -> None:
-        """Leave a note from here."""
+        """Add a note of this program."""
         self.keep(note)
         self._tell(note)
 
@@ -65,7 +65,7 @@ class Notes:
         self._tell(LineNote(device, kind))
 
     def keep(self, note: LineNote) -> None:
-        """Keep a note; one that is there already is kept once."""
+        """Keep a note; a duplicate is kept once."""
         now = self._clock()
         with self._lock:
             if note not in self._kept:

@@ -17,9 +17,9 @@ from .model import Reply
 MOST_TURNS, MOST_READS = 16, 250
 """Turns of a plan, and reads of one turn."""
 SHORTEST_PERIOD, LONGEST_PERIOD = 0.05, 60.0
-"""Bounds of a plan's period in seconds; what is read less often needs no plan."""
+"""Bounds of a plan's period in seconds; slower reads need no plan."""
 USUAL_TURNAROUND = 0.005
-"""Seconds that a device takes to answer, until it is measured."""
+"""Turnaround of a device in seconds, until it is measured."""
 
 
 class PlannedRead(msgspec.Struct, frozen=True, array_like=True):
@@ -73,7 +73,7 @@ class PolledTurn:
         return self._missed or bool(self._left)
 
     def take(self, read: PlannedRead, after: float) -> Reply | None:
-        """The reply to a read if it is newer than `after`; raises the error that came instead."""
+        """The reply to a read if it is newer than `after`; raises the error of a failed read."""
         if read not in self._left:
             self._missed = True
             return None
@@ -84,9 +84,9 @@ class PolledTurn:
 
 
 class Subscription:
-    """One plan that is carried out elsewhere; used in the line's loop.
+    """One plan that the holder of the line carries out; used in the line's loop.
 
-    Of cycles that come faster than they are taken the last one counts.
+    If cycles arrive faster than they are used, only the last one counts.
     """
 
     def __init__(self, plan: PollPlan, leave: Callable[[], None]) -> None:
@@ -97,7 +97,7 @@ class Subscription:
         self._moved = asyncio.Event()
 
     async def next(self, within: float) -> PolledTurn | None:
-        """The next cycle; None if it has ended, or brings nothing within so many seconds."""
+        """The next cycle; None if the plan has ended, or if none comes within so many seconds."""
         if self._latest is None and not self.ended:
             with suppress(TimeoutError):
                 async with asyncio.timeout(within):
@@ -107,17 +107,17 @@ class Subscription:
         return found
 
     def hear(self, turn: PolledTurn) -> None:
-        """A cycle has come."""
+        """Take the cycle that has arrived."""
         self._latest = turn
         self._moved.set()
 
     def lose(self) -> None:
-        """The process that carries it out is gone, or does not answer."""
+        """End the plan: the process that carries it out has exited, or does not answer."""
         self.ended = True
         self._moved.set()
 
     def end(self) -> None:
-        """Have no more cycles."""
+        """Cancel the plan."""
         if not self.ended:
             self.lose()
             self._leave()

@@ -46,7 +46,7 @@ class Program(msgspec.Struct, frozen=True):
     pid: Number = 0
     user: Word = ""
     where: Word = ""
-    """Its terminal; empty where that is unknown."""
+    """Its terminal; empty if unknown."""
     space: Word = ""
     """Its PID namespace, in which `pid` counts; empty for the one of the reader."""
 

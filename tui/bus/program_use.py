@@ -1,4 +1,4 @@
-"""The share of a line's time that each program has had of late."""
+"""Recent share of a line's time, by program."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .bounds import MOST_PROGRAMS
 from .program import KEEPER, Program
 
 USE_WINDOW = 10.0
-"""Seconds over which shares are taken; what is longer ago counts less and less."""
+"""Seconds over which shares are averaged; older use has less and less weight."""
 LEAST_USE = 0.002
 """A share below which a program counts as idle."""
 
@@ -24,7 +24,7 @@ class ProgramUse:
         self._when = clock()
 
     def count(self, program: str, seconds: float) -> None:
-        """A request of a program has taken so many seconds of the line; of none without a name."""
+        """Count the seconds that a request of a program kept the line; without an id, nothing."""
         if not program:
             return  # a stop that is repeated for a program that may be gone
         faded = dict(self.shares)

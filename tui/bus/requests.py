@@ -53,7 +53,7 @@ class Request(ABC):
 
     @property
     def register(self) -> int:
-        """The first register asked for, 0 for functions without one."""
+        """The first register of the request, 0 for functions without one."""
         return 0
 
     @property
@@ -62,7 +62,7 @@ class Request(ABC):
         return False
 
     def words(self, _pdu: bytes) -> tuple[int, ...]:
-        """The registers that a checked reply brings; none where the function reads none."""
+        """The registers in a checked reply; none if the function reads none."""
         return ()
 
     def pdu(self) -> bytes:
@@ -230,7 +230,7 @@ class Identify(Request):
 
 @dataclass(frozen=True, slots=True)
 class ReportId(Request):
-    """Function 17: what the device calls itself, in bytes of its maker's choice."""
+    """Function 17: the device's own name, in a format of its maker."""
 
     function: ClassVar[int] = REPORT_ID
 
@@ -248,9 +248,9 @@ def write_request(
     multiple: bool | None,
     functions: frozenset[int],
 ) -> WriteOne | WriteMany:
-    """The request that writes the values with what the device knows; see Line.write.
+    """The request that writes the values by a function that the device supports; see Line.write.
 
-    Raises RequestRefused where function 6 alone cannot carry them.
+    Raises RequestRefused if function 6 alone cannot carry them.
     """
     if multiple is None:
         one_word = WriteOne.function in functions or WriteMany.function not in functions
@@ -279,7 +279,7 @@ def diagnostic_of(pdu: bytes) -> int:
 
 
 REFERENCE = 1
-"""The object of function 43/14 that says which drive it is."""
+"""The object of function 43/14 with the reference of the drive."""
 _WORDS = re.compile(rb"[ -~]{3,}")
 
 
@@ -295,9 +295,9 @@ class Objects:
     conformity: int = 0
     objects: Mapping[int, bytes] = field(default_factory=dict)
     next_object: int | None = 0
-    """The object that the next request asks for; None when nothing follows."""
+    """The object with which the next request begins; None if nothing follows."""
     trouble: str = ""
-    """Why they cannot be taken for an identification, empty if they can."""
+    """Reason if they form no identification; else empty."""
 
     def with_more(self, pdu: bytes) -> Objects:
         """These objects, and those of a checked reply that follows."""

@@ -1,6 +1,6 @@
 """State shared by all programs on one line: programs, commanders, stops.
 
-A line that nobody shares has such facts too: then this program is the only one.
+A line that is not shared has such state too: then this program is the only one.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ class SharedState:
         self.notes = Notes(self._tell)
         """Notes for the next program on the line."""
         self.unkept = ""
-        """Why this program holds the line in place of a keeper; empty where that is meant so."""
+        """Reason if this program holds the line although a keeper should; else empty."""
         self.gated = False
-        """True on a line where nothing is written to a device that its program has not armed."""
+        """True if only armed devices may be written on the line."""
         self.events = EventHub()
         """Passes on what happens on the line."""
         self.accepts_care: Callable[[int, bytes], bool] = accepts_any_care
@@ -74,15 +74,15 @@ class SharedState:
         self.departed: tuple[Program, ...] = ()
         """Programs that have left the line, the last ones last."""
         self.voice: LinePublisher | None = None
-        """None while nobody else hears of it."""
+        """None while there is no other program to send to."""
         self._lock = threading.RLock()
         self.events.subscribe(self._end_pauses)
 
-    # Who is there
+    # Programs
 
     @property
     def others(self) -> tuple[Program, ...]:
-        """The other programs on the line; its keeper is none."""
+        """The other programs on the line, without its keeper."""
         mine = self.me.id
         return tuple(
             program for program in self.programs if program.id != mine and program.name != KEEPER
@@ -127,7 +127,7 @@ class SharedState:
             self.programs = programs
         self.events.emit(ProgramsChanged())
 
-    # What all are to read
+    # Notices to all
 
     def tell_all(self, device: int, text: str) -> None:
         """Have every program on the line show its person a message about a device."""
@@ -135,19 +135,19 @@ class SharedState:
         self._tell(Notified(device, text[:MOST_TEXT]))
 
     def _tell(self, message: AnyMessage) -> None:
-        """Carry what is done here to the other programs, if there are any; in any thread."""
+        """Send an action of this program to the other programs, if there are any; in any thread."""
         if (voice := self.voice) is not None:
             voice.send(message)
 
-    # Left alone
+    # Pauses of polling
 
     def pause_polling(self, device: int, why: str) -> None:
-        """Let nobody ask a device, but for what belongs to a stop."""
+        """Pause all requests to a device except those of a stop."""
         self.note_pause(device, self.me.id, why)
         self._tell(PollPause(device, why[:MOST_NOTICE]))
 
     def unhush(self, device: int) -> None:
-        """Let a device be asked again."""
+        """Resume the requests to a device."""
         self.note_pause(device, self.me.id, "")
         self._tell(PollPause(device, ""))
 
@@ -166,9 +166,9 @@ class SharedState:
     # Stops
 
     def give_stop(self, devices: Iterable[int], by: str) -> None:
-        """Devices are stopped from here: what was meant for them before is void everywhere."""
+        """Stop devices: earlier commands to them are canceled in all programs."""
         stopped = tuple(devices)
-        # counted before it is told: a program that attaches in between tells the counts
+        # count first, then send: a program that attaches in between reports the counts
         self.stops.give(self.me.id, stopped, by)
         for device in stopped:
             self.note_pause(device, "", "")
@@ -179,12 +179,12 @@ class SharedState:
     # Who commands
 
     def commander(self, device: int) -> Program | None:
-        """The other program that commands a device; None where none does, or this one."""
+        """The other program that commands a device; None if there is none."""
         holder = self.commanders.get(device)
         return None if holder in (None, self.me.id) else self.program(holder or "")
 
     def claim(self, device: int) -> str:
-        """Command a device from here; returns why not, or nothing."""
+        """Take command of a device; returns the reason if refused, else nothing."""
         with self._lock:
             if (other := self.commander(device)) is not None:
                 return commanded_by(device, other)
@@ -218,7 +218,7 @@ class SharedState:
         self._tell(DriveRequested(device, self.me))
 
     def answer(self, device: int, program: str, *, yes: bool, why: str = "") -> None:
-        """Answer a program that asked for a device which is commanded from here."""
+        """Answer a program that requested a device which this program commands."""
         if yes:
             self.release(device)
         self._tell(RequestGranted(device, program, yes, why[:MOST_TEXT]))
@@ -229,10 +229,10 @@ class SharedState:
             self.note_commander(device, None)
         self.events.emit(ControlAnswered(device, yes, why))
 
-    # Programs that went away
+    # Programs that have left
 
     def hear_gone(self, program: Program) -> None:
-        """A program is on the line no more; called where this program owns it."""
+        """Forget a program that has left the line; called in the owner only."""
         with self._lock:
             held = {d: text for d, text in self.commanders.items() if text != program.id}
             self.commanders = MappingProxyType(held)
@@ -244,13 +244,13 @@ class SharedState:
         self.set_programs(rest)
         self.events.emit(ProgramLost(program))
 
-    # What may go out
+    # Permission to send
 
     def refusal(self, program: str, device: int, stamp: int, *, writes: bool = False) -> str:
-        """Why a program's write to a device must not go out any more; empty where it may.
+        """Reason if a program's write to a device must no longer be sent; else empty.
 
-        `stamp` is the count of stops that the program knew when it handed the write over. True
-        `writes` for one that writes registers.
+        `stamp` is the count of stops that the program knew when it handed the write over. `writes`
+        is True if the request writes registers.
         """
         if stamp != self.stops.stamp(device):
             by = self.stops.by.get(device, "")

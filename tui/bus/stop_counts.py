@@ -35,7 +35,7 @@ def is_newer(count: int, than: int) -> bool:
 class StopCounts:
     """The stops of one line, as one program knows them; for any thread.
 
-    Each program counts its own, so that those of two that could not hear each other add up.
+    Each program counts its own stops, so that stops of two disconnected programs add up.
     """
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class StopCounts:
         self._lock = threading.RLock()
 
     def stamp(self, device: int) -> int:
-        """The count that a write to a device goes by; a broadcast goes by those of all."""
+        """The count that a write to a device carries; for a broadcast, that of all devices."""
         if device:
             return self.totals.get(device, 0)
         return sum(self.totals.values()) % STOPS_WRAP
@@ -85,9 +85,11 @@ class StopCounts:
             return news
 
     def learn_times(self, reported: Mapping[int, float]) -> None:
-        """Take over when devices were stopped; a time to come is of an earlier run of the machine.
+        """Take over when devices were stopped; a future time is from before a restart of the
+        computer.
 
-        It decides about commands that were typed before a stop and reached the line after it.
+        Commands that were typed before a stop and reach the line after it are refused by these
+        times.
         """
         now = time.monotonic()
         with self._lock:
@@ -104,14 +106,14 @@ class StopCounts:
 
     @property
     def late_times(self) -> dict[int, float]:
-        """When devices were stopped of late."""
+        """When devices were stopped recently."""
         since = time.monotonic() - STOPS_KEPT
         return {device: when for device, when in self.times.items() if when > since}
 
     def learn(self, reported: GivenStops) -> tuple[int, ...]:
-        """Take over counts that are higher than those known; returns the devices of which some are.
+        """Take over counts that are higher than the known ones; returns the devices of these.
 
-        A count never goes down: that would let a write through that a stop has voided.
+        A count never decreases: that would let a write through that a stop has canceled.
         """
         with self._lock:
             most = {device: dict(counts) for device, counts in self.given.items()}

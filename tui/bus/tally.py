@@ -26,7 +26,7 @@ class MinuteWindow:
         self._copied = copied
         """Counts of the program that owns the line; None if this one counts."""
         self._summed: tuple[object, int, LastMinute] = (None, 0, LastMinute())
-        """The last sum, of which buckets and in which bucket: it is looked at more often."""
+        """The last sum with its buckets and its time: it is read more often than it changes."""
 
     def count(self, kind: str, now: float, number: int = 1) -> None:
         """Count so many of a field of LastMinute; a negative number corrects an earlier count."""
@@ -47,7 +47,7 @@ class MinuteWindow:
         if of is buckets and then == newest:
             return total
         counted = [counts for bucket, counts in buckets if bucket > newest - BUCKETS]
-        # what corrects a count may be kept for longer than the count
+        # a correction may be kept for longer than the count
         total = LastMinute(*(max(0, sum(pair)) for pair in zip(*counted, strict=True)))
         self._summed = (buckets, newest, total)
         return total
@@ -78,14 +78,14 @@ class DeviceTally:
     """Requests of the last minute's counts that it did not answer since its last reply."""
 
     def count_reply(self, turnaround: float) -> None:
-        """A right reply came, so many seconds after its request."""
+        """Count a valid reply and its turnaround in seconds."""
         self.replies += 1
         bars = list(self.turnarounds)
         bars[bisect_left(TURNAROUND_EDGES, turnaround)] += 1
         self.turnarounds = tuple(bars)
 
     def count_exception(self, code: int) -> None:
-        """That reply was a refusal. The mapping is replaced: others may be reading it."""
+        """Count a refusal. The mapping is replaced: another thread may be reading it."""
         self.exceptions = {**self.exceptions, code: self.exceptions.get(code, 0) + 1}
 
     def frozen(self, now: float) -> DeviceCounters:
@@ -127,7 +127,7 @@ class Tally:
         return self.devices.get(device) or self.devices.setdefault(device, DeviceTally())
 
     def count_sent(self, device: int, size: int) -> None:
-        """A frame of so many bytes has gone out to a device."""
+        """Count a frame sent to a device."""
         tally = self.of(device)
         self.requests += 1
         self.bytes_out += size
@@ -135,14 +135,14 @@ class Tally:
         tally.bytes_out += size
 
     def count_end(self, device: int, seconds: float, received: int) -> None:
-        """Its exchange is over; bytes of the line were counted as they came."""
+        """Count the time and bytes of an exchange; the line's own bytes were counted on arrival."""
         tally = self.of(device)
         self.busy_seconds += seconds
         tally.busy_seconds += seconds
         tally.bytes_in += received
 
     def count_reply(self, device: int, turnaround: float) -> None:
-        """A right reply came, or a refusal."""
+        """Count a valid reply, or a refusal."""
         self.replies += 1
         self.of(device).count_reply(turnaround)
 
@@ -152,22 +152,21 @@ class Tally:
         self.of(device).count_exception(code)
 
     def count_checksum(self, device: int) -> None:
-        """Its reply came damaged."""
         self.checksum += 1
         self.of(device).checksum += 1
 
     def count_wrong(self, device: int) -> None:
-        """Something else came than its reply."""
+        """Count a reply that does not belong to the request."""
         self.wrong += 1
         self.of(device).wrong += 1
 
     def count_repeat(self, device: int) -> None:
-        """Its request is sent again."""
         self.repeats += 1
         self.of(device).repeats += 1
 
     def count_silence(self, device: int, *, searched: bool) -> None:
-        """No answer came; an empty address in a search is not a failure of the line."""
+        """Count a missing reply; in a search, an address without a device is not a fault of the
+        line."""
         if searched:
             self.searched += 1
         else:

@@ -53,5 +53,5 @@ class Trace:
 
     @property
     def looked_at(self) -> bool:
-        """True if somebody looked at the frames in the last seconds."""
+        """True if the frames were read in the last seconds."""
         return monotonic() - self._looked < LOOKED_LATELY

@@ -35,15 +35,15 @@ IGNORED_SIGNALS = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGTSTP", "SIGTTIN", "SIGTTO
 """Signals that end or suspend a process by default; a keeper goes on."""
 
 LEAVE_TIME = 10.0
-"""Seconds that programs have to stop their motors and leave, once a keeper is to end."""
+"""Seconds that programs have to stop their motors and leave when a keeper must end."""
 STOP_TIME = 60.0
-"""Seconds that motors have to stop, once a keeper is to end."""
+"""Seconds that motors have to stop when a keeper must end."""
 LOST_TIME = 2.0
 """The same on a line that is lost."""
 
 
 class Keeper:
-    """Holds one line until no program needs it, and stops motors of programs that are gone."""
+    """Holds one line until no program needs it, and stops motors of programs that have exited."""
 
     def __init__(self, order: KeeperOrder, lock: int) -> None:
         self._ended = threading.Event()
@@ -95,7 +95,7 @@ class Keeper:
         """
         self._ended.wait()
         while self._line.facts.others and not self._ordered:
-            self._ended.clear()  # one came just then
+            self._ended.clear()  # a program attached in the meantime
             self._ended.wait()
         begun = time.monotonic()
         while self._is_needed(time.monotonic() - begun):

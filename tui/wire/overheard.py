@@ -15,7 +15,7 @@ _HEAD = 6
 
 
 class OverheardRequest(NamedTuple):
-    """A request of another master; `register` and `words` are 0 where it names none."""
+    """A request of another master; `register` and `words` are 0 if it names none."""
 
     device: int
     function: int
@@ -36,9 +36,9 @@ class OverheardRequest(NamedTuple):
 
 
 def overheard_request(frame: bytes) -> OverheardRequest | None:
-    """The request in a whole frame, checksum included; None where it is a reply.
+    """The request in a whole frame, checksum included; None if it is a reply.
 
-    What a request and its reply have in common, as for function 6, counts as a request.
+    A frame that may be either, as with function 6, counts as a request.
     """
     device, function = frame[0], frame[1]
     # a reply of three bytes has the length of a request: coils may, registers do not

@@ -27,7 +27,7 @@ _NO_FRAGMENTS = 0x4000
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """One packet of a file, and what is said of it."""
+    """One packet of a file, and its comment."""
 
     data: bytes
     comment: str = ""
@@ -43,7 +43,7 @@ class PacketForm(Protocol):
         ...
 
     def noise_packet(self, data: bytes) -> Packet | None:
-        """The packet of bytes that form no frame; None where there is none for them."""
+        """The packet of bytes that form no frame; None if the format has none."""
         ...
 
 

@@ -20,14 +20,14 @@ _COUNTED_REPLIES = {1: 2, 2: 2, 3: 2, 4: 2, 12: 2, 17: 2, 23: 2}
 _OBJECTS_FROM = 8
 """Offset of the objects of an identification; the byte before counts them."""
 SAME_BOTH_WAYS = frozenset({5, 6, 8, 22})
-"""Functions whose reply is, or may be, the request once more."""
+"""Functions whose reply repeats the request, or may do so."""
 
 Lengths = tuple[int, ...] | None
 """Possible lengths of a frame, or None if more of it must come."""
 
 
 def request_lengths(head: bytes | bytearray) -> Lengths:
-    """Bytes of the request that begins so; none where no request does."""
+    """Length of the request that begins like this; none if no request does."""
     if len(head) < 2:
         return None
     function = head[1]
@@ -37,7 +37,7 @@ def request_lengths(head: bytes | bytearray) -> Lengths:
 
 
 def reply_lengths(head: bytes | bytearray) -> Lengths:
-    """Bytes of the reply that begins so; none where no reply does."""
+    """Length of the reply that begins like this; none if no reply does."""
     if len(head) < 2:
         return None
     function = head[1]

@@ -16,11 +16,11 @@ HeardAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again"
 """Result of a request: `again` is a second reply, `unasked` one to no request."""
 BROADCAST_DEVICE = 0
 GIVEN_UP_AFTER = 3.0
-"""Seconds after which a request counts as not answered, though no other follows it."""
+"""Seconds after which a request counts as unanswered, even if no other follows."""
 REPLY_WITHIN = 0.15
 """Seconds in which a reply that may as well be its request once more counts as a reply."""
 AGAIN_WITHIN = 0.05
-"""Seconds in which a write like the one before, which nobody answers, is a second reply."""
+"""Seconds in which a repeat of an unanswered write is a second reply."""
 _ECHOED = {15: 5, 16: 5}
 """Bytes that the reply of a function has from its request, function included."""
 
@@ -39,7 +39,7 @@ class HeardExchange:
     turnaround: float | None = None
     """Seconds from the end of the request to the beginning of the reply."""
     noise: bytes = b""
-    """Bytes behind the request that form no frame."""
+    """Bytes after the request that form no frame."""
     waited: float | None = None
     """Seconds from the end of a request that was not answered to the next request."""
 
@@ -128,7 +128,7 @@ class Pairing:
         return [self._kept(_exchange(frame, answer, requested.noise, waited))]
 
     def _stray(self, frame: HeardFrame) -> HeardExchange:
-        """A reply that nobody waits for."""
+        """A reply without a request."""
         last = self._last
         same = last is not None and last.answer in ("ok", "exception", "again")
         function = frame.function & ~REFUSAL
