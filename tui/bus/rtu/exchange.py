@@ -1,6 +1,6 @@
-"""One RTU request and the bytes that come back for it: what they are, and when that is sure.
+"""One RTU request and the bytes that come back for it: their meaning, and when it is certain.
 
-Knows no clock and no port: fed with bytes, told of silence and of the timeout.
+Knows no clock and no port: its caller passes it bytes, silence and the timeout.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from ..expectation import EXCEPTION, Expectation, exception_code, exception_exte
 from ..master import ExchangeResult, Piece, ResultKind
 
 FLOOD = 4096
-"""Bytes of one exchange beyond which the older half is let go: no line says that much."""
+"""Bytes of one exchange above which the older half is dropped: no valid exchange is as long."""
 REFUSAL, REFUSED_LATER = 5, 2
-"""Characters of the shortest reply, and those after it that are awaited as well: it is seldom."""
+"""Characters of the shortest reply, and of those after it for which it is worth to wait."""
 NOISE = 4
-"""Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
+"""Fewer loose bytes than in the shortest frame are noise, not a damaged reply."""
 
 
 class ReplyExtent(NamedTuple):
@@ -30,11 +30,11 @@ class ReplyExtent(NamedTuple):
 
 
 class RtuExchange:
-    """The awaited reply of one request on a line that may echo, stutter and mix up replies.
+    """The awaited reply of one request, on a line that may echo, repeat and mix up replies.
 
-    `echo` is whether the adapter repeats what is sent, None while not known; it is learnt on
-    the way. `expectation` None is a broadcast. The first `skip` fitting replies are those of
-    earlier requests. Without `exceptions` a refusal is taken for an earlier request's.
+    `echo` is True if the adapter repeats what is sent, None until the exchange shows it.
+    `expectation` None is a broadcast. The first `skip` fitting replies belong to earlier requests.
+    Without `exceptions`, a refusal counts as the reply to an earlier request.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class RtuExchange:
         self._skip = skip
         self._skipped_to = 0
         self._looked_to = 0
-        """Up to where no reply can begin any more that was not found."""
+        """End of the bytes in which no further reply can begin."""
         # a reply that repeats the request looks like an echo
         self._mirrored = expectation is not None and expectation.fits(frame[1:-2])
 
@@ -110,7 +110,8 @@ class RtuExchange:
         self._looked_to = max(0, self._looked_to - count)
 
     def pass_over(self, result: ExchangeResult) -> ExchangeResult | None:
-        """The reply just found cannot be that of this request; the next one, if it is there."""
+        """Skip the reply just found, which belongs to another request; returns the next one, if
+        any."""
         assert self._expectation is not None
         self._skipped_to = self.buffer.find(result.pdu, self._skipped_to) + len(result.pdu) + 2
         return self.feed(b"")
@@ -124,7 +125,7 @@ class RtuExchange:
         )
 
     def _is_too_short(self, expectation: Expectation) -> bool:
-        """Return True if neither the reply nor a refusal can be there yet, as after most pieces."""
+        """True if neither the reply nor a refusal can be complete yet, as after most pieces."""
         if expectation.length is None:
             return False
         if len(self.buffer) - self._skipped_to >= expectation.length + 3:
@@ -158,7 +159,7 @@ class RtuExchange:
         )
 
     def _loose(self, extent: ReplyExtent | None = None) -> list[Piece]:
-        """Return the bytes received beside the reply and the echo."""
+        """The received bytes besides the reply and the echo."""
         rest = bytearray(self.buffer)
         parts = []
         if extent is not None:
@@ -172,10 +173,9 @@ class RtuExchange:
         return [piece for part in parts for piece in pieces(part)]
 
     def silent(self) -> ExchangeResult | None:
-        """The line has been silent for longer than a pause inside a frame; maybe all is clear.
+        """Result after a silence longer than a pause inside a frame; None if the reply may follow.
 
-        What is left of the reply ends the exchange; noise, or another device's frame, does not:
-        the reply may follow.
+        The rest of a damaged reply ends the exchange; noise, or another device's frame, does not.
         """
         if self._expectation is None:
             return None
@@ -193,8 +193,7 @@ class RtuExchange:
         return None
 
     def _is_remnant(self, data: bytes, expectation: Expectation) -> bool:
-        """Return True if damaged bytes are what came of the reply: by its head, or by its
-        length."""
+        """True if damaged bytes are the rest of the reply, by their head or their length."""
         if expectation.length is not None and len(data) == expectation.length + 3:
             return True
         return begins_reply(data, self._device, expectation.function) or expectation.prefix in data
@@ -203,7 +202,7 @@ class RtuExchange:
         return self.echo is not False and self.frame.startswith(data)
 
     def expired(self) -> ExchangeResult:
-        """The time is up."""
+        """The result at the end of the timeout."""
         copied = self.frame in self.buffer
         if not self._mirrored:
             if copied:
@@ -271,7 +270,7 @@ def _candidates(
 
 
 def pieces(data: bytes | bytearray) -> list[Piece]:
-    """Received bytes taken apart into whole frames and what lies between them."""
+    """Received bytes, divided into whole frames and the bytes between them."""
     found: list[Piece] = []
     loose = 0
     for at, end in sorted(frame_ends(data).items()):

@@ -25,16 +25,20 @@ TOLERANCE = 0.001
 REMEMBERED, JUDGED, SELDOM = 64, 8, 0.15
 """Replies looked back at; how many are enough; the share of early ones on a line with a baud."""
 MUCH_TALK = 256
-"""Bytes that came in while nothing was due, and no silence, after which they are looked at."""
+"""Bytes received without a pause, while no reply was due, after which they are decoded."""
 IDLE_LIMIT = 4096
-"""Bytes kept of what comes in while nothing is due."""
+"""Bytes kept of those received while no reply is due."""
 BEFORE_END, SHORTEST_PAUSE = 0.0003, 0.0005
-"""Seconds before the end of a reply from which each piece of it is taken at once, and seconds for
-which it is worth to take none: a line that delivers single characters costs a turn for each."""
+"""Seconds before the end of a reply from which each piece is read immediately, and the shortest
+pause in reading. On a line that delivers single characters, each wake-up costs a turn of the
+loop."""
 
 
 class PutOffTimer:
-    """Does one thing once some seconds have gone by; lives in the line's loop."""
+    """Calls an action after a delay, which is often restarted; lives in the line's loop.
+
+    To restart it is cheap: the timer of the loop is kept, and set again only when it rings.
+    """
 
     def __init__(self) -> None:
         self._timer: asyncio.TimerHandle | None = None
@@ -42,7 +46,7 @@ class PutOffTimer:
         self._action: Callable[[], None] | None = None
 
     def start(self, delay: float, action: Callable[[], None]) -> None:
-        """Do only this, once so many seconds have gone by; a timer that is set is put off."""
+        """Call the action after so many seconds; replaces an earlier action and delay."""
         loop = asyncio.get_running_loop()
         self._due, self._action = loop.time() + delay, action
         if self._timer is not None and self._timer.when() > self._due:
@@ -51,7 +55,7 @@ class PutOffTimer:
             self._timer = loop.call_at(self._due, self._ring)
 
     def _ring(self) -> None:
-        """The time that was set first is over; a new one for each piece costs more."""
+        """Call the action if it is due, else wait on: a new timer for each piece costs more."""
         loop, self._timer = asyncio.get_running_loop(), None
         if self._action is None:
             return
@@ -61,11 +65,11 @@ class PutOffTimer:
             self._action()
 
     def leave(self) -> None:
-        """Do nothing any more; where it is soon started again, that costs less than stop()."""
+        """Cancel the action, but keep the timer: cheaper than stop() if start() follows soon."""
         self._action = None
 
     def stop(self) -> None:
-        """Do nothing any more."""
+        """Cancel the action and the timer."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -87,7 +91,7 @@ class RtuMaster:
         self.echo: bool | None = None
         self.failure: LineLost | None = None
         self.pause: Callable[[float], None] = lambda _: None
-        """Has the transport take nothing in for so many seconds, unless something is sent."""
+        """Has the transport read nothing for so many seconds, unless something is sent."""
         self._transport = transport
         self._around = around
         self._ended = ended
@@ -97,19 +101,19 @@ class RtuMaster:
         timing = around.timing
         floor = timing.frame_gap_tcp if isinstance(link, RtuTcpLink) else timing.frame_gap
         self._gap = max(self._silence, floor)
-        # what was said on the line before it was opened is not known
+        # earlier traffic on the line is unknown
         self._last = around.clock()
         self._hold = 0.0
         self._exchange: RtuExchange | None = None
         self._done: asyncio.Future[ExchangeResult] | None = None
         self._timer, self._time_out = PutOffTimer(), PutOffTimer()
         self._deadline = self._latest = 0.0
-        """When the reply is given up if nothing has come, and if bytes are coming in."""
+        """Timeout of the reply (line's clock) without any byte, and with bytes coming in."""
         self._sent = 0.0
         self._over = 0.0
         """When the last character of the reply that has begun is on the wire, at the latest."""
         self._ends = 0.0
-        """When that reply is given up, should nothing more come."""
+        """Timeout of that reply if no further byte comes."""
         self._idle = bytearray()
         self._early: deque[bool] = deque(maxlen=REMEMBERED)
         """Of the last replies, whether each began before its request was over."""
@@ -124,7 +128,7 @@ class RtuMaster:
         self._transport.close()
 
     def received(self, data: bytes, time: float) -> None:
-        """Bytes came in: part of the awaited reply, or of nothing that is due."""
+        """Take received bytes: part of the awaited reply, or unexpected ones."""
         self._last = time
         self._around.tally.bytes_in += len(data)
         if self._exchange is None:
@@ -133,7 +137,7 @@ class RtuMaster:
             if len(self._idle) < MUCH_TALK:
                 self._timer.start(self._gap, self._sort_idle)
             else:
-                self._sort_idle()  # others talk on and on: no silence would ever come
+                self._sort_idle()  # continuous traffic of others: there would be no silence
             return
         self._expect_end(self._exchange, len(data), time)
         result = self._exchange.feed(data)
@@ -148,10 +152,11 @@ class RtuMaster:
                 self.pause(pause)
 
     def _expect_end(self, exchange: RtuExchange, came: int, time: float) -> None:
-        """Wait for the rest of what has begun: by a gap, and as long as it is on the wire.
+        """Set the time until which the rest of a reply is awaited: its length on the wire, and a
+        gap.
 
-        A computer with much to do hands its bytes over with pauses in between; to ask again then
-        is to talk while the drive does. An echo may come in lumps while it is still being sent.
+        A busy computer delivers bytes with pauses in between; a new request then would collide with
+        the reply. An echo may come in pieces while the request is still being sent.
         """
         if not exchange.buffer:
             on_wire = exchange.longest * self._character
@@ -159,9 +164,9 @@ class RtuMaster:
         self._ends = max(time, self._sent, self._over) + self._gap
 
     def _came_too_early(self, result: ExchangeResult, time: float) -> bool:
-        """Return True if a reply began before its request was over: then it is that of another one.
+        """True if a reply began before the end of its request: then it belongs to another one.
 
-        Only where the line is known to keep the time of its baud.
+        Only if the line is known to keep the time of its baud.
         """
         if not self._wire_time or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
             return False
@@ -172,7 +177,7 @@ class RtuMaster:
         return early and seldom and len(self._early) >= JUDGED
 
     def lost(self, reason: str) -> None:
-        """The port went away: the waiting caller gets the error at once."""
+        """Note that the port is lost; the waiting caller gets the error at once."""
         self._timer.stop()
         self.failure = LineLost(f"The line was lost: {reason}.")
         settle(self._done, ExchangeResult(ResultKind.NOTHING))
@@ -198,7 +203,7 @@ class RtuMaster:
                 await self._transport.take_in()
                 if self._last + self._silence <= clock() or now >= give_up:
                     break
-                continue  # more came meanwhile
+                continue  # more bytes came
             await self._transport.rest(min(until, give_up))
         if self.failure is not None:
             raise self.failure
@@ -242,9 +247,9 @@ class RtuMaster:
         return result
 
     async def send_finished(self, data: bytes) -> None:
-        """Send a finished frame, await no reply, and leave the line quiet for it.
+        """Send a finished frame, await no reply, and keep the line quiet for one.
 
-        For a stop whose usual way has failed: it uses nothing that an exchange uses.
+        For a stop whose normal way has failed: it uses no state of an exchange.
         """
         await asyncio.sleep(self._gap)
         await self._transport.send(data)
@@ -261,9 +266,9 @@ class RtuMaster:
             raise self.failure or LineLost("The line was lost.") from error
 
     async def _distrust(self, sending: Sending) -> ExchangeResult:
-        """Let the time of the answer go by unheard.
+        """Wait for the end of the timeout, and ignore all bytes until then.
 
-        The program stood still as it sent: what came meanwhile may answer a request before.
+        The program was suspended while it sent: bytes since then may answer an earlier request.
         """
         clock = self._around.clock
         self._exchange = None
@@ -312,7 +317,7 @@ class RtuMaster:
                 settle(self._done, result)
 
     def _sort_idle(self) -> None:
-        """Look at what came in while nothing was due."""
+        """Decode the bytes that came while no reply was due."""
         if not self._idle:
             return
         self._timer.stop()
@@ -325,7 +330,7 @@ class RtuMaster:
                 self._around.stray(piece, self._last)
 
     def _count_port_errors(self) -> None:
-        """Note what the port has counted since the last look; asked only where an answer fails."""
+        """Add the port's error counts since the last call; only called if a reply fails."""
         now = self._port_errors()
         if now is None or self._counted is None:
             return

@@ -19,7 +19,7 @@ LONGEST_RETRY = 1.0
 
 
 class AliveReads:
-    """Queues a read for each device that is kept alive and was not heard for a while.
+    """Queues a read for each device that is kept alive and has not answered for a while.
 
     Lives in the line's loop, and is used only while this program holds the line.
     """

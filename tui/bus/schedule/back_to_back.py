@@ -1,4 +1,4 @@
-"""Keeps the line free for moments in which a program that asks again and again may ask next."""
+"""Keeps the line free for a moment if a program that reads continuously will soon send again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PAUSES = 4
 MARGIN, TRIP = 1.25, 0.003
 """Share of the longest pause, and seconds for its way to here, for which the line is kept free."""
 POLLS_SHARE = 0.15
-"""Share of the time that polls have beside it."""
+"""Share of the time that polls get in addition."""
 REST_AT_MOST = 2.0
 """Seconds from an answer to the next request up to which a program asks again and again."""
 GAP, LONGEST_GAP = 0.85, 0.1

@@ -43,7 +43,7 @@ async def open_port(link: SerialLink, *, alone: bool = True) -> Transport:
 
 
 def _open_port(link: SerialLink, *, alone: bool) -> tuple[serial.Serial, str]:
-    """The open port, and what is to be said of it."""
+    """The open port, and a remark about it."""
     port = open_serial(link.path, link.baud, link.format, alone=alone)
     note = ""
     if is_pseudo_terminal(link.path):
@@ -108,7 +108,7 @@ def _no_counts() -> None:
 
 
 class Connection:
-    """The life of a line in its loop; `changed` hears of every new state."""
+    """The life of a line in its loop; `changed` is called with each new state."""
 
     def __init__(
         self,
@@ -132,10 +132,10 @@ class Connection:
         self._note = ""
         dispatcher.steps.recovered = self._say_connected
         self.refusal: LineError | None = None
-        """Why requests are failed at once; None while they are taken."""
+        """Reason if requests fail immediately; None while they are accepted."""
 
     async def run(self) -> None:
-        """Connect and serve, again and again, until cancelled."""
+        """Connect and serve repeatedly, until canceled."""
         self._say(LineStatus.CONNECTING)
         while True:
             try:
@@ -148,12 +148,12 @@ class Connection:
             except LineError as error:
                 failure = error
             except Exception as error:
-                # a fault of this program must not take the line away for good
+                # an internal error must not lose the line permanently
                 log.exception("the line's loop failed")
                 failure = LineFailed(f"The line failed: {error!r}.")
             self._failures += 1
             if type(failure) is LineLost and self._dispatcher.steps.behind:
-                # stops are still taken, and kept: the line is tried again soon
+                # stops are still accepted and kept: the line is opened again soon
                 failure, self._failures = LineBehind(str(failure)), 1
             timing = self._around.timing
             delay = pause(self._failures, timing.reconnect_first, timing.reconnect_longest)
@@ -167,7 +167,8 @@ class Connection:
             await (self._shared.pause(delay) if self._shared else asyncio.sleep(delay))
 
     async def _once(self) -> None:
-        """One connection, from opening until nobody needs it any more. Raises when it is lost."""
+        """Serve one connection until no program needs it. Raises the line's errors when it is
+        lost."""
         if self._shared is not None:
             await self._shared.own(self._say_of_owner)
         master = await open_master(

@@ -14,19 +14,19 @@ from ..requests import Read
 TURNAROUNDS_KEPT = 16
 """Turnarounds remembered for each function."""
 COPIES = 6
-"""Replies of a device of which a copy may still come."""
+"""Number of replies of which a copy may still come."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outstanding:
-    """A reply that may still come until `expires`; asked for at `sent`, it was due at `due`."""
+    """A reply that may still come until `expires`, to a request of `sent`; it was due at `due`."""
 
     expectation: Expectation
     sent: float
     due: float
     expires: float
     copy: bool = False
-    """True if it came once already, at `sent`, and may come again."""
+    """True if it has come, at `sent`, and may come again."""
     pdu: bytes = b""
     """The request, if it may be repeated while its reply is outstanding."""
 
@@ -51,7 +51,7 @@ class Device:
     recent: dict[int, deque[float]] = field(default_factory=dict)
     outstanding: list[Outstanding] = field(default_factory=list)
     lateness: float = 0.0
-    """The longest that a reply came after its timeout."""
+    """Longest delay of a reply after its timeout in seconds."""
     settle: float = 0.0
     """Quiet time after each reply of a device that repeats its replies later."""
     repeated: float = 0.0
@@ -62,7 +62,7 @@ class Device:
     """The last requests that were answered, with their replies."""
     heard: float | None = None
     reported_usual: float | None = None
-    """The usual turnaround as the program told that owns the line."""
+    """The usual turnaround, as reported by the program that owns the line."""
     last: Expectation | None = None
     last_time: float = 0.0
 
@@ -74,7 +74,7 @@ def usual(recent: Mapping[int, Sequence[float]]) -> float | None:
 
 
 def note_turnaround(record: Device, function: int, turnaround: float) -> None:
-    """Note a turnaround; the timeout goes by the recent ones."""
+    """Note a turnaround; the timeout follows the recent ones."""
     recent = record.recent.setdefault(function, deque(maxlen=TURNAROUNDS_KEPT))
     recent.append(turnaround)
     record.turnaround = max(recent)

@@ -56,18 +56,19 @@ class Dispatcher:
         """Decides which replies are trusted after another process has used the line."""
         self._alive_reads = AliveReads(devices, self.facts, clock, self.submit)
         self.in_flight = False
-        """True if a request was sent whose end is not known yet."""
+        """True while an exchange is in progress."""
         self.held_back: Callable[[], bool] = bool
-        """True if nothing but stops may go out now: others may have sent stops meanwhile."""
+        """True if only stops may be sent now, because other programs may have sent stops
+        meanwhile."""
         self.last_way: LastWay | None = None
         """Place of stops that bypass the queue."""
 
     def wake(self) -> None:
-        """Something changed: a request came, a late reply came, or the line was lost."""
+        """Look at the queue again: a request or a late reply came, or the line was lost."""
         self._wake.set()
 
     def submit(self, job: Job) -> None:
-        """Queue a request, or fail it at once when its device is being left alone."""
+        """Queue a request, or fail it immediately if polling of its device is paused."""
         if self._ends_unsent(job):
             return
         try:
@@ -82,7 +83,7 @@ class Dispatcher:
             self.fail(job, reason, kind)
 
     def fail(self, job: Job, reason: str, kind: type[LineError] = LineLost) -> None:
-        """Fail a request without a line; the word of a stop is kept if the line closed itself."""
+        """Fail a request without a line; a stop word is kept if the line closed itself."""
         keeps = bool(self.steps.behind) and kind is not LineClosed
         if (kept := fail_lost(job, reason, kind, self._clock(), keeps=keeps)) is not None:
             self._queue.keep(kept)
@@ -99,20 +100,20 @@ class Dispatcher:
         return self._queue.drain()
 
     def put_back(self, job: Job) -> None:
-        """Queue a job that was taken out without a result, at its old place."""
+        """Queue a job again at its old place, as it has no result yet."""
         self._queue.put_back(job)
         self._wake.set()
 
     def void(self) -> None:
-        """A stop was given: what waits to change its device is refused at once."""
+        """Refuse waiting commands that a stop has canceled."""
         self._queue.refuse(self.refusal)
 
     def void_older(self, than: float, why: str) -> None:
-        """Refuse what waits to change anything since before a moment, but for stops."""
+        """Refuse waiting commands that are older than a moment, except stops."""
         self._queue.refuse(lambda job: why if job.commands and job.requested < than else "")
 
     def stray(self, piece: Piece, time: float) -> None:
-        """A whole frame came that nobody waited for; it may be what others were held back for."""
+        """Note a whole frame that came when none was due: requests may have waited for it."""
         self._outcomes.note_stray(piece, time)
         self.steps.stray(piece)
         self._wake.set()
@@ -175,11 +176,11 @@ class Dispatcher:
         return self.steps.refuses(job) or ends_unsent(job, self._devices, values, now)
 
     def refusal(self, job: Job) -> str:
-        """Why a write must not go out: a stop came after it, or another program commands."""
+        """Reason if a write must not be sent: a stop came after it, or another program commands."""
         return refusal_of(job, self.facts)
 
     def forbidden(self, job: Job) -> str:
-        """Why a request must not go out, by all, and by the one who asks."""
+        """Reason if a request must not be sent, by the shared state or by its sender."""
         return self.refusal(job) or (job.forbidden() if job.forbidden is not None else "")
 
     def _begins(self, job: Job) -> bool:
@@ -304,7 +305,7 @@ class Dispatcher:
             self._repeat(job, result)
 
     def _repeat(self, job: Job, result: ExchangeResult) -> None:
-        # one drive that went away must not keep the others waiting for several timeouts
+        # one drive that no longer answers must not delay the others by several timeouts
         missed = job.priority is Priority.POLL and result.kind is ResultKind.NOTHING
         self._queue.put_back(job, behind=missed)
         self._wake.set()
@@ -320,7 +321,7 @@ class Dispatcher:
         request = job.request
 
         def look() -> None:
-            # what came in during the silence before it, or while this program stood still
+            # a stop may have come during the silence before it, or while this program was suspended
             if job.priority is not Priority.STOP and self.held_back():
                 raise _NotSent
             if why := self.refusal(job):

@@ -1,4 +1,4 @@
-"""The thread and the loop of a line, and the ways into it from other threads."""
+"""The thread and the loop of a line, and the entry points from other threads."""
 
 from __future__ import annotations
 
@@ -248,13 +248,13 @@ class Engine:
             self._changed(LineState(LineStatus.CLOSED, "", self._clock()))
 
     async def _end(self) -> None:
-        """Fail what waits, end the workers."""
-        # what other threads handed over before the line was closed is taken first
+        """Fail the waiting requests, end the workers."""
+        # first take what other threads submitted before the line was closed
         await asyncio.sleep(0)
         quiet = self._quiet_after()
         self._dispatcher.fail_all("The line is closed.", LineClosed)
         if self._shared is not None:
-            await asyncio.sleep(0)  # what was failed is told first
+            await asyncio.sleep(0)  # first send the errors of the failed requests
             await self._shared.close(quiet)
         workers = set(self._workers)
         for task in workers:
@@ -269,7 +269,7 @@ class Engine:
         await asyncio.get_running_loop().shutdown_asyncgens()
 
     def _quiet_after(self) -> float:
-        """Seconds for which a reply to what was sent from here may still come."""
+        """Seconds for which a reply to a request of this program may still come."""
         now = self._clock()
         waits = self._dispatcher.in_flight or self._dispatcher.proof.busy
         late = now + self._timing.late_reply if waits else now
@@ -277,7 +277,7 @@ class Engine:
 
 
 def _do(action: Callable[[T], None], argument: T) -> None:
-    """Do something in the loop; who waits for it hears of an error in that."""
+    """Call an action in the loop; an error reaches the waiting caller."""
     try:
         action(argument)
     except Exception as error:

@@ -23,7 +23,7 @@ from .unsent import fail_without_line, is_stop_word
 CHECK_EVERY, CHECK_SHARE = 10.0, 0.01
 """Seconds from one proof to the next on a connection that buffers, and their longest share."""
 SUSPECT = 2
-"""Exchanges in a row that brought an earlier reply, after which the line is left to drain."""
+"""Exchanges in a row with an earlier reply, after which the line is left quiet."""
 LONGEST_DRAIN = 10.0
 REOPENINGS = 3
 """Times that the line is opened again immediately; after that, every RETRY seconds."""
@@ -65,7 +65,7 @@ class InStep:
         self.lengthen = self._probes.lengthen
         self._proved: set[int] = set()
         self._weak: set[int] = set()
-        """Drives whose next reply proves its step if it is unlike the last one alone."""
+        """Drives whose next reply proves the step if it differs from the last one only."""
         self._missed: dict[int, bytes] = {}
         """By device, the last request if nothing came: a reply to it is as good for its repeat."""
         self._next_check = 0.0
@@ -76,9 +76,9 @@ class InStep:
         self._last = -1
         """The device of the last exchange."""
         self.quiet_until = 0.0
-        """Until then the line is left to drain; 0 if it is not."""
+        """End of the time in which the line is left quiet; 0 if it is not."""
         self.behind = ""
-        """The trouble in a sentence, if the replies are behind."""
+        """A sentence about the problem if the replies are behind."""
         self.reopen = False
         """True if the connection must be closed, and opened again immediately."""
         self.recovered: Callable[[], None] = lambda: None
@@ -96,14 +96,14 @@ class InStep:
             self._probes.forget_sent()
 
     def refuses(self, job: Job) -> bool:
-        """Fail a request on a line that is behind, unless it is the word of a stop."""
+        """Fail a request on a line that is behind, unless it is a stop word."""
         if not self.behind or is_stop_word(job):
             return False
         fail_without_line(job, LineBehind(self.behind))
         return True
 
     def not_before(self, job: Job, now: float) -> float | None:
-        """When a request may be taken out, if that depends on nothing else; else None."""
+        """When a request may be sent, if that depends on nothing else; else None."""
         if self.behind and job.priority is not Priority.STOP:
             return 0.0  # to fail
         drains = self.quiet_until > now and job.priority > Priority.FEED
@@ -115,7 +115,7 @@ class InStep:
         if own is None or is_stop_word(job) or own.function in (IDENTIFY, REPORT_ID):
             return None
         if not self._timing.probes or job.within is not None:
-            return None  # who says how long is waited looks whether anybody answers at all
+            return None  # a request with its own timeout checks if there is a device at all
         if self._buffers and self._clock() >= self._next_check:
             self._proved.discard(device)
         before = self._probes.sent(device)
@@ -126,7 +126,7 @@ class InStep:
         if (before and self.lengthen(job)) or job.priority is Priority.STOP:
             return None
         if job.probes >= LOOKED_BACK:
-            return None  # what refuses so many is not going to prove anything
+            return None  # a drive that refuses so many probes will not prove its step
         job.probes += 1
         if (probe := self._probes.find(job)) is not None or not before:
             return probe
@@ -264,8 +264,10 @@ class InStep:
         return False
 
     async def attend(self, master: Master) -> float:
-        """Look whether a line that is behind is in step again; returns the seconds to the next
-        look. Raises LineLost."""
+        """Check if a line that is behind is in step again; returns the seconds to the next check.
+
+        Raises LineLost.
+        """
         now = self._clock()
         if now < self._next_try:
             return self._next_try - now
@@ -279,7 +281,7 @@ class InStep:
             self._waited += PROBE_AGAIN
             return PROBE_AGAIN
         if probe is None:
-            self._tries = PROBES  # few forms: the line is opened again all the same
+            self._tries = PROBES  # few forms: the line is opened again anyway
         else:
             await master.quiet()
             self._tries += 1
@@ -289,7 +291,7 @@ class InStep:
         if self.behind and self._tries >= PROBES:
             self._rounds += 1
             if not self._shifts and probe is not None:
-                self._fall_in()  # nothing speaks for it any more
+                self._fall_in()  # there is no further sign of it
             drain = self._timing.first_timeout
             self._next_try = self._clock() + (drain if self._rounds < REOPENINGS else RETRY)
         return 0.0

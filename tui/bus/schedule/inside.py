@@ -30,7 +30,7 @@ class LineInside:
     error: Callable[[], LineError | None]
     """The reason why the line is lost."""
     submit: Callable[[Job], None]
-    """Queues a job, or fails it at once where the line is lost."""
+    """Queues a job, or fails it immediately if the line is lost."""
 
     @property
     def timing(self) -> Timing:
@@ -70,13 +70,13 @@ class SharedLine(Protocol):
         """Return once no program needs the line: never if this one does."""
 
     async def pause(self, seconds: float) -> None:
-        """Wait before a lost line is tried again; a program that comes ends the wait."""
+        """Wait before the next attempt on a lost line; a program that attaches ends the wait."""
 
     def rest(self, quiet: float) -> None:
-        """The port is closed; a reply may still come for `quiet` seconds."""
+        """Note that the port is closed; a reply may still come for `quiet` seconds."""
 
     def pass_on(self, message: bytes) -> bool:
-        """Send a finished message to the owner; False if none takes it."""
+        """Send a finished message to the owner; False if there is none that accepts it."""
 
     def tell_state(self) -> None:
         """The line's state has changed."""

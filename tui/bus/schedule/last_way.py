@@ -1,4 +1,4 @@
-"""The way of prepared writes around the queue, for when the code of the usual way has failed."""
+"""Sending of prepared writes around the queue, if the code of the normal way has failed."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ class _Waiting:
 
 
 class LastWay:
-    """Sends finished frames by whatever still works; lives in the line's loop.
+    """Sends finished frames by any way that still works; lives in the line's loop.
 
-    Between two exchanges of the open port if the dispatcher still comes by, else without waiting
-    for it; by the owner of a shared line; on a port of its own. It shares no code with the queue.
+    The ways: between two exchanges of the open port, as long as the dispatcher runs, else without
+    waiting for it; through the owner of a shared line; on a port of its own. It shares no code with
+    the queue.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class LastWay:
         self._wake()
 
     def lose(self) -> None:
-        """The line is not open any more; what waits is sent by another way."""
+        """Forget the line, which is closed; waiting writes are sent by another way."""
         self.master = None
         self._send_now()
 

@@ -26,9 +26,9 @@ from .queue import Job
 from .shared_values import SharedValues
 
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
-"""Exceptions by which a gateway says that a device behind it did not answer."""
+"""Exceptions by which a gateway reports that a device behind it did not answer."""
 STILL = 1.0
-"""Seconds past the timeout after which an answer cannot have come just now."""
+"""Seconds above the timeout after which an answer cannot have come just now."""
 REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL + 1))
 SHORT_SILENCE = 5.0
 """Seconds after which several misses in a row are a trouble of the drive, not of the line."""
@@ -71,12 +71,12 @@ class Outcomes:
         return result.turnaround + self._clock() - result.end > longest + STILL
 
     def hear_gateway(self, job: Job, result: ExchangeResult) -> None:
-        """Take a gateway's word that a device behind it was silent for that silence."""
+        """Treat a gateway's report of a silent device as that silence."""
         if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
             result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
 
     def conclude(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> bool:
-        """Note the result of a request, and hand it back; True where it is to be sent again.
+        """Note the result of a request, and return it to the caller; True if it must be sent again.
 
         `unsent`: the probe before it had no reply, so that it was not sent itself.
         """
@@ -117,7 +117,7 @@ class Outcomes:
         return False
 
     def count_beside(self, device: int, result: ExchangeResult) -> None:
-        """Count the reply to a request that was sent beside the one that was asked for."""
+        """Count the reply to a request that was sent in addition to the requested one."""
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._count_good(device, result, result.end)
 
@@ -130,17 +130,19 @@ class Outcomes:
         tally.count_good(device, was_heard=record.ever_answered and short)
 
     def _share(self, job: Job, reply: Reply) -> None:
-        """Keep what was read, while somebody else may want it.
+        """Keep the words of a reply, while another reader may use them.
 
-        Another program, or another client of this one: a gateway takes what was read before.
+        That is another program, or another client of this one: a gateway uses earlier values.
         """
         if len(self._facts.programs) > 1 or job.max_age:
             self.values.note(job.request, reply.words, reply.time)
 
     @staticmethod
     def _time_of(job: Job, result: ExchangeResult) -> float:
-        """The time of a reply. That to a repeat may be the late one to the first try: it is right
-        for the request, but no newer than the first try."""
+        """The time of a reply; of a repeat, that of the first try.
+
+        Its reply may be the late one to the first try: right for the request, but no newer.
+        """
         return result.end if job.first_sent is None else min(job.first_sent, result.end)
 
     def _failed(self, job: Job, result: ExchangeResult, now: float) -> bool:
@@ -148,7 +150,7 @@ class Outcomes:
         assert expectation is not None
         place = (request.device, request.function, request.register)
         again = b"" if request.changes else job.pdu
-        # who says how long is waited looks whether anybody answers that at all
+        # a request with its own timeout checks if there is a device at all
         known = job.within is None and self._devices[request.device].ever_answered
         searched = job.priority >= Priority.BACKGROUND and not known
         if result.kind in (ResultKind.DAMAGED, ResultKind.WRONG) and not searched:
@@ -192,7 +194,7 @@ class Outcomes:
         return record.ever_answered and not rests and job.priority in REPEATED_WHEN_SILENT
 
     def note_strays(self, strays: Iterable[Piece], time: float) -> set[int]:
-        """Pass on frames that came beside the reply; returns the devices of unexplained ones."""
+        """Note frames that came with the reply; returns the devices of unexplained ones."""
         unexplained = set()
         for piece in strays:
             self._tally.stale += 1
@@ -201,7 +203,7 @@ class Outcomes:
         return unexplained
 
     def note_stray(self, piece: Piece, time: float) -> bool:
-        """Take note of a frame that answers no present request; True if it is explained."""
+        """Note a frame that answers no present request; True if its origin is known."""
         kind, device = self._devices.stray(piece, time), piece.device
         answers = device in self._devices.known and self._devices[device].ever_answered
         if not kind and (not answers or overheard_request(piece.data) is not None):
@@ -230,6 +232,6 @@ class Outcomes:
 
 
 def with_fate(job: Job, text: str) -> str:
-    """Add to an error of a write that it may have been taken nevertheless."""
+    """Add to an error of a write that it may have taken effect."""
     unknown = job.request.changes and job.request.device != BROADCAST
     return text + OUTCOME_UNKNOWN if unknown else text

@@ -1,4 +1,4 @@
-"""The time of a line shared out among everything that asks again and again.
+"""Division of the line's time among all regular polls.
 
 The holder of the line finds one factor for the periods of all programs; see PollsServed.
 """
@@ -26,7 +26,7 @@ class Pace:
         self._wishes: dict[Hashable, tuple[int, float]] = {}
         self._lock = threading.Lock()
         self.others: Mapping[int, float] = {}
-        """Share of the line's time that other programs' polls wish for, by device."""
+        """Share of the line's time that polls of other programs request, by device."""
         self.stretch = 1.0
         """The factor by which the holder of the line lengthens the periods of all programs."""
         self.carrier: PollCarrier | None = None
@@ -51,11 +51,11 @@ class Pace:
 
     @property
     def busy(self) -> bool:
-        """True if anybody asks again and again."""
+        """True if there are regular polls."""
         return bool(self._wishes)
 
     def release(self, who: Hashable) -> None:
-        """Wish for nothing any more."""
+        """Withdraw all requested shares."""
         with self._lock:
             self._wishes.pop(who, None)
 

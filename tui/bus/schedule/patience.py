@@ -44,11 +44,11 @@ class Devices:
         return self._devices.get(device) or self._devices.setdefault(device, Device())
 
     def describe(self, device: int, limits: Limits) -> None:
-        """Set what a device may be sent."""
+        """Set the requests that a device accepts."""
         self[device].limits = limits
 
     def state(self, device: int) -> DeviceState:
-        """Return what is known about a device."""
+        """Return the state of a device, as shown to programs."""
         record = self[device]
         return DeviceState(
             record.answers,
@@ -69,7 +69,7 @@ class Devices:
         return tuple(self._devices)
 
     def copy(self, device: int, state: DeviceState) -> None:
-        """Take over what the program that owns the line has seen of a device."""
+        """Take over the state of a device from the program that owns the line."""
         record = self[device]
         record.answers, record.failures = state.answers, state.failures
         record.silent_since, record.next_try = state.silent_since, state.next_try
@@ -192,7 +192,7 @@ class Devices:
         *,
         refused: bool = False,
     ) -> None:
-        """A reply came, or a refusal; `exchanged` are the request and its reply."""
+        """Note a reply or a refusal; `exchanged` are the request and its reply."""
         record = self[device]
         record.answers = record.ever_answered = True
         record.heard = now
@@ -244,7 +244,7 @@ class Devices:
     def may_come(
         self, device: int, expectation: Expectation, sent: float, now: float, pdu: bytes = b""
     ) -> None:
-        """The reply to a request sent at `sent` has not come, but may yet."""
+        """Note that the reply to a request of `sent` has not come, but may yet."""
         if not self._mistakable:
             return
         record = self[device]
@@ -256,7 +256,7 @@ class Devices:
             self.quiet_until = now + min(LATE_MARGIN * record.lateness, quiet)
 
     def stray(self, piece: Piece, now: float) -> StrayKind:
-        """A whole frame came that was not the awaited one: what it is, as far as is known."""
+        """Determine the origin of a whole frame that was not the awaited one, if possible."""
         record = self._devices.get(piece.device)
         if record is None:
             return ""

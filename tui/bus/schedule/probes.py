@@ -20,7 +20,7 @@ from .queue import Job
 ECHO = 0
 """The sub-function that every device echoes, if it has function 8."""
 LOOKED_BACK = 4
-"""Requests to a drive whose replies have a form of their own."""
+"""Number of recent requests to a drive whose replies differ in form."""
 
 
 class Probes:
@@ -45,7 +45,7 @@ class Probes:
         return self._sent.setdefault(0 if self._gateway else device, deque(maxlen=LOOKED_BACK))
 
     def forget_sent(self) -> None:
-        """No earlier reply can come: the connection is a new one."""
+        """Forget earlier requests: on a new connection, their replies cannot come."""
         self._sent.clear()
 
     def note_good(self, read: Read) -> None:
@@ -53,7 +53,7 @@ class Probes:
         self._good.setdefault(read.device, {})[read.count] = read
 
     def lengthen(self, job: Job) -> bool:
-        """Have a read sent longer, so that no earlier reply can be taken for its own."""
+        """Lengthen a read, so that no earlier reply can be mistaken for its own."""
         if not isinstance(job.request, Read) or not job.limits.answers_all:
             return False
         forms = self.forms.longer(job.request, job.limits)
@@ -70,7 +70,7 @@ class Probes:
         return next((request for request in found if self._is_new(request, depth)), None)
 
     def find_alone(self, job: Job, depth: int) -> Request | None:
-        """The same where the job itself is not sent; it may be the job."""
+        """The same if the job itself is not sent; it may be the job."""
         return next((request for request in self._alone(job) if self._is_new(request, depth)), None)
 
     def _alone(self, job: Job) -> Iterator[Request]:
@@ -123,7 +123,7 @@ FORM_TRIES = 2
 SILENT_FOR, DEVICE_SILENT_FOR = 60.0, 300.0
 """Seconds until they are sent again: of those registers, and to a drive that may be silent."""
 REMEMBERED = 4096
-"""Longer reads whose failures are remembered at most."""
+"""Most longer reads whose failures are remembered."""
 
 
 class Forms:
@@ -145,7 +145,7 @@ class Forms:
         for more in range(1, MOST_MORE + 1):
             form = replace(request, count=request.count + more)
             if form in self._refused or self._rests(form, SILENT_FOR):
-                return  # what is longer is refused too
+                return  # longer reads are refused too
             if not send_refusal(form, limits):
                 yield form
 

@@ -20,7 +20,7 @@ from ..requests import BROADCAST, Read, Request
 
 @dataclass(eq=False, slots=True)
 class Job:
-    """One request with everything needed to send it and to hand back its answer."""
+    """One request with all that is needed to send it and to return its reply."""
 
     request: Request
     priority: Priority
@@ -29,23 +29,23 @@ class Job:
     repeats: int = 0
     """Number of retries."""
     first_sent: float | None = None
-    """When it was first sent, if it is sent again: a reply to it may be of that time."""
+    """When it was first sent, if it is a repeat: a reply may be to that first request."""
     pdu: bytes = b""
     form: Read | None = None
     """The longer read that is sent for it."""
     probes: int = 0
     """Requests that were sent before it so that its drive proves its step."""
     begun: bool = False
-    """True if it was taken from the queue once, so that it cannot be withdrawn any more."""
+    """True if it was taken from the queue once: then it can no longer be withdrawn."""
     expectation: Expectation | None = None
     order: int = 0
     """Place among the jobs of its priority; kept when it is sent again."""
     replaceable: bool = False
     """True if a newer write of the same register may take its place while it waits."""
     forbidden: Callable[[], str] | None = None
-    """Asked just before it is sent: why it must not be any more, or empty."""
+    """Called just before it is sent; returns the reason if it must not be, else nothing."""
     program: str = ""
-    """Id of the program that asks."""
+    """Id of the requesting program."""
     stamp: int = 0
     """The count of stops of the device that it knew of."""
     requested: float = 0.0
@@ -54,10 +54,10 @@ class Job:
     """A reply to the same request of any program is used, up to this age in seconds."""
 
     within: float | None = None
-    """Seconds in which its answer is to begin, where the asker says it; else the line knows."""
+    """Timeout in seconds, if the requester sets it; else it follows from the device's state."""
 
     def __post_init__(self) -> None:
-        # made now, in the thread of the one who asks: the line's own has a silence to keep
+        # made in the caller's thread: the line's thread must keep the inter-frame gap
         self.pdu = self.request.pdu()
         if self.request.device != BROADCAST:
             self.expectation = self.request.expectation()
@@ -85,17 +85,17 @@ class Job:
         return self.request.changes and self.priority is not Priority.STOP
 
     def fail(self, error: LineError) -> None:
-        """Hand back an error, unless the one who asked has gone."""
+        """Return an error to the caller, unless it no longer waits."""
         if self.begun or self.answer.set_running_or_notify_cancel():
             self.begun = True
             self.answer.set_exception(error)
 
     def break_off(self, error: Exception) -> None:
-        """An internal error kept it from being queued."""
+        """Fail it with an internal error of the line."""
         self.fail(LineFailed(f"The line failed: {error!r}."))
 
     def finish(self, pdu: bytes, time: float) -> Reply:
-        """Hand back a checked reply, without device and checksum."""
+        """Return a checked reply to the caller; `pdu` is without device and checksum."""
         own = self.own_part(pdu)
         reply = Reply(self.request.words(own), time, own)
         self.answer.set_result(reply)
@@ -103,9 +103,9 @@ class Job:
 
 
 class JobQueue:
-    """Bounded queue: by shares and priority, then first come first served.
+    """Bounded queue, ordered by shares and priority, then first come first served.
 
-    It passes by what must wait yet.
+    It skips requests that must wait.
     """
 
     def __init__(self, length: int, use: ProgramUse | None = None) -> None:
@@ -121,10 +121,10 @@ class JobQueue:
         return len(self._jobs)
 
     def put(self, job: Job) -> None:
-        """Queue a job. Raises LineBusy when the queue is full.
+        """Queue a job. Raises LineBusy if the queue is full.
 
-        Each program that shares the line has as much room: none takes it from the others. A stop
-        always finds some; polls and background work leave half of it to the operator.
+        Each program that shares the line has the same number of places. A stop always has one;
+        polls and background work leave half of the places to the operator.
         """
         if job.replaceable and (older := self._replaced_by(job)) is not None:
             self._jobs.remove(older)
@@ -141,10 +141,10 @@ class JobQueue:
         self._jobs.append(job)
 
     def _replaced_by(self, job: Job) -> Job | None:
-        """A waiting write whose place this one may take.
+        """A waiting write that this one may replace.
 
-        Only where nothing else that changes the device waits behind it, so that no command
-        ever meets another reference than those before and after it.
+        Only if no other change of the device waits after it, so that every command meets the same
+        reference as without the replacement.
         """
         request = job.request
         behind = [
@@ -159,20 +159,20 @@ class JobQueue:
         return older if same == (job.priority, type(request), request.register) else None
 
     def put_back(self, job: Job, *, behind: bool = False) -> None:
-        """Queue a job that is sent again, at its old place or behind all that wait."""
+        """Queue a job again, at its old place or after all others."""
         if behind:
             job.order = next(self._orders)
         self._jobs.append(job)
 
     def keep(self, stop: Job) -> None:
-        """Queue a stop for whose answer nobody waits, unless the same one waits."""
+        """Queue a stop whose reply has no receiver, unless an equal one waits."""
         if not any(stop.request == job.request for job in self._jobs):
             self._jobs.append(stop)
 
     def take(
         self, not_before: Callable[[Job], float], now: float
     ) -> tuple[Job | None, float | None]:
-        """The job that goes out now, or when one may; both None when nothing waits."""
+        """The job to send now, or the time when one may be sent; both None if nothing waits."""
         earliest: float | None = None
         self._jobs = [job for job in self._jobs if not self._withdrawn(job)]
 
@@ -193,7 +193,7 @@ class JobQueue:
         return any(job.priority is Priority.STOP and job.request.changes for job in self._jobs)
 
     def count(self, job: Job, begun: float, now: float, *, acknowledged: bool) -> None:
-        """A job that was taken has kept the line since `begun`."""
+        """Count a job that has kept the line since `begun`."""
         seconds = now - begun
         self._stops.count(job, now, acknowledged=acknowledged)
         self._shares.count(job, seconds, self._jobs)
@@ -204,7 +204,7 @@ class JobQueue:
         return not job.begun and job.answer.cancelled()
 
     def waiting(self) -> tuple[Job, ...]:
-        """All that wait, in the order in which they came."""
+        """The waiting jobs, in the order of their arrival."""
         return tuple(self._jobs)
 
     def remove(self, job: Job) -> None:
@@ -212,7 +212,7 @@ class JobQueue:
         self._jobs.remove(job)
 
     def refuse(self, reason: Callable[[Job], str]) -> None:
-        """Take out and fail what waits and has a reason not to be sent."""
+        """Remove and fail the waiting jobs that have a reason not to be sent."""
         for job in self.waiting():
             if why := reason(job):
                 self.remove(job)
@@ -233,10 +233,10 @@ class SentStop(NamedTuple):
 
 
 class SentStops:
-    """Says which stops take turns with what else waits. Lives in the line's loop.
+    """Decides which stops take turns with other requests. Lives in the line's loop.
 
-    A stop is the first unless the same request was acknowledged just before, and nothing else has
-    changed its device since. A repeat waits for one other exchange at most.
+    A stop is first, unless the same request was acknowledged just before and no other command to
+    its device followed. A repeat waits for one other exchange at most.
     """
 
     def __init__(self) -> None:
@@ -259,7 +259,7 @@ class SentStops:
         request = job.request
         self._stopped_last = job.priority is Priority.STOP
         if job.commands:
-            # the same stop means something again
+            # the same stop is needed again
             self._sent = {
                 which: sent
                 for which, sent in self._sent.items()
@@ -280,11 +280,11 @@ MINIMUM_SHARES: Mapping[Priority, float] = {
     Priority.POLL: 0.15,
     Priority.BACKGROUND: 0.05,
 }
-"""Of the time of a full line, by kind of request; stops and commands take all that they need."""
+"""Shares of a full line's time, by kind of request; stops and commands take all they need."""
 MOST_OWED = 0.3
-"""Seconds of the line that a kind may be owed: what it could not use is not made up for."""
+"""Most seconds of the line that a kind may be owed: unused time is not kept."""
 OVERDUE = 0.1
-"""Seconds owed from which a kind goes before those above it: a few commands pass undivided."""
+"""Seconds owed at which a kind precedes higher ones: short series of commands pass undivided."""
 LEAST_COUNTED = 0.001
 """Seconds that an exchange is counted for at least."""
 
@@ -339,7 +339,7 @@ class LineShares:
         for priority, share in MINIMUM_SHARES.items():
             due = self._owed[priority] + share * seconds
             if priority is kind:
-                # what it takes beyond its share while nothing else waits is no debt
+                # use above its share is no debt while nothing else waits
                 due = max(due - seconds, -seconds)
             self._owed[priority] = min(
                 due, MOST_OWED if priority is kind or priority in kinds else 0.0

@@ -1,4 +1,4 @@
-"""Words that were read a moment ago, for other programs before they are old."""
+"""Words of the last replies, for reads of other programs while they are recent."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class SharedValues:
         self._words: dict[int, dict[tuple[int, int], tuple[int, float]]] = {}
 
     def note(self, request: Request, words: Sequence[int], time: float) -> None:
-        """Keep what a read brought; what changes a device makes all of its words old."""
+        """Keep the words of a read; a change of a device discards all of its words."""
         if request.changes:
             self.drop(request.device)
         elif isinstance(request, Read):
@@ -31,9 +31,9 @@ class SharedValues:
             self._words.pop(device, None)
 
     def find(self, request: Request, oldest: float) -> Reply | None:
-        """The reply that a read would bring, from words not read before `oldest`.
+        """The reply to a read, made of words that were read no earlier than `oldest`.
 
-        Only words of one reply: two of different moments could belong to two values.
+        Only of words of one reply: two of different times could belong to two values.
         """
         if type(request) not in (Read, ReadInput) or not isinstance(request, Read):
             return None

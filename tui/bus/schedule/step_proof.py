@@ -20,7 +20,7 @@ from .probes import ECHO
 from .queue import Job
 
 MOST_TRIES = 3
-"""Requests that are sent for a proof; then the device has to wait."""
+"""Most requests for a proof; then the device must wait."""
 
 
 class StepProof:
@@ -48,7 +48,7 @@ class StepProof:
         self._proved: set[int] = set()
         self._tries: dict[int, int] = {}
         self._repeats: dict[int, Job] = {}
-        """The last stop of each device whose reply proves nothing."""
+        """The last stop of each device that was sent when replies proved nothing."""
 
     def doubt(self, until: float) -> None:
         """Trust no reply before a time on the line's clock, unless its drive has proved itself."""
@@ -90,7 +90,7 @@ class StepProof:
         return self._until
 
     def is_due(self, job: Job) -> bool:
-        """True if the request's drive has to prove itself first."""
+        """True if the request's drive must first prove its step."""
         return self._doubts(job, self._clock())
 
     def _doubts(self, job: Job, now: float) -> bool:
@@ -119,7 +119,7 @@ class StepProof:
             if result.kind is ResultKind.REPLY:
                 self._proved.add(device)
         if result.kind is ResultKind.NOTHING:
-            # others are not to wait for a silent drive
+            # other drives must not wait for a silent one
             self._tries[device] = MOST_TRIES
 
     async def _exchange(self, master: Master, job: Job, request: Request) -> ExchangeResult:

@@ -20,7 +20,7 @@ def is_stop_word(job: Job) -> bool:
 
 
 def fail_without_line(job: Job, error: LineError) -> None:
-    """Fail a request that no line carries. A stop that cannot read goes on to send its word."""
+    """Fail a request without a line. A stop that cannot read then sends its word."""
     place = (job.request.device, job.request.function, job.request.register)
     reads = job.priority is Priority.STOP and not job.request.changes
     job.fail(NoAnswer(*place, str(error)) if reads else error)
@@ -31,7 +31,7 @@ def fail_lost(
 ) -> Job | None:
     """Fail a request of a lost line; returns the stop that is still to be sent, if it `keeps` any.
 
-    The program hears of the failure at once; the word is sent as soon as the line opens.
+    The program gets the error at once; the stop word is sent as soon as the line opens.
     """
     error = kind(with_fate(job, reason) if job.begun else reason)
     if not keeps:
@@ -46,7 +46,7 @@ def fail_lost(
 
 
 def ends_unsent(job: Job, devices: Devices, values: SharedValues, now: float) -> bool:
-    """End a request whose device is not polled now, or whose reply is known already."""
+    """End a request if polling of its device is paused, or if its reply is known already."""
     return _is_left_alone(job, devices, now) or _is_answered(job, values, now)
 
 
@@ -62,7 +62,7 @@ def _is_left_alone(job: Job, devices: Devices, now: float) -> bool:
 
 
 def _is_answered(job: Job, values: SharedValues, now: float) -> bool:
-    """Answer a read from what was read for another program, if that is young enough."""
+    """Answer a read with words that were read for another program, if they are recent enough."""
     if not job.max_age or job.begun:
         return False
     reply = values.find(job.request, now - job.max_age)
@@ -74,7 +74,7 @@ def _is_answered(job: Job, values: SharedValues, now: float) -> bool:
 
 
 def refusal_of(job: Job, facts: SharedState) -> str:
-    """Why a write must not go out: a stop came after it, or another program commands."""
+    """Reason if a write must not be sent: a stop came after it, or another program commands."""
     if job.priority is Priority.STOP or not job.program:
         return ""
     if paused := facts.paused.get(job.request.device):

@@ -86,7 +86,7 @@ class TcpMaster:
         return awaited and int.from_bytes(unit[:2], "big") == self._transaction
 
     def _reset(self, reason: str) -> None:
-        """Give up a connection whose bytes cannot be separated any more."""
+        """Close a connection whose bytes can no longer be separated into frames."""
         self._transport.close()
         self.lost(reason)
 

@@ -1,1 +1,1 @@
-"""Bytes to and from a serial port or a TCP connection, and what ports there are."""
+"""Bytes to and from a serial port or a TCP connection, and the list of ports."""

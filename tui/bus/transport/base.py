@@ -6,13 +6,13 @@ from typing import Protocol
 
 
 class Receiver(Protocol):
-    """The one who gets what a transport receives; called in the line's loop."""
+    """Receiver of a transport's bytes; called in the line's loop."""
 
     def received(self, data: bytes, time: float) -> None:
-        """Bytes came in; `time` is when they were taken from the system."""
+        """Take bytes; `time` is when they were read from the system."""
 
     def lost(self, reason: str) -> None:
-        """The transport cannot be used any more; said once."""
+        """Note that the transport is lost; called once."""
 
 
 class Transport(Protocol):
@@ -28,10 +28,10 @@ class Transport(Protocol):
         """Hand the bytes to the system. Raises OSError."""
 
     async def rest(self, until: float) -> None:
-        """Wait until a time of the line's clock, exactly; shorter if bytes come in."""
+        """Wait exactly until a time of the line's clock; shorter if bytes come in."""
 
     async def take_in(self) -> None:
-        """Hand over what the system holds already: it came before what is sent next."""
+        """Pass on the bytes that the system already has: they precede the next request."""
 
     def close(self) -> None:
         """Give the port back; may be called twice."""

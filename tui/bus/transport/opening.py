@@ -1,4 +1,4 @@
-"""Opening and closing a serial port in a thread: the system may take seconds, or for ever."""
+"""Opening and closing a serial port in a thread: the system may take seconds, or never return."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import LineLost
 T = TypeVar("T")
 
 OPENS_WITHIN = 10.0
-"""Seconds that the system has to open a port."""
+"""Timeout of the system for opening a port, in seconds."""
 
 CLOSES_WITHIN = 0.5
 """Seconds for which a line waits until the system has closed its port, and sent the last bytes."""

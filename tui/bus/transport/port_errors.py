@@ -13,14 +13,14 @@ COUNTS = 20
 
 
 class PortErrors(NamedTuple):
-    """Counts since the driver was loaded; only their growth says anything."""
+    """Counts since the driver was loaded; only their increase is meaningful."""
 
     framing: int
     """Characters without a stop bit where one was due: another baud, or another format."""
     parity: int
     breaks: int
     overruns: int
-    """Characters that the port or the system let go."""
+    """Characters that the port or the system lost."""
 
     def since(self, before: PortErrors) -> PortErrors:
         """Return the errors since then; a driver that was reloaded counts from 0."""

@@ -21,14 +21,14 @@ class PortSeen:
     permitted: bool = True
     """True if this user may read and write it."""
     group: str = ""
-    """The group whose users may, where the port has one."""
+    """The group whose users may open it, if the port has one."""
     user: str = ""
     in_group: bool = False
     """True if the user was put into the group and has not logged in since."""
     holder: str = ""
     """Programs that hold it, this one aside; with their process ids."""
     others: str = ""
-    """Programs that have it open beside this one."""
+    """Other programs that have it open."""
     latency: int | None = None
     """Milliseconds for which its adapter may keep a byte back; None if it does not report it."""
 
@@ -54,7 +54,7 @@ def see_port(path: str) -> PortSeen:
 
 
 def latency_of(path: str) -> int | None:
-    """The latency timer of an adapter in ms, where its driver has one."""
+    """The latency timer of an adapter in ms, if its driver has one."""
     name = os.path.basename(os.path.realpath(path))
     with suppress(ValueError):
         place = port_names.SYSTEM_PORTS / name / "device"

@@ -1,4 +1,4 @@
-"""Serial ports of this machine: which there are, who holds one, and opening one for Modbus."""
+"""Serial ports of this computer: their list, their users, and opening one for Modbus."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _name(pid: int) -> str:
 
 
 def other_openers(path: str) -> str:
-    """Programs that have the port open beside this one, empty when none is seen."""
+    """Other programs that have the port open; empty if none is found."""
     if _is_no_port(path):
         return ""
     pids = [pid for pid in _openers(os.path.realpath(path)) if pid != os.getpid()]
@@ -154,7 +154,7 @@ def open_serial(path: str, baud: int, format: str, *, alone: bool = True) -> ser
     `parity`. Raises PortBusy, PortMissing, PortRefused.
     """
     if is_pseudo_terminal(path):
-        # the C library refuses parity here, or drops it without a word
+        # the C library refuses parity here, or ignores it silently
         return _open(path, baud, f"8N{format[2]}", alone=alone)
     port = _open(path, baud, format, alone=alone)
     if not _has_parity(port):

@@ -17,7 +17,7 @@ LUMP = 4096
 WAITED_ON_PORT = 0.0025
 """The loop wakes to the millisecond only; the last part of a pause is waited on the port."""
 SHORT_PAUSE = 0.004
-"""A pause up to which the loop sleeps through it: to turn meanwhile costs more."""
+"""Longest pause for which the loop sleeps: to run it in between would cost more."""
 SPIN = 0.00008
 """The system wakes a sleeper that much late; the very last part is waited in a short loop."""
 SEND_TIMEOUT = 1.0
@@ -40,9 +40,9 @@ class PosixSerial:
         self._resume()
 
     def pause(self, seconds: float) -> None:
-        """Leave what comes in with the system for so long, unless something is sent before.
+        """Read nothing for so many seconds, unless something is sent before.
 
-        Each wake-up of the loop costs more than the bytes that it brings.
+        Each wake-up of the loop costs more than the bytes that it delivers.
         """
         if self._fd is None or self._resumes is not None:
             return
@@ -64,7 +64,7 @@ class PosixSerial:
             asyncio.get_running_loop().add_reader(self._fd, self._take)
 
     def _take(self) -> None:
-        """Read what is there; the end of the port shows as an error or as nothing to read."""
+        """Read the available bytes; a lost port shows as an error or as nothing to read."""
         if self._fd is None or self._receiver is None:
             return
         try:
@@ -132,8 +132,8 @@ class PosixSerial:
                 return
 
     async def take_in(self) -> None:
-        """Hand over what the port holds already."""
-        # not without a look: a port that holds nothing reads as one that went away
+        """Pass on the bytes that the port already has."""
+        # poll first: reading from a port without bytes looks like a lost port
         if self._fd is not None and select.select([self._fd], [], [], 0)[0]:
             self._take()
 

@@ -1,4 +1,4 @@
-"""A serial port read by a thread of its own, for systems whose ports no loop can watch."""
+"""A serial port read by a thread of its own, for systems whose ports no event loop can watch."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ JOIN_TIMEOUT = 1.0
 
 
 class ThreadedSerial:
-    """An opened serial port whose thread hands every lump of bytes to the line's loop."""
+    """An open serial port whose thread passes received bytes to the line's loop."""
 
     def __init__(self, port: serial.Serial, note: str = "") -> None:
         self.note = note
@@ -69,7 +69,7 @@ class ThreadedSerial:
         await asyncio.sleep(0)
 
     async def take_in(self) -> None:
-        """Let the loop hand over what the thread has read."""
+        """Have the loop pass on the bytes that the thread has read."""
         await asyncio.sleep(0)
 
     def pause(self, seconds: float) -> None:

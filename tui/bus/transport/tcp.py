@@ -61,7 +61,7 @@ class TcpTransport(asyncio.Protocol):
             receiver.lost(reason)
 
     def start(self, receiver: Receiver) -> None:
-        """Begin to hand over what is received."""
+        """Begin to pass on received bytes."""
         self._receiver = receiver
         if self._early:
             receiver.received(bytes(self._early), time.monotonic())
@@ -83,7 +83,7 @@ class TcpTransport(asyncio.Protocol):
             await asyncio.sleep(left)
 
     async def take_in(self) -> None:
-        """Let the loop hand over what came in already."""
+        """Have the loop pass on the bytes that have arrived."""
         # it looks at its sockets once in each turn, and hands over behind who was ready by then
         await asyncio.sleep(0)
         await asyncio.sleep(0)
