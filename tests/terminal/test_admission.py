@@ -16,7 +16,6 @@ from textual.widgets import Input, Static
 
 from tests.ui.test_flows import until
 from tui.safety import KEY_TOO_LATE
-from tui.terminal.admission import Admission
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.stroke import Stroke, attach
 from tui.terminal.type_ahead import TypeAhead
@@ -65,7 +64,7 @@ class Panel(App[None]):
         self.not_taken: list[int] = []
         self.late = 0
         self.submitted: list[str] = []
-        self.typed = TypeAhead(self, Admission(self, self).admits)
+        self.typed = TypeAhead(self, self)
 
     def compose(self) -> ComposeResult:
         yield Input(id="text")

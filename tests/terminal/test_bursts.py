@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.safety import BURST_GAP
-from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts, KeyInput
+from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts
+from tui.terminal.stroke import Pressed
 from tui.terminal.tokens import KeyToken, Paste
 
 QUIET = BURST_GAP + 0.01
@@ -21,34 +22,38 @@ def pressed(name: str, at: float) -> KeyToken:
     return KeyToken(name, name if len(name) == 1 else None, at, at)
 
 
+def keys_of(given: Iterable[Pressed | Paste]) -> list[Pressed]:
+    return [key for key in given if isinstance(key, Pressed)]
+
+
 class Bench:
     """Reads at given times, and looks when there is something to know."""
 
     def __init__(self) -> None:
         self.bursts = Bursts()
         self.now = 0.0
-        self.found: list[KeyInput] = []
+        self.found: list[Pressed] = []
 
-    def read(self, *names: str, after: float = 1.0) -> list[KeyInput]:
+    def read(self, *names: str, after: float = 1.0) -> list[Pressed]:
         """Keys of one read, so long after the last; what is given out by then."""
         self.now += after
         before = len(self.found)
         while (deadline := self.bursts.deadline()) is not None and deadline < self.now - 0.001:
-            self.found += self.bursts.given(deadline + 0.001)
+            self.found += keys_of(self.bursts.given(deadline + 0.001))
         for name in names:
             key = pressed(name, self.now)
             if name in STOPS:
                 self.bursts.stop(key)
             else:
                 self.bursts.key(key)
-        self.found += self.bursts.given(self.now)
+        self.found += keys_of(self.bursts.given(self.now))
         return self.found[before:]
 
-    def rest(self) -> list[KeyInput]:
+    def rest(self) -> list[Pressed]:
         return self.read()
 
     def names(self) -> list[str]:
-        return [given.what.name for given in self.found if isinstance(given.what, KeyToken)]
+        return [given.name for given in self.found]
 
 
 def test_a_key_alone_is_held_back_until_that_is_known() -> None:
@@ -56,8 +61,9 @@ def test_a_key_alone_is_held_back_until_that_is_known() -> None:
     assert bench.read("r") == []
     assert bench.bursts.deadline() == pytest.approx(bench.now + BURST_GAP)
     assert bench.bursts.given(bench.now + BURST_GAP - 0.001) == []
-    (given,) = bench.bursts.given(bench.now + BURST_GAP + 0.001)
-    assert (given.alone, given.held, given.steps, given.piece) == (True, False, True, 1)
+    (given,) = keys_of(bench.bursts.given(bench.now + BURST_GAP + 0.001))
+    stroke = given.stroke
+    assert (stroke.alone, stroke.held, stroke.steps, stroke.piece) == (True, False, True, 1)
     assert bench.bursts.deadline() is None
 
 
@@ -65,7 +71,8 @@ def test_keys_of_one_read_are_a_piece() -> None:
     bench = Bench()
     bench.read("r", "enter")
     found = bench.rest()
-    assert [(g.alone, g.held, g.steps, g.piece) for g in found] == [(False, False, False, 2)] * 2
+    strokes = [given.stroke for given in found]
+    assert [(s.alone, s.held, s.steps, s.piece) for s in strokes] == [(False, False, False, 2)] * 2
 
 
 @pytest.mark.parametrize(
@@ -76,7 +83,7 @@ def test_keys_within_50_ms_are_a_piece(gap: float, alone: bool) -> None:
     bench.read("r")
     bench.read("enter", after=gap)
     bench.rest()
-    assert [given.alone for given in bench.found] == [alone, alone]
+    assert [given.stroke.alone for given in bench.found] == [alone, alone]
 
 
 def test_a_chain_of_near_keys_is_one_piece() -> None:
@@ -85,7 +92,7 @@ def test_a_chain_of_near_keys_is_one_piece() -> None:
         bench.read(name, after=CLOSE)
     bench.rest()
     assert bench.names() == list("drive")
-    assert not any(given.alone for given in bench.found)
+    assert not any(given.stroke.alone for given in bench.found)
 
 
 def test_a_stop_voids_what_still_waits_and_is_part_of_the_piece() -> None:
@@ -94,9 +101,9 @@ def test_a_stop_voids_what_still_waits_and_is_part_of_the_piece() -> None:
     bench.read("f", after=CLOSE)
     bench.rest()
     assert bench.names() == ["v", "f"]
-    assert not any(given.alone or given.steps for given in bench.found)
+    assert not any(given.stroke.alone or given.stroke.steps for given in bench.found)
     bench.read("r")
-    assert [given.alone for given in bench.rest()] == [True]
+    assert [given.stroke.alone for given in bench.rest()] == [True]
 
 
 def test_a_stop_voids_a_key_whose_time_was_over_but_that_was_not_given_out() -> None:
@@ -111,26 +118,26 @@ def test_several_arrows_at_once_step_once() -> None:
     bench = Bench()
     bench.read("up", "up", "up")
     found = bench.rest()
-    assert [given.steps for given in found] == [True, False, False]
-    assert not any(given.alone or given.held for given in found)
+    assert [given.stroke.steps for given in found] == [True, False, False]
+    assert not any(given.stroke.alone or given.stroke.held for given in found)
     bench.read("up", "down")
-    assert not any(given.steps for given in bench.rest())
+    assert not any(given.stroke.steps for given in bench.rest())
 
 
 def test_an_arrow_held_down_goes_on_at_its_pace_and_ends_with_the_key() -> None:
     bench = Bench()
     bench.read("up")
-    assert [given.alone for given in bench.rest()] == [True]
+    assert [given.stroke.alone for given in bench.rest()] == [True]
     assert bench.read("up", after=0.5) == []
     assert bench.read("up", after=0.033) == []
-    assert [given.held for given in bench.read("up", after=0.033)] == [True] * 3
+    assert [given.stroke.held for given in bench.read("up", after=0.033)] == [True] * 3
     for _ in range(50):
         (given,) = bench.read("up", after=0.033)
-        assert given.held
-        assert given.steps
+        assert given.stroke.held
+        assert given.stroke.steps
     assert bench.rest() == []
     bench.read("up")
-    assert [given.alone for given in bench.rest()] == [True]
+    assert [given.stroke.alone for given in bench.rest()] == [True]
 
 
 def test_a_slower_repeat_is_keys_alone() -> None:
@@ -138,7 +145,7 @@ def test_a_slower_repeat_is_keys_alone() -> None:
     for _ in range(5):
         bench.read("down", after=0.09)
     bench.rest()
-    assert [given.alone for given in bench.found] == [True] * 5
+    assert [given.stroke.alone for given in bench.found] == [True] * 5
 
 
 def test_a_letter_held_down_is_a_piece() -> None:
@@ -146,7 +153,8 @@ def test_a_letter_held_down_is_a_piece() -> None:
     for _ in range(40):
         bench.read("r", after=0.033)
     bench.rest()
-    assert not any(given.alone or given.held or given.steps for given in bench.found)
+    strokes = [given.stroke for given in bench.found]
+    assert not any(stroke.alone or stroke.held or stroke.steps for stroke in strokes)
     assert len(bench.found) == 40
 
 
@@ -155,7 +163,7 @@ def test_arrows_at_an_uneven_pace_step_once() -> None:
     for gap in (0.5, 0.006, 0.045, 0.006, 0.045, 0.006, 0.045):
         bench.read("up", after=gap)
     bench.rest()
-    assert sum(given.steps for given in bench.found) == 1
+    assert sum(given.stroke.steps for given in bench.found) == 1
 
 
 def test_arrows_that_come_faster_than_any_keyboard_step_once() -> None:
@@ -163,7 +171,7 @@ def test_arrows_that_come_faster_than_any_keyboard_step_once() -> None:
     for _ in range(300):
         bench.read("up", after=0.001)
     bench.rest()
-    assert sum(given.steps for given in bench.found) == 1
+    assert sum(given.stroke.steps for given in bench.found) == 1
     assert len(bench.found) == 300
 
 
@@ -174,7 +182,7 @@ def test_quick_link_steps_once_per_read() -> None:
         bench.read("up", after=0.033)
     bench.read("up", "up", after=0.033)
     bench.rest()
-    assert sum(given.steps for given in bench.found) == 1 + 3 + 1
+    assert sum(given.stroke.steps for given in bench.found) == 1 + 3 + 1
 
 
 def test_another_key_ends_a_held_one() -> None:
@@ -184,8 +192,8 @@ def test_another_key_ends_a_held_one() -> None:
     bench.read("down", after=0.033)
     bench.read("up", after=0.033)
     bench.rest()
-    assert [given.held for given in bench.found] == [True] * 4 + [False] * 2
-    assert not any(given.steps for given in bench.found[4:])
+    assert [given.stroke.held for given in bench.found] == [True] * 4 + [False] * 2
+    assert not any(given.stroke.steps for given in bench.found[4:])
 
 
 def test_a_long_piece_is_not_held_back_to_its_end() -> None:
@@ -200,15 +208,15 @@ def test_a_paste_keeps_its_place_and_leaves_no_key_beside_it_alone() -> None:
     bursts.paste(Paste("text", 1.01))
     bursts.key(pressed("enter", 1.02))
     found = [*bursts.given(1.02), *bursts.given(2.0)]
-    assert [type(given.what) for given in found] == [KeyToken, Paste, KeyToken]
-    assert not any(given.alone for given in found)
+    assert [type(given) for given in found] == [Pressed, Paste, Pressed]
+    assert not any(given.stroke.alone for given in keys_of(found))
 
 
 def test_a_stop_does_not_void_a_paste() -> None:
     bursts = Bursts()
     bursts.paste(Paste("text", 1.0))
     bursts.stop(pressed("space", 1.0))
-    assert [given.what for given in bursts.given(2.0)] == [Paste("text", 1.0)]
+    assert bursts.given(2.0) == [Paste("text", 1.0)]
 
 
 def test_a_key_waits_for_a_sequence_that_began_beside_it() -> None:
@@ -217,9 +225,9 @@ def test_a_key_waits_for_a_sequence_that_began_beside_it() -> None:
     assert bursts.given(1.08, pending=1.03) == []
     assert bursts.deadline(pending=1.03) is None
     bursts.key(KeyToken("escape", "\x1b", 1.03, 1.03))
-    assert [given.alone for given in bursts.given(1.13)] == [False, False]
+    assert [given.stroke.alone for given in keys_of(bursts.given(1.13))] == [False, False]
     bursts.key(pressed("r", 2.0))
-    assert [given.alone for given in bursts.given(2.1, pending=2.06)] == [True]
+    assert [given.stroke.alone for given in keys_of(bursts.given(2.1, pending=2.06))] == [True]
 
 
 NAMES = st.sampled_from(["r", "enter", "up", "up", "up", "down", "pageup", "space", "f12", "1"])
@@ -247,28 +255,24 @@ def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> No
         bench.read(*names, after=gap)
     bench.rest()
     typed = _times(reads)
-    keys = [given.what for given in bench.found if isinstance(given.what, KeyToken)]
+    keys = bench.found
     # in order, each once, none that was not typed
     rest = iter(name for name, _ in typed)
     assert all(any(name == key.name for name in rest) for key in keys)
-    for key_input in bench.found:
-        key = key_input.what
-        assert isinstance(key, KeyToken)
-        near = [name for name, at in typed if abs(at - key.at) <= BURST_GAP - 1e-6]
-        if key_input.alone:
+    for key in bench.found:
+        near = [name for name, at in typed if abs(at - key.stroke.read_at) <= BURST_GAP - 1e-6]
+        if key.stroke.alone:
             assert near == [key.name]
-        if key_input.held:
+        if key.stroke.held:
             assert key.name in STEPPING
             assert near.count(key.name) > 1
-        assert key_input.steps <= (key.name in STEPPING or key_input.alone)
+        assert key.stroke.steps <= (key.name in STEPPING or key.stroke.alone)
     # a key that no stop came after is given out, alone where nothing is near
     stops = [at for name, at in typed if name in STOPS]
     for name, at in typed:
         near = [other for other, time in typed if abs(time - at) <= BURST_GAP + 1e-6]
         if name not in STOPS and near == [name] and not [s for s in stops if s == at]:
-            assert any(
-                isinstance(g.what, KeyToken) and g.what.at == at and g.alone for g in bench.found
-            )
+            assert any(given.stroke.read_at == at and given.stroke.alone for given in bench.found)
 
 
 @given(
@@ -283,5 +287,5 @@ def test_a_paste_without_brackets_is_one_piece_at_every_cut(
     bench.read(*names[cut:], after=data.draw(st.floats(0, CLOSE)))
     bench.rest()
     assert bench.names() == names
-    assert not any(given.alone or given.held for given in bench.found)
-    assert sum(given.steps for given in bench.found) <= 1
+    assert not any(given.stroke.alone or given.stroke.held for given in bench.found)
+    assert sum(given.stroke.steps for given in bench.found) <= 1

@@ -16,7 +16,8 @@ from textual.message import Message
 
 from tui.terminal import driver as module
 from tui.terminal.driver import NO_REPORTS, with_own_keys
-from tui.terminal.reader import KeyReader, Pressed
+from tui.terminal.reader import KeyReader
+from tui.terminal.stroke import Pressed
 
 
 class Stops:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.terminal.reader import KeyReader, Pressed, TerminalInput
+from tui.terminal.reader import KeyReader, TerminalInput
+from tui.terminal.stroke import Pressed
 from tui.terminal.tokens import Paste, Report
 
 from .dialect_tables import DIALECTS, REPLIES, REPORTS

@@ -21,9 +21,9 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.key_dispatcher import NOBODY_TO_STOP
 from tui.session.command.commander import Commander
 from tui.session.fleet import FoundDrive
-from tui.terminal.admission import PASTE_IGNORED
 from tui.terminal.reader import KeyReader
 from tui.terminal.stroke import Stroke, attach
+from tui.terminal.type_ahead import PASTE_IGNORED
 
 from . import fakes
 from .fakes import app_of

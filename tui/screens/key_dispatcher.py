@@ -11,7 +11,6 @@ from textual.events import Event, InputEvent, Key, Paste
 
 from tui.bus.errors import LineClosed
 from tui.session.carry_on import carried_on
-from tui.terminal.admission import Admission
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
@@ -52,7 +51,7 @@ class KeyDispatcher(Panel):
         self._stops = 0
         self._trying_f12 = False
         self.unreached = ("", 0.0)
-        self._typed = TypeAhead(self, Admission(self, self).admits)
+        self._typed = TypeAhead(self, self)
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
         """Stop, if the key means that now; may be called in any thread.

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 from tui.safety import BURST_GAP
 
+from .stroke import Pressed, Stroke
 from .tokens import KeyToken, Paste
 
 SHORTEST_REPEAT: Final = 0.005
@@ -30,18 +31,6 @@ STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"
 """Keys that a person holds down to go on."""
 
 
-class KeyInput(NamedTuple):
-    """A key, or a paste, and the company in which it came."""
-
-    what: KeyToken | Paste
-    alone: bool = False
-    held: bool = False
-    steps: bool = False
-    """True if it may step a value: alone, held, or the first of a piece of one arrow only."""
-    piece: int = 1
-    """Number of keys that came together, as far as known."""
-
-
 class Bursts:
     """Holds keys back until it is known whether they came alone."""
 
@@ -53,7 +42,7 @@ class Bursts:
         self._reads: list[list[KeyToken]] = []
         self._repeating: str | None = None
         self._stepped = False
-        self._given: list[KeyInput] = []
+        self._given: list[Pressed | Paste] = []
 
     def key(self, key: KeyToken) -> None:
         """Take a key; `given` decides about it."""
@@ -67,7 +56,7 @@ class Bursts:
     def stop(self, key: KeyToken) -> None:
         """A stop key was taken: whatever was typed before it and still waits is void."""
         self._waiting.clear()
-        self._given = [given for given in self._given if isinstance(given.what, Paste)]
+        self._given = [given for given in self._given if isinstance(given, Paste)]
         self._join(key.began, key.at)
         self._repeating, self._stepped, self._reads = None, True, []
 
@@ -75,9 +64,9 @@ class Bursts:
         """A paste keeps its place among the keys; those beside it are not alone."""
         self._join(paste.at, paste.at)
         self._give_parts()
-        self._given.append(KeyInput(paste))
+        self._given.append(paste)
 
-    def given(self, now: float, pending: float | None = None) -> list[KeyInput]:
+    def given(self, now: float, pending: float | None = None) -> list[Pressed | Paste]:
         """Return the known keys; `pending` is when a sequence began that may become a key."""
         self._give_repeats()
         if not self._hangs_on(pending):
@@ -105,16 +94,22 @@ class Bursts:
     def _close(self) -> None:
         """The piece is over."""
         if self._members == 1 and self._waiting:
-            self._given.append(KeyInput(self._waiting.pop(), alone=True, steps=True))
+            self._give(self._waiting.pop(), alone=True, steps=True)
         self._give_parts()
         self._members, self._names, self._reads = 0, set(), []
         self._repeating, self._stepped = None, False
+
+    def _give(
+        self, key: KeyToken, *, steps: bool, alone: bool = False, held: bool = False, piece: int = 1
+    ) -> None:
+        stroke = Stroke(key.began, key.mark, alone=alone, held=held, steps=steps, piece=piece)
+        self._given.append(Pressed(key.name, key.character, stroke))
 
     def _give_parts(self) -> None:
         """Give out what waits as parts of a piece; of arrows, the first steps once."""
         steps = not self._stepped and len(self._names) == 1 and self._names <= STEPPING
         for key in self._waiting:
-            self._given.append(KeyInput(key, steps=steps, piece=self._members))
+            self._give(key, steps=steps, piece=self._members)
             self._stepped, steps = self._stepped or steps, False
         self._waiting.clear()
 
@@ -140,7 +135,7 @@ class Bursts:
         self._give_parts()
         self._stepped = True
         for key in held:
-            self._given.append(KeyInput(key, held=True, steps=True, piece=self._members))
+            self._give(key, held=True, steps=True, piece=self._members)
         self._waiting = behind
         self._give_parts()
 

@@ -26,8 +26,8 @@ from textual.message import Message
 from .held_input import with_held_input
 from .loop import soon_in_loop
 from .outlet import Outlet
-from .reader import KeyReader, Pressed, Stops, TerminalInput
-from .stroke import attach
+from .reader import KeyReader, Stops, TerminalInput
+from .stroke import Pressed, attach
 from .tokens import Report
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import codecs
 import logging
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
-from .bursts import Bursts, KeyInput
+from .bursts import Bursts
 from .dialects import ESCAPE_DELAY, Tokenizer
 from .names import STOP_KEYS
-from .stroke import Stroke
+from .stroke import Pressed
 from .tokens import KeyToken, Paste, Report, Token
 
 log = logging.getLogger(__name__)
@@ -41,14 +41,6 @@ class Stops(Protocol):
 
     def sequence_swallowed(self, data: bytes) -> None:
         """A sequence came that no known terminal sends; it did nothing."""
-
-
-class Pressed(NamedTuple):
-    """A key for the app."""
-
-    name: str
-    character: str | None
-    stroke: Stroke
 
 
 TerminalInput = Pressed | Paste | Report
@@ -123,8 +115,7 @@ class KeyReader:
             else:
                 self._left_at = self._left(token)
                 self._bursts.key(token)
-        given = self._bursts.given(now, self._tokens.pending)
-        return [*reports, *(_to_input(key_input) for key_input in given)]
+        return [*reports, *self._bursts.given(now, self._tokens.pending)]
 
     def _stopped(self, key: KeyToken) -> bool:
         """Return True if a key was a stop."""
@@ -134,18 +125,3 @@ class KeyReader:
         """When a key was read last, up to this one, that may leave a text."""
         writes = key.character is not None and key.character.isprintable()
         return self._left_at if writes or key.name in EDITING else key.began
-
-
-def _to_input(given: KeyInput) -> Pressed | Paste:
-    key = given.what
-    if not isinstance(key, KeyToken):
-        return key
-    stroke = Stroke(
-        read_at=key.began,
-        stamp=key.mark,
-        alone=given.alone,
-        held=given.held,
-        steps=given.steps,
-        piece=given.piece,
-    )
-    return Pressed(key.name, key.character, stroke)

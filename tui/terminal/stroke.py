@@ -29,6 +29,14 @@ class Stroke(NamedTuple):
         return self.alone or self.held
 
 
+class Pressed(NamedTuple):
+    """A key for the app."""
+
+    name: str
+    character: str | None
+    stroke: Stroke
+
+
 def attach(event: Event, stroke: Stroke) -> None:
     """Let an event of Textual carry what is known of the key."""
     vars(event)["stroke"] = stroke
