@@ -120,6 +120,23 @@ async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
     assert (again.text, again.physical.display) == ("50.00", "4.6 A")
 
 
+async def test_only_a_percentage_with_a_number_is_converted_to_the_unit_of_its_rating() -> None:
+    profile = profile_of(
+        parameter("HZ", 10, unit="Hz", scale="0.1", rating="NCR"),
+        parameter("PCT", 11, unit="%", scale="1", values={"0": "off"}, rating="NCR"),
+        parameter("NCR", 12, unit="A", scale="0.1", values={"9": "unknown"}),
+        parameter("LOAD", 13, unit="%", scale="1", rating="NCR"),
+    )
+    line = OneDrive({10: 500, 11: 0, 12: 84, 13: 50})
+    reader = Reader(DriveSession(line, 1, profile))
+    readings = await reader.read(["HZ", "PCT", "LOAD"])
+    assert [readings[code].physical for code in ("HZ", "PCT")] == [None, None]
+    assert (readings["HZ"].text, readings["PCT"].text) == ("50.0", "off")
+    assert readings["LOAD"].physical is not None
+    line.registers[12] = 9  # a rating without a number converts nothing
+    assert (await reader.read(["NCR", "LOAD"]))["LOAD"].physical is None
+
+
 @pytest.mark.parametrize("priority", [Priority.POLL, Priority.OPERATOR_READ])
 async def test_whatever_was_read_is_known_of_the_drive(priority: Priority) -> None:
     """What Monitor polls is what parameters, commands and stops go by."""
