@@ -2,7 +2,7 @@
 
     python -m tests.mutants [NAME...] [--list] [--jobs N] [--table]
     python -m tests.mutants --random N [--seed S] [--stop-path] [--package NAME] | --again
-    python -m tests.mutants --coverage
+    python -m tests.mutants --coverage [TEST...]
 
 The defects are in `tests/defects/`; random ones are made by `tests/mutator.py`. The checkout is
 never changed: each worker has a copy of its own in a temporary folder. Exit status 1 if a defect
@@ -52,7 +52,10 @@ from tests.defects import (
 from tests.defects.defect import Defect
 
 ROOT = Path(__file__).resolve().parent.parent
-COPIED = ("tui", "tests", "benchmarks", "profiles", "pyproject.toml", "README.md", "LICENSE")
+COPIED = (
+    "tui", "tests", "benchmarks", "profiles", "docs", "systemd", "pyproject.toml",
+    "constraints.txt", "hatch_build.py", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE",
+)  # fmt: skip
 DEFECTS: tuple[Defect, ...] = (
     *bus.DEFECTS,
     *drive.DEFECTS,
@@ -308,14 +311,16 @@ def _listed(defects: Iterable[Defect]) -> int:
 def main() -> int:
     """Plant what was asked for; 1 where something survives."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="plant only these defects")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="only these defects, or tests")
     parser.add_argument("--list", action="store_true", help="name the defects, plant nothing")
     parser.add_argument("--table", action="store_true", help="the last results as Markdown")
     parser.add_argument("--jobs", type=int, default=2, choices=(1, 2), help="copies at work")
     options = parser.add_argument_group("random defects")
     options.add_argument("--random", type=int, metavar="N", help="plant N random defects")
     options.add_argument("--seed", type=int, default=1, help="which ones (default: 1)")
-    options.add_argument("--package", metavar="NAME", help="only in this package of tui")
+    options.add_argument(
+        "--package", metavar="NAME", action="append", help="only in this package of tui; repeatable"
+    )
     options.add_argument("--stop-path", action="store_true", help="only where a stop passes")
     options.add_argument("--again", action="store_true", help="those not noticed the last time")
     options.add_argument("--coverage", action="store_true", help="record what each test reaches")

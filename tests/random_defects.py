@@ -13,7 +13,7 @@ import re
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from itertools import islice, zip_longest
@@ -40,6 +40,7 @@ IN_PROCESSES = {"tui/keeper/": ("tests/line/test_keeper.py", "tests/line/test_hu
 """By the beginning of a path: tests of code that runs in processes that are not recorded."""
 BY_SOURCE = {"lock": ["tests/test_locks.py"]}
 """By kind of defect: tests that read the source itself."""
+_FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.*)$", re.MULTILINE)
 UNREACHED, EQUAL = "NOT REACHED", "EQUIVALENT"
 
 
@@ -233,14 +234,14 @@ def _exists(name: str) -> bool:
 class Judge:
     """Plants one defect at a time in copies, and believes only a test that fails by it alone."""
 
-    def __init__(self, chooser: Chooser) -> None:
-        self._chooser = chooser
+    def __init__(self, tests: Mapping[Mutant, list[str]]) -> None:
+        self._tests = tests
         self._passes: dict[str, bool] = {}
 
     def judge(self, mutant: Mutant, copy: Path) -> Judged:
         """Plant a defect in a copy and run the tests that reach it."""
         begun = time.monotonic()
-        tests = self._chooser.tests(mutant)
+        tests = self._tests[mutant]
         if mutant.identity in EQUIVALENT:
             by = EQUAL
         else:
@@ -263,6 +264,8 @@ class Judge:
                 return SURVIVED
             if repeated and self._passes_without(failed, copy):
                 return failed
+            if failed not in tests:
+                return SURVIVED  # one of a file that was chosen as a whole
             tests.remove(failed)
         return SURVIVED
 
@@ -319,24 +322,24 @@ def rate(results: Sequence[Judged]) -> float:
     return sum(result.noticed for result in changing) / len(changing) if changing else 1.0
 
 
-def record_tests(jobs: int) -> int:
-    """Run all tests of the main layer in a copy, and keep what each reaches, by the commit."""
+def record_tests(tests: Sequence[str], jobs: int) -> int:
+    """Run tests of the main layer in a copy, and keep what each reaches, by the commit."""
     commit = reached.git("rev-parse", "HEAD").strip()
     with copies(1) as (copy,):
-        record = reached.record(copy, commit, (), jobs)
-    print(f"Recorded {len(record.tests)} tests of {commit[:12]} in {reached.folder()}.")
+        record = reached.record(copy, commit, tests, jobs)
+    print(f"{len(record.tests)} tests are recorded for {commit[:12]} in {reached.folder()}.")
     return 0
 
 
 def main(requested: argparse.Namespace) -> int:
     """Record, or plant and report; 1 if less than required is noticed."""
     if requested.coverage:
-        return record_tests(requested.jobs)
-    record = reached.newest()
+        return record_tests(requested.names, requested.jobs)
+    record = reached.recorded()
     if record is None:
         raise SystemExit("Nothing is recorded: run `python -m tests.mutants --coverage` first.")
     defaults = Defaults(map(tree_of, modules()))
-    packages = [requested.package] if requested.package else PACKAGES
+    packages = requested.package or PACKAGES
     sites = {package: list(all_sites(package, defaults)) for package in packages}
     if requested.stop_path:
         places = stop_path()
@@ -359,9 +362,13 @@ def main(requested: argparse.Namespace) -> int:
             flush=True,
         )
 
+    chooser = Chooser(record)
+    tests = {mutant: chooser.tests(mutant) for mutant in mutants}  # by the source of this moment
     with copies(requested.jobs) as made:
-        dealt(Judge(Chooser(record)).judge, mutants, made, show)
-    print(f"\n{len(mutants)} defects, seed {requested.seed}, recorded at {record.commit[:12]}\n")
+        dealt(Judge(tests).judge, mutants, made, show)
+    print(
+        f"\n{len(mutants)} defects, seed {requested.seed}, recorded at {record.commits[0][:12]}\n"
+    )
     print(report(results))
     return 0 if rate(results) >= (1.0 if requested.stop_path else LEAST) else 1
 

@@ -9,21 +9,23 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sqlite3
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections import defaultdict
+from collections.abc import Generator, Sequence
 from difflib import SequenceMatcher
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import platformdirs
 import pytest
 
 if TYPE_CHECKING:
-    from coverage import Coverage
+    from coverage import Coverage, CoverageData
 
 ROOT = Path(__file__).resolve().parent.parent
 PARTS = "DRIVEPANEL_REACHED_PARTS"
@@ -98,8 +100,11 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Recorder(Path(parts)))
 
 
-def record(copy: Path, commit: str, tests: Iterable[str], jobs: int) -> Record:
-    """Run tests in a copy of the checkout and keep the lines that each reaches."""
+def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
+    """Run tests in a copy of the checkout and keep the lines that each reaches.
+
+    Named tests are added to what is recorded for the commit; none named: all are recorded again.
+    """
     from coverage import CoverageData
 
     parts = folder() / f"{commit}.parts"
@@ -107,25 +112,30 @@ def record(copy: Path, commit: str, tests: Iterable[str], jobs: int) -> Record:
     environment = {**os.environ, "PYTHONPATH": str(copy), PARTS: str(parts)}
     command = [sys.executable, *PYTEST, "-n", str(jobs), "--dist", "worksteal", *tests]
     subprocess.run(command, cwd=copy, env=environment, check=False)
-    whole = folder() / f"{commit}.lines"
-    whole.unlink(missing_ok=True)
-    data = CoverageData(str(whole))
+    lines_file, tests_file = (folder() / f"{commit}.{name}" for name in ("lines", "json"))
+    if not tests:
+        lines_file.unlink(missing_ok=True)
+        tests_file.unlink(missing_ok=True)
+    data = CoverageData(str(lines_file))
     for part in sorted(parts.glob("lines.*")):
         recorded = CoverageData(str(part))
         recorded.read()
         data.update(recorded, map_path=lambda path: Path(path).relative_to(copy).as_posix())
-    known: dict[str, tuple[float, bool]] = {}
+    known: dict[str, Sequence[object]] = {}
+    if tests_file.exists():
+        known = {name: rest for name, (_, *rest) in _load(tests_file).items()}
     for part in parts.glob("tests-*.json"):
-        known |= json.loads(part.read_text("utf-8"))
-    lines = _lines_by_test(whole)
-    tests_file = folder() / f"{commit}.json"
-    tests_file.write_text(
-        json.dumps({name: (lines.get(name, 0), *rest) for name, rest in known.items()}), "utf-8"
-    )
-    for part in parts.iterdir():
-        part.unlink()
-    parts.rmdir()
-    return Record(commit)
+        known |= _load(part)
+    lines = _lines_by_test(lines_file)
+    found = {name: (lines.get(name, 0), *rest) for name, rest in known.items()}
+    tests_file.write_text(json.dumps(found), "utf-8")
+    shutil.rmtree(parts)
+    return Record([commit])
+
+
+def _load(path: Path) -> dict[str, list[Any]]:
+    found: dict[str, list[Any]] = json.loads(path.read_text("utf-8"))
+    return found
 
 
 def _lines_by_test(whole: Path) -> dict[str, int]:
@@ -141,41 +151,58 @@ def _lines_by_test(whole: Path) -> dict[str, int]:
 
 
 class Record:
-    """The lines that tests have reached at one commit, for the source as it is now."""
+    """The lines that tests have reached at some commits, for the source as it is now."""
 
-    def __init__(self, commit: str) -> None:
-        self.commit = commit
+    def __init__(self, commits: Sequence[str]) -> None:
+        self.commits = commits
+        """The newest first."""
+        self._lines: dict[str, dict[int, set[str]]] = {}
 
     @cached_property
     def tests(self) -> dict[str, Reach]:
-        """Each test that was recorded, by its name."""
-        known = json.loads((folder() / f"{self.commit}.json").read_text("utf-8"))
-        return {name: Reach(*reach) for name, reach in known.items()}
+        """Each test that was recorded, by its name; what was recorded last counts."""
+        return {
+            name: Reach(*reach)
+            for commit in reversed(self.commits)
+            for name, reach in _load(folder() / f"{commit}.json").items()
+        }
 
-    @cached_property
-    def _moved(self) -> dict[str, str]:
-        """Where files were at the commit that have another path today."""
-        status = git("diff", "--name-status", "--diff-filter=R", "-M50%", self.commit, "--", "tui")
-        rows = (line.split("\t") for line in status.splitlines())
-        return {new: old for _, old, new in rows}
-
-    @cache  # noqa: B019 - there is one record in a process
     def lines(self, path: str) -> dict[int, set[str]]:
         """By each line of a file as it is now: the tests that reach it."""
-        from coverage import CoverageData
+        if path not in self._lines:
+            found = self._lines[path] = defaultdict(set)
+            for commit in self.commits:
+                for line, tests in _lines_at(commit, path).items():
+                    found[line] |= tests
+        return self._lines[path]
 
-        old = self._moved.get(path, path)
-        data = CoverageData(str(folder() / f"{self.commit}.lines"))
-        data.read()
-        reached = {n: set(found) - {""} for n, found in data.contexts_by_lineno(old).items()}
-        if not reached:
-            return {}
-        before = git("show", f"{self.commit}:{old}").splitlines()
-        return {
-            new: reached[was]
-            for new, was in same_lines(before, (ROOT / path).read_text("utf-8").splitlines())
-            if was in reached
-        }
+
+@cache
+def _moved(commit: str) -> dict[str, str]:
+    """Where files were at a commit that have another path today."""
+    status = git("diff", "--name-status", "--diff-filter=R", "-M50%", commit, "--", "tui")
+    rows = (line.split("\t") for line in status.splitlines())
+    return {new: old for _, old, new in rows}
+
+
+@cache
+def _data(commit: str) -> CoverageData:
+    from coverage import CoverageData
+
+    data = CoverageData(str(folder() / f"{commit}.lines"))
+    data.read()
+    return data
+
+
+def _lines_at(commit: str, path: str) -> dict[int, set[str]]:
+    """By each line of a file as it is now: the tests that reached it at a commit."""
+    old = _moved(commit).get(path, path)
+    reached = {n: set(found) - {""} for n, found in _data(commit).contexts_by_lineno(old).items()}
+    if not reached:
+        return {}
+    before = git("show", f"{commit}:{old}").splitlines()
+    pairs = same_lines(before, (ROOT / path).read_text("utf-8").splitlines())
+    return {line: reached[was] for line, was in pairs if was in reached}
 
 
 def same_lines(before: list[str], after: list[str]) -> list[tuple[int, int]]:
@@ -190,13 +217,8 @@ def same_lines(before: list[str], after: list[str]) -> list[tuple[int, int]]:
     return found
 
 
-def newest() -> Record | None:
-    """The record of the newest commit that the present one comes from."""
+def recorded() -> Record | None:
+    """All that is recorded for the present commit and those that it comes from."""
     kept = {path.stem for path in folder().glob("*.json")}
-    for commit in git("rev-list", "HEAD").split():
-        if commit in kept:
-            return Record(commit)
-    return None
-
-
-Chooser = Callable[[str, int], set[str]]
+    commits = [commit for commit in git("rev-list", "HEAD").split() if commit in kept]
+    return Record(commits) if commits else None
