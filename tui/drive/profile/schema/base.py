@@ -33,11 +33,11 @@ class When(Table, frozen=True, kw_only=True):
 
     parameter: str
     mask: WordAddress | None = None
-    """Bits of the word that count; all of it where absent."""
+    """Bits of the word that are evaluated; absent: all."""
     values: list[int]
 
     def holds(self, raws: Mapping[str, int]) -> bool | None:
-        """Return True if it holds, given raw values by code; None where its word is not known."""
+        """Return True if it holds, given raw values by code; None if its word is unknown."""
         raw = raws.get(self.parameter)
         if raw is None:
             return None

@@ -8,7 +8,7 @@ from .base import Effective, Identifier, RawWord, ReadCount, Table, WordAddress
 
 
 class BlockChoice(Table, frozen=True, kw_only=True):
-    """A raw selector value of an indirect block and the parameter it stands for."""
+    """Raw selector value of an indirect block and its parameter."""
 
     raw: RawWord
     parameter: str
@@ -24,13 +24,13 @@ class Block(Table, frozen=True, kw_only=True):
     min_words: ReadCount = 1
     max_words: ReadCount
     slots: list[str]
-    """Parameters that select the contents of each place, in order."""
+    """Parameters that select the content of each slot, in order."""
     values: list[str] = []
-    """Parameters that carry the values, where they are parameters of their own."""
+    """Parameters that carry the values, if they are separate parameters."""
     selects_by: Literal["choice", "address"]
     choices: list[BlockChoice] = []
     fixed_start: bool = False
-    """True where a read must begin at `address`; else any part of it may be read."""
+    """True if a read must begin at `address`; otherwise any part can be read."""
     write_when: Literal["any", "stopped"] = "any"
     effective: Effective = "at-once"
     note: str = ""

@@ -1,4 +1,4 @@
-"""Words that show who commands the drive and what gives its reference now."""
+"""Words that show the active command and reference channels."""
 
 from __future__ import annotations
 
@@ -10,43 +10,42 @@ from .base import Confidence, Table, When, WordAddress
 
 
 class ChannelRow(Table, frozen=True, kw_only=True):
-    """A word that shows the channel in force, if its conditions hold."""
+    """A word that shows the active channel, if its conditions hold."""
 
     parameter: str
     when: list[When] = []
-    """Conditions under which the row counts; all must hold."""
+    """Conditions for the row; all must hold."""
     mask: WordAddress = 0xFFFF
-    """Bits that show it, before the shift."""
+    """Bits that show the channel, before the shift."""
     shift: Annotated[int, Meta(ge=0, le=15)] = 0
     line: list[int] = []
-    """Values, behind mask and shift, with which the channel is this line."""
+    """Values, after mask and shift, that mean this line."""
     names: dict[str, str] = {}
-    """Names of the values; those of the parameter, or of its bits, where empty."""
+    """Names of the values; empty: names of the parameter or its bits."""
 
 
 class ChannelSwitch(Table, frozen=True, kw_only=True):
-    """A parameter by which another channel can come into force while the drive runs."""
+    """A parameter that can switch channels while the drive runs."""
 
     parameter: str
     fixed: list[int]
-    """Raw values with which nothing is switched."""
+    """Raw values for which nothing is switched."""
     when: list[When] = []
-    """Conditions under which it switches; all must hold."""
+    """Conditions for switching; all must hold."""
     does: str
-    """Further effect, after its name and value."""
+    """Further effect; a clause that follows the parameter's name and value."""
 
 
 class Channels(Table, frozen=True, kw_only=True):
-    """Channels that command and give the reference; of several rows the first that applies
-    counts."""
+    """Command and reference channels; the first row that applies is used."""
 
     command: list[ChannelRow] = []
-    """Words that show who commands."""
+    """Words that show the command channel."""
     reference: list[ChannelRow] = []
-    """Words that show what gives the reference."""
+    """Words that show the reference channel."""
     switches: list[ChannelSwitch] = []
-    """Parameters by which another channel can come into force."""
+    """Parameters that can switch channels."""
     remedy: str = ""
-    """Setting that lets the line command the drive, as a sentence."""
+    """Setting that gives command to Modbus, as a sentence."""
     source: str = ""
     confidence: Confidence = "manual"

@@ -1,4 +1,4 @@
-"""The state chart of a drive: its states, and what may be ordered in them."""
+"""The state chart of a drive: its states and the commands allowed in them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ StateKind = Literal[
 
 
 class State(Table, frozen=True, kw_only=True):
-    """A state of the drive, recognized in a status word; the first that fits counts."""
+    """State of the drive, derived from a status word; the first match applies."""
 
     id: Identifier
     name: str
@@ -30,7 +30,7 @@ class Transition(Table, frozen=True, kw_only=True):
     source: Identifier
     target: Identifier
     command: RawWord | None = None
-    """Command word that makes it; absent if the drive does so on its own."""
+    """Command word that triggers it; absent if the drive does so on its own."""
     edge_bit: BitNumber | None = None
     name: str = ""
 
@@ -44,7 +44,7 @@ class DirectionBit(Table, frozen=True, kw_only=True):
 
 
 class StatusBit(Table, frozen=True, kw_only=True):
-    """A status bit with a meaning of its own and the value at which it holds."""
+    """Status bit with its own meaning, and the value for which it applies."""
 
     parameter: str
     bit: BitNumber
@@ -52,12 +52,12 @@ class StatusBit(Table, frozen=True, kw_only=True):
 
 
 class ChannelBits(Table, frozen=True, kw_only=True):
-    """Some bits of a word that show who commands the drive."""
+    """Bits of a word that show the command channel."""
 
     parameter: str
     shift: Annotated[int, Meta(ge=0, le=15)]
     mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
-    """Mask of the value after it was shifted down."""
+    """Mask applied after the shift."""
     names: dict[str, str]
 
 
@@ -76,26 +76,26 @@ OrderId = Literal[
 
 
 class Order(Table, frozen=True, kw_only=True):
-    """Command to a drive, as words that are written one after another.
+    """Command to a drive, as words that are written in sequence.
 
-    Of several orders with one id the first counts whose states and conditions hold.
+    Of several with the same id, the first whose states and conditions hold is used.
     """
 
     id: OrderId
     name: str
     words: list[RawWord]
     parameter: str = ""
-    """Register of the words; the chart's command word if empty."""
+    """Register of the words; empty: the chart's command word."""
     states: list[Identifier] = []
-    """States in which it may be given; any where empty."""
+    """States in which it is allowed; empty: any."""
     when: list[When] = []
-    """Raw values that must be known and hold."""
+    """Conditions that must be known and hold."""
     broadcast: bool = False
-    """True where its word can start no motor on any drive that hears it."""
+    """True if its word cannot start a motor on any drive that receives it."""
     clears: list[str] = []
-    """Words that go back to their initial values by it."""
+    """Words that it resets to their initial values."""
     follows: str = ""
-    """Further consequences, shown before it is given; sentences."""
+    """Further consequences, shown before it is sent; sentences."""
     note: str = ""
     confidence: Confidence = "manual"
 
@@ -106,25 +106,25 @@ class Interlock(Table, frozen=True, kw_only=True):
     parameter: str
     mask: WordAddress = 0xFFFF
     values: list[int]
-    """Raw values, behind the mask, with which it may be given."""
+    """Masked raw values with which the command is allowed."""
     orders: list[OrderId] = []
-    """Orders that it holds for; those that run or brake where empty."""
+    """Commands that it applies to; empty: those that run or brake."""
     when: list[When] = []
-    """Raw values with which it counts at all."""
+    """Conditions for the interlock."""
     text: str
-    """Problem otherwise, as a sentence."""
+    """Problem if it is not met, as a sentence."""
     remedy: str = ""
 
 
 class OptionChoice(Table, frozen=True, kw_only=True):
-    """One setting of an option: the bits behind its mask, and their name."""
+    """One setting of an option: the masked bits and their name."""
 
     bits: WordAddress
     name: str
 
 
 class CommandOption(Table, frozen=True, kw_only=True):
-    """Bits of a command word that stay as they are from order to order."""
+    """Bits of a command word that are kept between commands."""
 
     id: Identifier
     name: str
@@ -144,10 +144,10 @@ class Chart(Table, frozen=True, kw_only=True):
     kind: Identifier = "plain"
     """Behavior of a simulated drive beyond its states and commands."""
     runs_in: Identifier | None = None
-    """The running state to which a start leads through the transitions, a command at a time;
-    without it the words of a command are written unchanged."""
+    """The running state that a start reaches through the transitions, one command at a time;
+    absent: the words of a command are written unchanged."""
     when: When | None = None
-    """Condition; absent: always, or if no other applies."""
+    """Condition for the chart; absent: always, or if no other applies."""
     status: str
     command: str = ""
     states: list[State]
@@ -166,7 +166,7 @@ class Chart(Table, frozen=True, kw_only=True):
 
 
 class CommandExample(Table, frozen=True, kw_only=True):
-    """A whole command word with what it does, for the person who reads words."""
+    """A complete command word and its effect, for readers of raw words."""
 
     word: WordAddress
     does: str
@@ -175,7 +175,7 @@ class CommandExample(Table, frozen=True, kw_only=True):
 
 
 class ScaleWhen(When, frozen=True, kw_only=True):
-    """A condition on another word, without which references count in another scale."""
+    """A condition on another word; if it is not met, references have another scale."""
 
     otherwise: str
     """Problem if the condition is not met, and the remedy, as sentences."""
@@ -189,18 +189,18 @@ class ReferenceWay(Table, frozen=True, kw_only=True):
     signed: bool = False
     feedback: str = ""
     scale_when: ScaleWhen | None = None
-    """With which raw value of another word it has the scale of this profile."""
+    """Condition for the scale of this profile."""
     note: str = ""
 
 
 class TeachableReference(Table, frozen=True, kw_only=True):
-    """A word of unknown scale that takes the reference once that scale was taught and confirmed."""
+    """A word of unknown scale that takes the reference once its scale is learned and confirmed."""
 
     parameter: str
     bits: WordAddress = 0
-    """Bits of the chart's command word that choose it; set with each command to run."""
+    """Bits of the chart's command word that select it; set with each run command."""
     most: str = ""
-    """Parameter that holds the highest reference, once it was taught in the same unit."""
+    """Parameter that contains the highest reference, once learned in the same unit."""
     note: str = ""
     source: str = ""
     confidence: Confidence = "unverified"

@@ -10,7 +10,7 @@ from .base import Identifier, RawWord, Table
 
 
 class Setting(Table, frozen=True, kw_only=True):
-    """A parameter and the raw value that it is to hold."""
+    """A parameter and its required raw value."""
 
     parameter: str
     value: RawWord
@@ -20,18 +20,18 @@ class Way(Table, frozen=True, kw_only=True):
     """Source of the command or the reference, or the selection between two."""
 
     sources: Annotated[list[str], Meta(min_length=1, max_length=2)]
-    """One source, or two: that without the switch and that with it."""
+    """One source, or two: without the switch and with it."""
     switch: str = ""
 
 
 class ControlSource(Table, frozen=True, kw_only=True):
-    """A configuration of who commands the drive and who gives its reference."""
+    """A configuration of command source and reference source."""
 
     id: Identifier
     name: str
     command: Way
     reference: Way
     settings: list[Setting]
-    """Settings that select it, in the order of writing."""
+    """Settings that select it, in write order."""
     note: str = ""
     source: str = ""

@@ -1,4 +1,4 @@
-"""The form of a help file: what the faults and alarms of a family point at."""
+"""The form of a help file: help on the faults and alarms of a family."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ that is on, without action, or only by switching the drive off and on."""
 
 
 class LookAt(Table, frozen=True, kw_only=True):
-    """A parameter to look at after a fault, and why."""
+    """A parameter to check after a fault, and why."""
 
     code: str
     why: str
@@ -28,7 +28,7 @@ class RuledOut(Table, frozen=True, kw_only=True):
     """A cause or a check that the value of a parameter rules out."""
 
     text: str
-    """The cause or the check, as in `probable` or `check`."""
+    """The cause or check, word for word as in `probable` or `check`."""
     parameter: str
     values: list[int] = []
     """Raw values that rule it out."""
@@ -37,7 +37,7 @@ class RuledOut(Table, frozen=True, kw_only=True):
     max: int | None = None
     """With `min`: the highest raw value that rules it out."""
     when: list[When] = []
-    """Raw values with which this counts; they must be known."""
+    """Conditions; their words must be known."""
 
     def holds(self, raws: Mapping[str, int]) -> bool:
         """True if it is ruled out; an unknown value rules out nothing."""
@@ -67,14 +67,14 @@ class FaultHelp(Hint, frozen=True, kw_only=True):
     raw: RawWord | None = None
     """The fault, as among the profile's codes; absent: any trip of a family without numbers."""
     code: str = ""
-    """Its code, for readers of the file; it must be that of the profile."""
+    """Code of the fault, for readers of the file; must match the profile."""
     name: str = ""
     """Name of the fault if `raw` is absent."""
     reset: ResetWay | None = None
-    """End of the fault; absent if no document states it. Recalled, never sure: the drive knows
-    better."""
+    """End of the fault; absent if no document states it. Recalled from memory, so the drive's own
+    sign takes precedence."""
     wait_s: Annotated[int, Meta(ge=1)] | None = None
-    """Seconds to wait before a reset can work, about."""
+    """Approximate seconds to wait before a reset can work."""
 
 
 class AlarmHelp(Hint, frozen=True, kw_only=True):

@@ -18,7 +18,7 @@ class Source(Table, frozen=True, kw_only=True):
 
 
 class Erratum(Table, frozen=True, kw_only=True):
-    """A place where a manual is wrong or contradicts itself, and what this profile follows."""
+    """An error or contradiction in a manual, and what this profile follows."""
 
     place: str
     printed: str
@@ -27,7 +27,7 @@ class Erratum(Table, frozen=True, kw_only=True):
 
 
 class ProfileHead(Table, frozen=True, kw_only=True):
-    """The first table of a profile, all that a listing reads."""
+    """First table of a profile; a listing reads no more."""
 
     id: Identifier
     name: str
@@ -37,8 +37,8 @@ class ProfileHead(Table, frozen=True, kw_only=True):
     demo_hz: DecimalText | None = None
     """Frequency at which its motor runs in the demo; absent: it is not in the demo."""
     rows_from: list[str] = []
-    """Files of rows that several families share, beside this file; a row with the same key here
-    says what differs."""
+    """Files of rows shared by several families, in the folder of this file; a row here with the
+    same key contains the differences."""
     without: list[str] = []
     """Codes of shared parameters that this family does not have."""
 
@@ -70,11 +70,11 @@ class Identification(Table, frozen=True, kw_only=True):
     """Beginnings of object 1 (reference) that belong to this family."""
     objects: list[IdentificationObject] = []
     version_digits: Literal["as-told", "two-and-two"] = "as-told"
-    """`two-and-two` where 0201 means version 2.1."""
+    """`two-and-two` if 0201 means version 2.1."""
     conformity: int = 1
     highest_read_device_id: Annotated[int, Meta(ge=1, le=4)] = 1
     exception_has_mei_byte: bool = False
-    """True where a refused function 43 is answered with the MEI byte before the code."""
+    """True if the exception to function 43 has the MEI byte before the code."""
     model_parameter: str = ""
     class_parameter: str = ""
     class_bit: BitNumber | None = None

@@ -42,7 +42,7 @@ class LinkSetting(Table, frozen=True, kw_only=True):
 
 
 class LinkSettings(Table, frozen=True, kw_only=True):
-    """Line settings of the drive as it leaves the factory, and the parameters behind them."""
+    """Factory line settings of the drive, and their parameters."""
 
     baud: int
     format: Annotated[str, Meta(pattern=r"^8[NEO][12]$")]
@@ -57,7 +57,7 @@ class LinkSettings(Table, frozen=True, kw_only=True):
 
 
 class FurtherServer(Table, frozen=True, kw_only=True):
-    """A further Modbus server in the same drive, at an address of its own."""
+    """A further Modbus server in the same drive, with its own address."""
 
     parameter: str
     name: str
@@ -65,16 +65,16 @@ class FurtherServer(Table, frozen=True, kw_only=True):
 
 
 class Addresses(Table, frozen=True, kw_only=True):
-    """Slave addresses a drive of this family takes."""
+    """Slave addresses that a drive of this family accepts."""
 
     first: DeviceAddress = 1
     last: DeviceAddress = 247
     factory: DeviceAddress = 1
     broadcast: DeviceAddress | None = 0
     zero_digit_is_group: bool = False
-    """True where an address with a zero digit (10, 20, 105) calls a group of drives."""
+    """True if an address with a zero digit (10, 20, 105) calls a group of drives."""
     off: int | None = None
-    """Raw address at which the drive's server is switched off."""
+    """Raw address that switches the drive's server off."""
     servers: list[FurtherServer] = []
     note: str = ""
     source: str = ""
@@ -100,25 +100,25 @@ class PortCounters(Table, frozen=True, kw_only=True):
 
     name: str
     frames: str
-    """Frames to the drive's address, right and damaged ones, modulo 65536."""
+    """Parameter that counts frames to the drive's address, good and damaged, modulo 65536."""
     checksum_errors: str
-    """Those with a wrong checksum; stays at 65535."""
+    """Parameter that counts frames with a wrong checksum; stays at 65535."""
     source: str = ""
 
 
 class ReadShapes(Table, frozen=True, kw_only=True):
-    """Which shapes of a read the drive answers."""
+    """Forms of a read that the drive answers."""
 
     single_words_only: bool = False
-    """True where only one word, or a block declared below, can be read."""
+    """True if only one word, or a declared block, can be read."""
     unknown_word: WordAddress | None = None
-    """Word that stands for an unknown or protected parameter inside a longer read."""
+    """Word that stands for an unknown or protected parameter in a longer read."""
     unknown_exception: ExceptionByte | None = 2
-    """Exception for a read of unknown words only; absent where the manual names none."""
+    """Exception for a read of unknown words only; absent if the manual names none."""
     low_word_first: bool = True
-    """Order of the two words of 32-bit values, where a parameter does not say otherwise."""
+    """Word order of 32-bit values, unless a parameter overrides it."""
     gaps_readable: bool = False
-    """True where a read may run over addresses that carry no parameter."""
+    """True if a read can span addresses without a parameter."""
     note: str = ""
     source: str = ""
 

@@ -1,4 +1,4 @@
-"""Saving of a drive's settings, and its return to factory settings."""
+"""Commands that save a drive's settings or restore factory settings."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ from .base import RawWord, Table, When
 
 
 class MemoryOrder(Table, frozen=True, kw_only=True):
-    """A word that saves or recalls settings."""
+    """A word that saves settings or restores factory settings."""
 
     parameter: str
     raw: RawWord
-    """The value, or the bits that are set while the others stay."""
+    """The value, or the bits that are set while the others are kept."""
     bit: bool = False
-    """True where `raw` are bits of a word whose others stay."""
+    """True if `raw` contains bits and the word's other bits are kept."""
     does: str
-    """Exact effect, for the person who confirms it."""
+    """Exact effect, shown for confirmation."""
     at_rest_mask: RawWord = 0
-    """Bits of the extended status word that must be 0 before."""
+    """Bits of the extended status word that must be 0 beforehand."""
     keeps_value: bool = False
-    """True if the word keeps the written value: it does not show when it is done."""
+    """True if the word keeps the written value and does not show completion."""
     done: When | None = None
-    """Sign that it is done, if the word itself does not show it."""
+    """Condition that shows completion, if the word itself does not."""
     groups: str = ""
-    """A word that chooses the groups of settings; nothing happens while it is 0."""
+    """A word that selects the groups of settings; nothing happens while it is 0."""
     source: str = ""
 
 
 class MemoryOrders(Table, frozen=True, kw_only=True):
-    """The orders to a drive's memory; what is not known is left out."""
+    """Commands to a drive's memory; unknown ones are omitted."""
 
     save: MemoryOrder | None = None
     factory: MemoryOrder | None = None

@@ -1,4 +1,4 @@
-"""Monitored values of a drive, its faults, and its own communication watch."""
+"""Monitored values of a drive, its faults, and its communication monitoring."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class MonitoringValue(Table, frozen=True, kw_only=True):
 
     parameter: str
     rate: Literal["fast", "slow", "on-change"] = "fast"
-    """When it is read: in every cycle, in every tenth, or when the state has changed."""
+    """Read in every cycle, in every tenth, or when the state has changed."""
     low: str = ""
-    """Lower end of its bar, in its unit."""
+    """Lower end of the bar, in the value's unit."""
     high: str = ""
-    """Upper end of its bar, in its unit, or the code of a parameter that holds it."""
+    """Upper end of the bar, in the value's unit, or the code of a parameter that contains it."""
 
 
 class SpeedFormula(Table, frozen=True, kw_only=True):
@@ -51,14 +51,14 @@ class FaultCode(Table, frozen=True, kw_only=True):
 
 
 class AfterReset(Table, frozen=True, kw_only=True):
-    """The effect of a fault reset for one command channel; the first row that holds counts."""
+    """The effect of a fault reset for one command channel; the first row that holds is used."""
 
     by: Literal["line", "others"] | None = None
-    """The holder of the command channel; absent: any channel, also one that is not known."""
+    """The command channel; absent: any, even an unknown one."""
     when: list[When] = []
     """Conditions; all must hold."""
     text: str
-    """The sentence for the question, the Faults screen, `reset` and `status`."""
+    """The effect in sentences, for the question, the Faults screen, `reset` and `status`."""
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -68,16 +68,16 @@ class InputBits(Table, frozen=True, kw_only=True):
 
     parameter: str
     mask: WordAddress = 0xFFFF
-    """Its bits that are inputs."""
+    """Bits that are inputs."""
 
 
 class Faults(Table, frozen=True, kw_only=True):
     """Registers of faults, and the meaning of their codes."""
 
     parameter: str = ""
-    """The parameter that holds the present or last fault."""
+    """The parameter that contains the present or last fault."""
     shows_last: bool = False
-    """True where it keeps the last fault after the fault is gone."""
+    """True if it keeps the last fault after the fault is cleared."""
     history: list[str] = []
     stored: list[list[str]] = []
     """Values that the drive stores for each fault of its history, in the same order."""
@@ -85,9 +85,9 @@ class Faults(Table, frozen=True, kw_only=True):
     help: list[FaultHelp] = []
     """Help on faults; a file of the folder `help` contains it if a family has many."""
     help_file: Identifier | None = None
-    """Name of that file, without .toml, where it is not the profile's id."""
+    """Name of that file, without .toml, if it is not the profile's id."""
     reset_ready: StatusBit | None = None
-    """The bit by which the drive shows that a reset can work now."""
+    """The bit that shows that a reset can work."""
     after_reset: list[AfterReset] = []
     """The effect of a reset, one sentence per command channel."""
     inputs: InputBits | None = None
@@ -108,27 +108,27 @@ class Reaction(Table, frozen=True, kw_only=True):
     trips: bool
     motor_keeps_running: bool = False
     never_set: bool = False
-    """True where it makes a lost line go unnoticed: it is set at the keypad, or not at all."""
+    """True if it hides communication loss; Drive Panel never sets it, only the keypad can."""
 
 
 class CommunicationFault(Table, frozen=True, kw_only=True):
-    """The drive's watch over the line."""
+    """The drive's communication monitoring."""
 
     timeout: str
     other_timeouts: list[str] = []
-    """Timeouts of other ports of the drive; which port the line is on, nobody knows."""
+    """Timeouts of other ports of the drive; the port of this line is unknown."""
     off: int | None = None
-    """Raw timeout at which the watch is off."""
+    """Raw timeout that switches monitoring off."""
     reaction: str = ""
     reactions: list[Reaction] = []
     starts: str
-    """When the watch begins, in words."""
+    """Start of monitoring, in words."""
     starts_confidence: Confidence = "manual"
     """Certainty of that; `unverified` if no document states it."""
     needs_write: bool = False
-    """True where it begins only after a command or reference was written."""
+    """True if it begins only after a command or reference was written."""
     begins_with: RawWord | None = None
-    """A command word that begins the watch and moves nothing, where a first command begins it."""
+    """A first command word that starts monitoring and moves nothing, if a command starts it."""
     fault: int | None = None
     warnings: list[str] = []
     note: str = ""

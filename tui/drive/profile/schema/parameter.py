@@ -1,4 +1,4 @@
-"""One parameter: where it lies, how its raw value is read, who may write it and when."""
+"""One parameter: its address, decoding of its raw value, and write access."""
 
 from __future__ import annotations
 
@@ -45,38 +45,38 @@ class Bit(Table, frozen=True, kw_only=True):
     off: str = ""
     on: str = ""
     alarm: bool = False
-    """True where a set bit is an alarm."""
+    """True if a set bit is an alarm."""
     counts: WordState | None = None
-    """Required values of other bits of the word for this one to be valid."""
+    """Required values of other bits of the word for this bit to be valid."""
     note: str = ""
 
 
 class ScaleBy(Table, frozen=True, kw_only=True):
-    """A scale that follows another parameter's raw value (ramps after Inr)."""
+    """A scale that depends on another parameter's raw value (ramps on Inr)."""
 
     parameter: str
     scales: dict[str, DecimalText]
     absent: DecimalText | None = None
-    """Scale where the drive says that it has no such parameter; without it the scale is unknown."""
+    """Scale if the drive reports that it has no such parameter; absent: unknown."""
 
 
 class FactoryBy(Table, frozen=True, kw_only=True):
-    """A factory setting that follows another parameter's raw value (HSP after bFr); raw values."""
+    """A factory setting that depends on another parameter's raw value (HSP on bFr)."""
 
     parameter: str
     raws: dict[str, int]
 
 
 class Multiple(Table, frozen=True, kw_only=True):
-    """So many times another parameter, in the unit of the one it is for, cut to a whole count.
+    """A multiple of another parameter, in the unit of this one, truncated to a whole count.
 
-    Limits and factory settings that follow the drive's rated current, for one.
+    For example, limits and factory settings that depend on the drive's rated current.
     """
 
     parameter: str
     times: SignedDecimalText
     plus: SignedDecimalText = "0"
-    """Added to it, in the same unit: `100 - tA1` is times -1, plus 100."""
+    """Added to the product, in the same unit: `100 - tA1` is times -1, plus 100."""
 
 
 class Grounds(Table, frozen=True, kw_only=True):
@@ -88,12 +88,12 @@ class Grounds(Table, frozen=True, kw_only=True):
 
 
 class UnitBy(Table, frozen=True, kw_only=True):
-    """A unit told by some bits of another parameter (counters of energy and time)."""
+    """A unit given by bits of another parameter (counters of energy and time)."""
 
     parameter: str
     shift: Annotated[int, Meta(ge=0, le=15)]
     mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
-    """Mask of the value after it was shifted down."""
+    """Mask applied after the shift."""
     units: dict[str, str]
 
 
@@ -178,18 +178,18 @@ Quantity = Literal[
     "drive_reference",
     "software_version",
 ]
-"""Meaning of a parameter across families: the same name, the same thing."""
+"""Meaning of a parameter across families."""
 
 
 class ParameterGroup(Table, frozen=True, kw_only=True):
     """Kind of a group's parameters if they are not settings."""
 
     name: str
-    """As the parameters have it in `group`."""
+    """Name as in `group` of the parameters."""
     holds: Literal["settings", "commands", "measurements"] = "settings"
     needs_factory: str = ""
-    """A word that says which option is fitted: the group means what it says while that word
-    holds its factory value, and is not written otherwise."""
+    """A word that shows the fitted option. The group is valid only while that word has its factory
+    value, and is not written otherwise."""
 
 
 class Parameter(Table, frozen=True, kw_only=True):
@@ -201,25 +201,24 @@ class Parameter(Table, frozen=True, kw_only=True):
     """Address as the manual writes it: W9001, 16#FD00, 1.05."""
     address: WordAddress
     function: Literal[3, 4] = 3
-    """The function that reads it: 3, or 4 for an input register, which nothing writes."""
+    """The function that reads it: 3, or 4 for an input register, which is never written."""
     type: WordType = "uint16"
     low_word_first: bool = True
-    """Order of the two words of a 32-bit value; without it that of `reading`."""
+    """Word order of a 32-bit value; absent: as in `reading`."""
     mask: Annotated[int, Meta(ge=1, le=0xFFFF)] = 0xFFFF
-    """Bits of the word that are this parameter, once shifted down; the others are not its own,
-    and stay as they are when it is written."""
+    """Bits of the word that belong to this parameter, after the shift; a write keeps the others."""
     shift: BitNumber = 0
-    """Bits by which the word is shifted down first."""
+    """Bits by which the word is first shifted right."""
     sure_up_to: int | None = None
-    """Highest raw value whose meaning is sure; one above it is marked `?`."""
+    """Highest raw value with a certain meaning; higher ones are marked `?`."""
     unit: str = ""
     scale: DecimalText = "1"
     scale_by: ScaleBy | None = None
     unit_by: UnitBy | None = None
     base: str = ""
-    """Base of a percentage, as far as it is known."""
+    """Base of a percentage, if known."""
     rating: str = ""
-    """Parameter that carries 100 % in a physical unit, where the value is a percentage."""
+    """Parameter that gives 100 % in a physical unit, if the value is a percentage."""
     min: int | None = None
     max: int | None = None
     min_from: str = ""
@@ -227,22 +226,22 @@ class Parameter(Table, frozen=True, kw_only=True):
     """Parameters that limit this one further (LSP..HSP)."""
     min_of: Multiple | None = None
     max_of: Multiple | None = None
-    """Limits that are so many times another parameter (0.2 times the drive's rated current)."""
+    """Limits as a multiple of another parameter (0.2 times the drive's rated current)."""
     limit_grounds: Grounds | None = None
     """Source of the limits if it differs from the row's."""
     factory: int | None = None
     factory_text: str = ""
-    """Factory setting in words where it depends on the rating or the market."""
+    """Factory setting in words, if it depends on the rating or the market."""
     factory_by: FactoryBy | None = None
-    """Factory setting after another parameter; `factory` is that of the factory state."""
+    """Factory setting that depends on another parameter; `factory` applies to the factory state."""
     factory_of: Multiple | None = None
     factory_grounds: Grounds | None = None
     """Source of the factory setting if it differs from the row's."""
     set_by_drive: bool = False
-    """True where the drive itself changes it (auto-tuning): never told as changed by a person."""
+    """True if the drive changes it (auto-tuning); never reported as changed by a user."""
     enumeration: str = ""
     values: dict[str, str] = {}
-    """Names of raw values; of special ones where the parameter is a number."""
+    """Names of raw values; for a number, of special values only."""
     bits: list[Bit] = []
     reserved: list[BitNumber] = []
     """Bits that must never be written as 1."""
@@ -251,15 +250,15 @@ class Parameter(Table, frozen=True, kw_only=True):
     effective: Effective = "at-once"
     group: str
     holds: Literal["command"] | None = None
-    """`command` where it is one, whatever its group holds."""
+    """`command` for a command, whatever its group contains."""
     resets_others: Annotated[int, Meta(ge=0, le=9)] = 0
-    """Not 0 where writing it changes other settings: 1 is written before 2, both before others."""
+    """Above 0 if writing it changes other settings: 1 is written before 2, both before others."""
     rated: bool = False
-    """True where its value belongs to one rating of drive and motor, or to one model."""
+    """True if its value belongs to one rating of drive and motor, or to one model."""
     quantity: Quantity | None = None
     """Meaning of the parameter across families; at most one parameter per quantity."""
     forbidden: str = ""
-    """Why the panel never writes it, where it must not."""
+    """Reason why Drive Panel never writes it, if it must not."""
     note: str = ""
     source: str
     confidence: Confidence

@@ -14,11 +14,11 @@ class StartUpStep(Table, frozen=True, kw_only=True):
     """
 
     step: str
-    """Name in a word or two."""
+    """Short name of the step."""
     text: str
-    """Decision or task, for the person at the machine."""
+    """Decision or task for the technician at the machine."""
     parameters: list[str] = []
-    """Codes in the order in which they are set or looked at."""
+    """Codes in the order in which they are set or checked."""
     action: Literal["", "auto-tune", "save", "first-run", "take-control"] = ""
     """Action of the step besides setting values."""
     stopped_only: bool = False

@@ -1,4 +1,4 @@
-"""Line of a family in the manuals: warnings, lamps, names of signals, waiting times."""
+"""Wiring facts of a family: warnings, lamps, names of signals, waiting times."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .base import Confidence, Table
 
 
 class FamilyWarning(Table, frozen=True, kw_only=True):
-    """Something that surprises, hurts or breaks, as a sentence."""
+    """A fact that surprises, injures or damages, as a sentence."""
 
     text: str
     source: str = ""
@@ -18,19 +18,19 @@ class FamilyWarning(Table, frozen=True, kw_only=True):
 
 
 class Opening(Table, frozen=True, kw_only=True):
-    """Waiting time, everything switched off, before the drive is opened or plugged."""
+    """Waiting time with everything switched off, before opening or plugging."""
 
     minutes: Annotated[int, Meta(ge=1)] | None = None
     """Absent if no available document states it."""
     below_volts: Annotated[int, Meta(ge=1)] | None = None
-    """Voltage of the DC bus, measured, below which it counts as discharged."""
+    """Measured DC bus voltage below which the bus is considered discharged."""
     note: str = ""
     source: str = ""
     confidence: Confidence = "manual"
 
 
 class Lamp(Table, frozen=True, kw_only=True):
-    """A lamp or a sign of the display, and its meaning."""
+    """A lamp or display symbol, and its meaning."""
 
     name: str
     tells: str
@@ -39,7 +39,7 @@ class Lamp(Table, frozen=True, kw_only=True):
 
 
 class SignalName(Table, frozen=True, kw_only=True):
-    """A signal of the line and what other standards and makers call it."""
+    """A signal of the line and its names in other standards."""
 
     signal: str
     names: dict[str, str]
@@ -47,7 +47,7 @@ class SignalName(Table, frozen=True, kw_only=True):
 
 
 class Wiring(Table, frozen=True, kw_only=True):
-    """Facts that a person must know before touching the line or the drive."""
+    """Facts to know before touching the line or the drive."""
 
     warnings: list[FamilyWarning] = []
     """Facts that surprise, injure or damage."""
@@ -58,4 +58,4 @@ class Wiring(Table, frozen=True, kw_only=True):
     signals_source: str = ""
     """Source of those names."""
     lamps: list[Lamp] = []
-    """Lamps and signs of the display."""
+    """Lamps and display symbols."""
