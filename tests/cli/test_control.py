@@ -27,7 +27,7 @@ def test_the_control_is_taken_and_given_back(line: str) -> None:
     status = run(0, "status", line, *DRIVE)
     assert "drivepanel run --take-control takes it, in the panel t on Monitor." in status
     reported = motor(0, line, *DRIVE, "--arm", "--take-control", "--for", "1")
-    assert reported.index("Control by the line") < reported.index("Unlock and run forward:")
+    assert reported.index("Control by Modbus") < reported.index("Unlock and run forward:")
     assert "stop --give-back --arm gives it back" in reported
     assert reported.rstrip().endswith("stopped.")
     assert held(line, IN_FORCE) == 1
@@ -57,7 +57,7 @@ def test_stop_without_arming_gives_nothing_back_exits_with_6(line: str) -> None:
 def test_control_that_would_start_motor_is_not_taken_exits_with_5(line: str) -> None:
     put(line, COMMAND_WORD, 0x0003)
     output = motor(5, line, *DRIVE, "--arm", "--take-control")
-    assert "the motor would start as soon as it is in force" in output
+    assert "the motor would start as soon as that word takes effect" in output
     assert held(line, IN_FORCE) == 0
 
 

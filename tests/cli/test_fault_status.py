@@ -59,27 +59,27 @@ async def test_a_fault_with_causes_checks_and_live_values() -> None:
     assert reported["causes"][0] == "The braking is too sudden for the inertia"
     assert reported["confidence"] == "public"
     assert "AAV49428" in reported["source"]
-    assert "Lengthen DEC" in reported["checks"]
+    assert "Increase DEC" in reported["checks"]
     (ramp,) = [row for row in reported["look_at"] if row["code"] == "DEC"]
     assert (ramp["value"]["text"], ramp["value"]["unit"], ramp["value"]["quality"]) == (
         "0.5", "s", "good",
     )  # fmt: skip
-    assert ramp["why"] == "the ramp in force"
+    assert ramp["why"] == "the active ramp"
     assert reported["reset"] == {
         "way": "automatic",
         "confidence": "practice",
         "possible_now": True,
         "wait_s": None,
-        "follows": "Modbus commands this drive: a reset leads to Switch on disabled, and the motor"
+        "follows": "Modbus commands this drive. A reset leads to Switch on disabled. The motor"
         " runs only on a new run command. No input is closed at the terminals now.",
     }
     text = text_of(status)
     for part in (
         "probably: The braking is too sudden for the inertia; ",
         "(public guide)",
-        "check: Lengthen DEC; ",
+        "check: Increase DEC; ",
         "(general practice)",
-        "look at: DEC 0.5 s, the ramp in force",
+        "look at: DEC 0.5 s, the active ramp",
         "reset: a fault reset works now, says the drive. ",
     ):
         assert part in text

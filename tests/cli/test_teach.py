@@ -164,7 +164,7 @@ def test_taking_the_control_running_at_a_taught_reference_and_giving_it_back(lin
     reported = motor(
         0, line, *DRIVE, "--arm", "--take-control", "--reference", "750rpm", "--for", "1"
     )
-    order = ("Control by the line", "Reference 750 rpm (1.21)", "Unlock and run forward:")
+    order = ("Control by Modbus", "Reference 750 rpm (1.21)", "Unlock and run forward:")
     places = [reported.index(text) for text in order]
     assert places == sorted(places)
     assert "stop --give-back --arm gives it back" in reported

@@ -30,21 +30,21 @@ COMBINED_CASES = {
         {"Fr1": AI1, "Fr2": MODBUS, "rFC": SECOND, "LRS3": 1}, "Modbus", "Modbus",
     ),
     "away by the switch": (
-        {"Fr2": AI1, "rFC": SECOND, "LRS3": 1}, "Terminals", "Analogue input AI1",
+        {"Fr2": AI1, "rFC": SECOND, "LRS3": 1}, "Terminals", "Analog input AI1",
     ),
     "away by the switch, LRS3 late": (
-        {"Fr2": AI1, "rFC": SECOND}, "Terminals", "Analogue input AI1",
+        {"Fr2": AI1, "rFC": SECOND}, "Terminals", "Analog input AI1",
     ),
     "an input switches, and is 0": ({"Fr2": AI1, "rFC": LI4}, "Modbus", "Modbus"),
     "an input switches, and is 1": (
-        {"Fr2": AI1, "rFC": LI4, "LRS3": 1}, "Terminals", "Analogue input AI1",
+        {"Fr2": AI1, "rFC": LI4, "LRS3": 1}, "Terminals", "Analog input AI1",
     ),
     "CANopen": ({"Fr1": 167}, "CANopen", "CANopen"),
-    "Cd1 does not count": ({"Cd1": LINE, "Fr1": AI1}, "Terminals", "Analogue input AI1"),
+    "Cd1 does not count": ({"Cd1": LINE, "Fr1": AI1}, "Terminals", "Analog input AI1"),
 }  # fmt: skip
 SEPARATE_CASES = {
     "both by the line": ({"Cd1": LINE}, "Modbus", "Modbus"),
-    "reference elsewhere": ({"Cd1": LINE, "Fr1": AI1}, "Modbus", "Analogue input AI1"),
+    "reference elsewhere": ({"Cd1": LINE, "Fr1": AI1}, "Modbus", "Analog input AI1"),
     "command elsewhere": ({}, "Terminals", "Modbus"),
     "second command channel": ({"CCS": CCS_SECOND, "LRS3": 2}, "Modbus", "Modbus"),
     "away by the switch": (
@@ -145,9 +145,9 @@ def test_possible_channel_changes_are_reported() -> None:
     assert switch_texts(profile, IDLE) == []
     raws = IDLE | {"FLO": LI4, "rFC": 134, "CCS": LI4, "COP": 2}
     assert switch_texts(profile, raws) == [
-        "FLO is Logic input LI4: while it is 1 the drive is forced to local control.",
+        "FLO is Logic input LI4: while it is 1, the drive is forced to local control.",
         "rFC is Logic input LI6: it switches between Fr1 and Fr2.",
-        "COP is Command: at a switch channel 2 goes on with it.",
+        "COP is Command: when the channel is switched, channel 2 takes it over.",
     ]
     assert any("Cd1 and Cd2" in text for text in switch_texts(profile, raws | {"CHCF": SEPARATE}))
 

@@ -72,12 +72,12 @@ def test_every_pin_rule_command_and_erratum_stands_on_the_page(family: str) -> N
 
 
 WARNED = [
-    ("atv31", "With SLL = 0 a motor goes on running"),
-    ("atv312", "With SLL = 0 a motor goes on running"),
-    ("atv71", "With SLL = 0 a motor goes on running"),
-    ("atv21", "With F803 = 0 the drive does not notice a dead line"),
+    ("atv31", "With SLL = 0 a motor keeps running"),
+    ("atv312", "With SLL = 0 a motor keeps running"),
+    ("atv71", "With SLL = 0 a motor keeps running"),
+    ("atv21", "With F803 = 0 the drive does not detect communication loss"),
     *((family, "Behind a gateway") for family in FAMILIES),
-    ("atv71", "leaves the factory at OFF"),
+    ("atv71", "factory setting of the address is OFF"),
     ("atv21", "can be set to 0: the drive then does not answer"),
     *((family, "digit 0 (10, 20, 100 to 110) call a group") for family in LEROY),
 ]

@@ -52,7 +52,7 @@ def test_reset_follows_by_line_needs_a_new_run_command(family: str) -> None:
 def test_reset_follows_by_terminals_names_the_closed_input(family: str) -> None:
     profile = library.load(family)
     text = reset_follows(profile, BY_TERMINALS[family], {})
-    assert "run input that is closed" in text
+    assert "closed run input" in text
     assert LINE not in text
     takes_priority = family == "atv21"  # 16#E000 takes the command with the reset
     assert (NOT_IN_COMMAND in text) is not takes_priority
@@ -71,9 +71,9 @@ def test_reset_follows_nothing_read_is_the_general_sentence(family: str) -> None
 def test_reset_follows_2_wire_by_level_starts_the_motor() -> None:
     atv71 = library.load("atv71")
     level = {**BY_TERMINALS["atv71"], "TCC": 0, "TCT": 0}
-    assert "closed starts the motor (2-wire by level)" in reset_follows(atv71, level, {})
+    assert "closed run input starts the motor (2-wire by level)" in reset_follows(atv71, level, {})
     edge = {**BY_TERMINALS["atv71"], "TCC": 0, "TCT": 1}
-    assert "closed may start the motor" in reset_follows(atv71, edge, {})
+    assert "closed run input may start the motor" in reset_follows(atv71, edge, {})
 
 
 @pytest.mark.parametrize(

@@ -252,8 +252,8 @@ def test_every_status_word_has_a_state(profile: Profile) -> None:
 
 COMMAND_BITS = {
     0: "Preset speed, bit 0", 6: "Ramp", 9: "Direction", 10: "Run", 11: "Coast stop",
-    12: "Emergency stop", 13: "Fault reset", 14: "Reference priority of the line",
-    15: "Command priority of the line",
+    12: "Emergency stop", 13: "Fault reset", 14: "Reference priority of Modbus",
+    15: "Command priority of Modbus",
 }  # fmt: skip
 
 

@@ -138,7 +138,7 @@ def test_inputs_of_a_large_drive_can_be_typed(profile: Profile, code: str, typed
 
 
 def test_the_access_level_warns(profile: Profile) -> None:
-    assert "starts the motor at once" in profile["LAC"].note
+    assert "starts the motor immediately" in profile["LAC"].note
 
 
 def test_names_of_values_are_this_family_s_own() -> None:

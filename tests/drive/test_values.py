@@ -200,6 +200,24 @@ def test_names_are_typed_in_any_case_or_as_numbers() -> None:
         encode(p, "1", names, Decimal(1))
 
 
+@pytest.mark.parametrize(
+    ("family", "code", "former"),
+    [
+        ("atv312", "Fr1", "Analogue input AI1"),
+        ("atv71", "STP", "DC bus kept up"),
+        ("atv71", "SLL", "Speed kept"),
+        ("atv71", "BST", "travelling"),
+    ],
+)
+def test_former_names_of_values_are_still_read(family: str, code: str, former: str) -> None:
+    profile = library.load(family)
+    names = profile.names(profile[code])
+    assert former not in names.values()
+    present = {"Analogue input AI1": "Analog input AI1", "DC bus kept up": "DC bus maintained"}
+    present |= {"Speed kept": "Speed maintained", "travelling": "Traveling"}
+    assert names[encode(profile[code], former, names, Decimal(1)).raw] == present[former]
+
+
 def test_a_number_with_a_special_name_is_still_a_number() -> None:
     p = parameter(values={"0": "Off"}, unit="s", min=0, max=100)
     assert decode(p, 0, {0: "Off"}, Decimal(1)).text == "Off"

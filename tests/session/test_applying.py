@@ -184,7 +184,7 @@ async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
         reported = text(applied, "ACC")
         assert "exception 4, Not completed" in reported
         assert "The drive is ready" in reported or "The drive is not ready" in reported
-        assert "Check whether the parameter can be written" in reported
+        assert "Check if the parameter can be written" in reported
         assert {edit.code for edit in applied.left} == {"ACC", "DEC"}
         assert [e.answer.startswith("Device 1 refused") for e in made.journal.recent] == [
             True,
@@ -425,5 +425,5 @@ async def rest(made: Bench) -> None:
 async def test_a_drive_that_refuses_to_save_says_why() -> None:
     with bench("atv71") as made:
         made.drive.busy = True
-        with pytest.raises(DeviceException, match="Check whether the parameter can be written"):
+        with pytest.raises(DeviceException, match="Check if the parameter can be written"):
             await save_to_eeprom(made.session, made.journal, made.permit())

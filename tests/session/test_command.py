@@ -262,7 +262,7 @@ async def test_a_stop_ends_arming() -> None:
 
 
 REFUSALS = [
-    ("atv31", {"LAC": 1}, "forward", r"below L3.*Set LAC to L3"),
+    ("atv31", {"LAC": 1}, "forward", r"below L3.*set LAC to L3"),
     ("atv312", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("atv71", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("powerdrive", {"6.43": 0}, "forward", r"6\.43 is Terminals\. .*t takes the control"),

@@ -99,7 +99,7 @@ async def test_start_and_reference_are_refused_while_another_master_has_changed_
             give()
             text = await made.done(OutcomeKind.REFUSED)
             assert text.startswith("Bit 9 of CMI is set:"), text
-            assert text.endswith("Have the program that set it clear it.")
+            assert text.endswith("Clear it in the program that set it.")
         assert made.writes() == []
         assert made.drive.motor.frequency == 0
         made.drive.set("CMI", 0x0010)

@@ -49,7 +49,7 @@ def access(line: TrippedDrive) -> CommandAccess:
 
 def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:
     reported = reset_follows(ATV21, {"FD01": 0, "CMOD": 0}, {"FD06": 1})
-    assert "starts the motor until Drive Panel sends 16#C000" in reported
+    assert "Until Drive Panel sends 16#C000, a closed run input" in reported
     assert "clears FA00 and the reference" in reported
     assert reported.endswith("Closed at the terminals now: F.")
 

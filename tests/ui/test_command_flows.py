@@ -330,7 +330,7 @@ def follows(app: DrivePanelApp) -> str:
     ("family", "closed", "output"),
     [
         ("atv71", "LI3", ("on a new run command", "Closed at the terminals now: LI3.")),
-        ("atv21", "F", ("a run input that is closed", "Closed at the terminals now: F.")),
+        ("atv21", "F", ("a closed run input", "Closed at the terminals now: F.")),
         ("powerdrive", "RUN", ("6.42 commands this drive", "cannot be read over Modbus")),
     ],
 )

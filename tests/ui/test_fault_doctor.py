@@ -83,7 +83,7 @@ def test_which_input_tripped_it_is_reported_at_80_columns() -> None:
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
     text = reported(view(external.raw, readings=read))
     assert "ETF    Logic input LI4 input or bit that trips it     Enter opens" in text
-    assert "IL1R   LI3, LI4        state of the inputs now" in text
+    assert "IL1R   LI3, LI4        present state of the inputs" in text
     still = reported(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))
     assert "IL1R   none " in still
 
@@ -155,14 +155,14 @@ BRAKING = {"BRA": 1, "VCAL": 4, "ULP0": 2280, "DEC": 30}
 def test_advice_that_a_value_rules_out_is_not_given() -> None:
     fault = readings_of(ATV71, BRAKING, NOW)
     text = reported(view(18, readings=fault), 100, 30)
-    assert "(ruled out, BRA Yes) No resistor fitted" in text
+    assert "(ruled out, BRA Yes) No resistor: set BRA on" in text
     assert "(ruled out, ULP0 228.0 V) Mains voltage already high" in text
     assert text.index("The load drives the motor") < text.index("Mains voltage already high")
     open_ = reported(
         view(18, readings=readings_of(ATV71, {**BRAKING, "BRA": 0, "ULP0": 2580}, NOW))
     )
     assert "ruled out" not in open_
-    assert "No resistor fitted: BRA on" in open_
+    assert "No resistor: set BRA on" in open_
 
 
 def test_no_value_that_is_unknown_or_older_fault_rules_anything_out() -> None:

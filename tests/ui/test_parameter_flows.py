@@ -215,8 +215,8 @@ async def test_simply_start_is_the_first_group_with_its_steps_in_their_order() -
             await made.pilot.press("left")
         await until(made.pilot, lambda: "2 Mains standard" in shown(made.app, "table"))
         assert screen.listed.code == "bFr"
-        assert "1 Before" in shown(made.app, "table")
-        assert "drive powered without a run command" in table(made)
+        assert "1 Preparation" in shown(made.app, "table")
+        assert "drive is powered without a run command" in table(made)
         listed = [item.code for item in screen.listed.items if item.code]
         assert listed[:3] == ["bFr", "UnS", "FrS"]
         await press(made.pilot, "down", "down", "down")
@@ -227,7 +227,7 @@ async def test_simply_start_is_the_first_group_with_its_steps_in_their_order() -
         # its limits follow the rated current of the drive
         await until(made.pilot, lambda: "(INV)" in shown(made.app, "detail"))
         await press(made.pilot, "up", "up", "up")
-        await until(made.pilot, lambda: "1 Before" in shown(made.app, "table"))
+        await until(made.pilot, lambda: "1 Preparation" in shown(made.app, "table"))
         await press(made.pilot, "end")
         await until(made.pilot, lambda: "14 First run" in shown(made.app, "table"))
 

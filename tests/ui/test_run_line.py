@@ -267,7 +267,7 @@ async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_th
         before = writes(made.app)
         await made.pilot.press("enter")
         await until(made.pilot, lambda: "Esc no" not in output(made.app))
-        await made.message("The drive is not commanded by Modbus: command channel in force")
+        await made.message("The drive is not commanded by Modbus: active command channel")
         assert writes(made.app) == before
 
 

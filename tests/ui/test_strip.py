@@ -49,7 +49,7 @@ def cells_before(text: str, part: str) -> int:
     current=st.sampled_from(["0.0", "120.4", "-----"]),
     name=st.text(max_size=30),
     armed=st.sampled_from([None, 0.2, 59.0]),
-    by=st.sampled_from(["", "Terminals", "panel pts/12", "analogue input AI1 of the drive"]),
+    by=st.sampled_from(["", "Terminals", "panel pts/12", "analog input AI1 of the drive"]),
     faults=st.integers(0, 31),
     width=st.sampled_from([60, 72, 80, 100, 120, 200]),
 )

@@ -141,7 +141,7 @@ async def test_a_taught_preset_is_proposed_confirmed_and_run_by() -> None:
         await made.message("1.21 takes the reference, in rpm")
         await made.armed()
         await made.answer("t", "y")
-        await made.message("Control by the line")
+        await made.message("Control by Modbus")
         await pilot.press("r")
         await made.message("RUN FORWARD", "rpm", "Enter runs")
         await pilot.press(*"1200")

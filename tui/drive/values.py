@@ -14,6 +14,7 @@ from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 from .errors import ValueRefused
 from .profile.schema import Bit, Parameter
 from .units import factor_between
+from .value_names import raw_of_name
 
 LONGEST_NUMBER = 30
 """Places before or behind the point of a number that anybody means."""
@@ -185,7 +186,7 @@ def encode(
     typed = text.strip()
     if parameter.sure_up_to is not None:
         typed = typed.replace("?", "")  # the mark of such a value, as it is shown
-    raw = _named(typed, names)
+    raw = raw_of_name(typed, names)
     rounded = lossy = False
     if raw is None and typed.lower().startswith(("16#", "0x")):
         raw = _hexadecimal(parameter, typed)
@@ -240,11 +241,6 @@ def _doubt(parameter: Parameter) -> str:
 
 def _scale_source(parameter: Parameter) -> str:
     return parameter.scale_by.parameter if parameter.scale_by else "another parameter"
-
-
-def _named(typed: str, names: Mapping[int, str]) -> int | None:
-    folded = typed.casefold()
-    return next((raw for raw, name in names.items() if name.casefold() == folded), None)
 
 
 def _hexadecimal(parameter: Parameter, typed: str) -> int:

@@ -47,7 +47,7 @@ SHORT_NAMES: Mapping[str, str] = {
     "ramp 1 (acc, dec)": "",
     "coast stop: output allowed": "",
     "standby: starting up": "",
-    "standby with run order: starting up": "",
+    "standby with run command: starting up": "",
     "control: remote": "",
 }
 """Short forms of what bits say; nothing for what is so while all is well."""

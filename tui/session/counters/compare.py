@@ -149,7 +149,7 @@ def _differences(found: Comparison) -> Iterator[Difference]:
             "damaged-there",
             damaged,
             f"{_frames(damaged)} reached the drive damaged: noise on the way to it. Look at the"
-            " shield, the termination, the polarisation, the motor cable beside it.",
+            " shield, the termination, the polarization, the motor cable beside it.",
         )
     # of foreign frames nobody knows whether they were answered
     missed = min(frames, found.sent.low) - damaged - found.answered.high

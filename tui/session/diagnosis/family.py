@@ -10,7 +10,8 @@ from tui.drive.profile.schema import LinkSetting
 
 from .evidence import DiagnosticEvidence
 
-WIRED = ("polarisation", "termination")
+WIRED = ("polarization", "polarisation", "termination")
+"""Subjects of line rules to check; older profiles have the second spelling."""
 NAMED = "names of"
 """Beginning of the line rule that names its wires."""
 SPEED_ROLES = ("baud", "format", "parity")
@@ -77,7 +78,7 @@ def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def wiring_hints(sight: DiagnosticEvidence, *, answers: bool = False) -> Iterator[str]:
-    """Polarity, pins, polarisation and termination, as the family's manual names them.
+    """Polarity, pins, polarization and termination, as the family's manual names them.
 
     The wires of a drive that answers are the right ones: then nothing of polarity and pins.
     """
@@ -88,7 +89,7 @@ def wiring_hints(sight: DiagnosticEvidence, *, answers: bool = False) -> Iterato
         yield from _wire_hints(sight.profile)
     for rule in data.line_rules:
         subject = rule.subject.casefold()
-        if subject in WIRED or subject.endswith(f", {WIRED[1]}"):
+        if subject in WIRED or subject.endswith(f", {WIRED[-1]}"):
             yield f"{rule.subject}: {rule.rule}"
     for rule in data.line_rules:
         if rule.subject.casefold() == "ports":

@@ -104,7 +104,7 @@ def mend_settings(sight: DiagnosticEvidence) -> Iterator[str]:
     yield from settings_hints(sight)
     if sight.profile is None:
         yield NAME_A_FAMILY
-    yield "Bytes without any request: polarisation is missing, or another master talks."
+    yield "Bytes without any request: polarization is missing, or another master talks."
     yield from wiring_hints(sight)
 
 
@@ -148,7 +148,7 @@ def end_damage(sight: DiagnosticEvidence) -> Iterator[str]:
     if sight.broken:
         yield "A format that differs by its parity or stop bits breaks some characters only."
         yield from settings_hints(sight)
-    yield "Look at shield and routing, polarisation, termination at both ends alone, taps."
+    yield "Look at shield and routing, polarization, termination at both ends alone, taps."
     yield "Two drives at one address, or a second master, break answers too."
     yield from wiring_hints(sight, answers=True)
 
