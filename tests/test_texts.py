@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import tomli
 
 from .sources import ROOT, modules, tree_of
 
@@ -38,7 +39,8 @@ class Text(NamedTuple):
     """One text with its place."""
 
     kind: str
-    """U literal, S docstring, N name, L click help, D Markdown, G commit subject, T test name."""
+    """U literal, S docstring, N name, L click help, D Markdown, G commit subject, T test name,
+    P text of a profile."""
     path: str
     line: int
     text: str
@@ -119,12 +121,19 @@ CHECKS: dict[int, Check] = {
     26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), "test_who_asks"),
 }  # fmt: skip
 
+PROFILE_CHECKS = (*range(1, 19), 24)
+CHECKS |= {n: CHECKS[n]._replace(kinds=f"{CHECKS[n].kinds}P") for n in PROFILE_CHECKS}
+NOT_OURS = {"printed", "title", "source", "quantity"}
+"""Keys of profiles that are not checked: quotes from manuals, documents, names that stay."""
+
 EXCEPTIONS: dict[tuple[int, str, str], str] = {
     (2, "tells", "tui/drive/profile/field_texts.py"): "a key of profiles, on lamps",
     (9, "counted-anew", "tui/session/counters"): "a kind in the JSON of `counters`",
     (9, "mended", "tui/session"): "a kind of entry in journals, also of earlier versions",
     (18, "analogue_input_1", "tui/drive/profile/schema"): "a quantity of profiles",
     (18, "analogue_input_2", "tui/drive/profile/schema"): "a quantity of profiles",
+    (15, "stand-by", "tui/drive/value_names.py"): "a name of a value in older backups",
+    (18, "analogue", "tui/drive/value_names.py"): "a word of such names",
     (18, "favourites", "tui/session/settings/favorites.py"): "the key in stored files",
     (19, "asked", "tui/cli/documents"): "a JSON field of `why`, `counters` and `listen`",
     (21, "does", "tui/drive/profile/field_texts.py"): "a key of profiles",
@@ -204,6 +213,30 @@ def _paragraphs(path: Path) -> Iterator[Text]:
             held = f"{held} {line.strip()}".strip()
 
 
+def _profile_texts(path: Path) -> Iterator[Text]:
+    """Texts and comments of a profile, of shared rows or of help."""
+    source, name = path.read_text("utf-8"), path.relative_to(ROOT).as_posix()
+    lines: dict[str, int] = {}
+    for number, line in enumerate(source.splitlines(), 1):
+        if line.startswith("#"):
+            yield Text("P", name, number, line.lstrip("# "))
+        for literal in re.findall(r'"((?:[^"\\]|\\.)*)"', line):
+            lines.setdefault(literal.replace('\\"', '"'), number)
+    for text in _ours(tomli.loads(source)):
+        yield Text("P", name, lines.get(text, 0), text)
+
+
+def _ours(part: object) -> Iterator[str]:
+    match part:
+        case str():
+            yield part
+        case list():
+            yield from (text for item in part for text in _ours(item))
+        case dict():
+            kept = (item for key, item in part.items() if key not in NOT_OURS)
+            yield from (text for item in kept for text in _ours(item))
+
+
 def _subjects() -> Iterator[Text]:
     """Subjects of new commits; none outside a repository, or if it starts later."""
     git = ["git", "-C", str(ROOT), "log", "--format=%s", f"{FIRST_COMMIT}..HEAD"]
@@ -227,6 +260,9 @@ def all_texts() -> tuple[Text, ...]:
             found += _paragraphs(page)
     for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"):
         found += _paragraphs(page)
+    for path in sorted((ROOT / "profiles").rglob("*")):
+        if path.suffix in (".toml", ".rows"):
+            found += _profile_texts(path)
     return (*found, *_subjects())
 
 
@@ -305,6 +341,20 @@ def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert [paragraph.text for paragraph in _paragraphs(page) if paragraph.text] == [
         "# Head", "One two.", "- item", "- more", "a", "b",
     ]  # fmt: skip
+
+
+def test_texts_of_profile_leave_quotes_of_manuals_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
+    path = tmp_path / "pump.toml"
+    path.write_text(
+        '# Faults\n[[errata]]\nprinted = "Analogue"\nright = "The \\"dry\\" bit"\n'
+        'bits = [{ bit = 0, name = "Dry", on = "yes" }]\nvalues = { 1 = "Level" }\n',
+        "utf-8",
+    )
+    found = {text.text: text.line for text in _profile_texts(path)}
+    assert found == {"Faults": 1, 'The "dry" bit': 4, "Dry": 5, "yes": 5, "Level": 6}
 
 
 if __name__ == "__main__":
