@@ -1,1 +1,1 @@
-"""Modbus TCP for programs of others: frames in, answers out; what is answered is not known here."""
+"""Modbus TCP for third-party programs: frames in, answers out; their content is unknown here."""

@@ -20,7 +20,7 @@ WRITE_FUNCTIONS = frozenset({5, 6, 15, 16, 22, 23})
 LONGEST_OBJECTS = 246
 """Bytes of objects in one answer of function 43/14."""
 REGULAR, EXTENDED = 0x03, 0x80
-"""Objects below the first are basic, below the second regular, from there on extended."""
+"""Objects below the first number are basic, below the second regular, the rest extended."""
 
 
 class Unanswerable(Exception):
@@ -163,7 +163,7 @@ def diagnosed_pdu(subfunction: int, data: int) -> bytes:
 def identified_pdu(
     requested: IdentifyAsked, conformity: int, objects: Mapping[int, bytes]
 ) -> bytes:
-    """The answer of function 43/14; says by which object it goes on. Raises Unanswerable."""
+    """The answer of function 43/14, with the object that follows. Raises Unanswerable."""
     ends = {1: REGULAR, 2: EXTENDED}
     wanted = {number: value for number, value in sorted(objects.items())
               if number < ends.get(requested.read_code, 0x100)}  # fmt: skip

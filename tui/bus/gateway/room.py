@@ -1,8 +1,8 @@
-"""Makes room for a further connection to a server that keeps a limited number.
+"""Makes room for a further connection to a server with a limited number.
 
-Each address that clients come from has a share: the one with the most connections gives one of
-its own. So no number of connections keeps a client out that must stop a motor. One that waits for
-the answer to a write goes last: it may be a stop. That is carried out, but not answered.
+Each address of clients has a share: the one with the most connections loses one of its own. So no
+number of connections excludes a client that must stop a motor. A connection that waits for the
+answer to a write is closed last: the write may be a stop. It is carried out, but not answered.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ class ServedConnection:
     address: str
     """The host that it comes from."""
     idle: float
-    """Seconds since its last request, or since it came; 0 while a read waits for its answer."""
+    """Seconds since its last request or its start; 0 while a read waits for its answer."""
     writes: bool = False
     """True while a write of it is not answered yet."""
 
 
 def makes_room(address: str, here: Mapping[K, ServedConnection]) -> K:
-    """The connection that goes for a further one from an address.
+    """The connection to close for a further one from an address.
 
-    Of the address that would have the most connections it is the one that was idle for longest.
+    Of the address that would have the most connections, it is the one idle for longest.
     """
     counts = Counter(connection.address for connection in here.values())
     counts[address] += 1

@@ -30,13 +30,13 @@ LONGEST_PDU = 253
 MOST_CLIENTS = 64
 """Connections at a time; for one more another one makes room, see `makes_room`."""
 MOST_LEAVING = 64
-"""Connections that made room whose writes are still under way."""
+"""Most closed connections whose writes are still in progress."""
 IDLE_CLIENT_ENDS_AFTER = 600.0
-"""Seconds after which a connection that asks nothing, or takes no answer, is closed."""
+"""Seconds after which a connection without requests, or with unread answers, is closed."""
 
 
 class _Incoming(asyncio.StreamReader):
-    """The bytes of a connection; knows which of them waited while this program stood still."""
+    """The bytes of a connection; knows which of them waited while this program was suspended."""
 
     def __init__(self, awake: Awake, loop: asyncio.AbstractEventLoop) -> None:
         super().__init__(loop=loop)
@@ -59,7 +59,7 @@ class _Incoming(asyncio.StreamReader):
 
     @property
     def stale(self) -> bool:
-        """True if what was taken last waited while this program stood still."""
+        """True if the bytes that were read last waited while this program was suspended."""
         return self._taken <= self._stale
 
 
@@ -75,17 +75,17 @@ class TcpRequest:
     unit: int
     pdu: bytes
     stale: bool = False
-    """True if it waited while this program stood still: nobody may expect its effect now."""
+    """True if it waited while this program was suspended: its effect may be unexpected now."""
     turn: Callable[[], Awaitable[None]] = at_once
     """Returns once the writes that came before it on its connection are answered."""
 
 
 TcpAnswer = Callable[[TcpRequest], Coroutine[Any, Any, bytes]]
-"""Gives the bytes of the answer; is called as soon as the request has come, awaited afterwards."""
+"""Returns the bytes of the answer; called immediately on a request, awaited afterwards."""
 
 
 class TcpGateway:
-    """Listens, and answers until it is closed; lives in one loop."""
+    """Listens and answers until it is closed; lives in one loop."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class TcpGateway:
         )
 
     async def close(self) -> None:
-        """Take no more connections, and end those that are."""
+        """Stop listening, and close all connections."""
         self._awake.close()
         if self._server is not None:
             self._server.close()
@@ -147,7 +147,7 @@ class TcpGateway:
                 writer.close()
 
     def _make_room(self, host: str) -> None:
-        """Have another client go if there are too many with the one from this host."""
+        """Close another connection if there are too many with the one from this host."""
         here = {task: talk.place for task, talk in self._talks.items() if not talk.goes}
         if len(here) < MOST_CLIENTS:
             return
@@ -182,7 +182,7 @@ class TcpGateway:
             raise
         finally:
             client.left = True
-            # what a client sent before it went is carried out: a stop may be among it
+            # requests sent before the client left are carried out: one may be a stop
             await talk.ended()
 
     async def _begin(self, talk: ClientTalk, transaction: int, request: TcpRequest) -> None:
@@ -210,7 +210,7 @@ class TcpGateway:
 
     async def _send(self, talk: ClientTalk, transaction: int, unit: int, reply: bytes) -> None:
         if talk.writer.is_closing():
-            return  # it has gone meanwhile: nobody takes it, and asyncio would complain of each
+            return  # it has disconnected: no answer arrives, and asyncio would log each
         try:
             talk.writer.write(HEADER.pack(transaction, 0, len(reply) + 1, unit) + reply)
             async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
@@ -223,7 +223,7 @@ class TcpGateway:
         try:
             return await answer
         except Exception:
-            # one request that nobody foresaw ends no connection
+            # an internal error in one request closes no connection
             log.exception("a request of %s: %s", request.client.peer, request.pdu.hex())
             return exception_pdu(request.pdu[0], DEVICE_FAILURE)
 
@@ -231,11 +231,11 @@ class TcpGateway:
 LOOK_AWAKE = 0.5
 """Seconds between two looks."""
 CATCHES_UP = 1.0
-"""Seconds after standing still in which a loop takes in what came meanwhile."""
+"""Seconds after a suspension in which a loop reads what came in the meantime."""
 
 
 class Awake:
-    """Looks at the time again and again; lives in one loop."""
+    """Checks the time regularly to detect a suspension; lives in one loop."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         self._clock = clock
@@ -243,24 +243,24 @@ class Awake:
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        """Begin to look."""
+        """Begin the checks."""
         self._looked = self._clock()
         self._task = asyncio.get_running_loop().create_task(self._work(), name="awake")
 
     def close(self) -> None:
-        """Look no more."""
+        """End the checks."""
         if self._task is not None:
             self._task.cancel()
 
     @property
     def just_woke(self) -> bool:
-        """True if what comes in now may have come while the loop stood still."""
+        """True if bytes that come in now may have come while the loop was suspended."""
         now = self._clock()
         # the bytes of a connection are taken in before the look that is due
         return now - self._looked > GATEWAY_SUSPENDED_AFTER or now < self._stale_until
 
     def look(self) -> None:
-        """The loop goes on."""
+        """Note that the loop runs."""
         now = self._clock()
         if now - self._looked > GATEWAY_SUSPENDED_AFTER:
             self._stale_until = now + CATCHES_UP

@@ -1,4 +1,4 @@
-"""One connection to the Modbus TCP server, and what is under way on it."""
+"""One connection to the Modbus TCP server, and its requests in progress."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from .room import ServedConnection, host_of
 
 MOST_AT_ONCE = 128
-"""Requests of one connection that may be under way; a further read is asked to come again."""
+"""Most requests of one connection in progress; a further read is answered with BUSY."""
 
 
 @dataclass(slots=True, eq=False)
@@ -22,7 +22,7 @@ class TcpClient:
     """Host and port that it comes from."""
     host: str = ""
     left: bool = False
-    """True if it sends nothing any more: it may be gone."""
+    """True if it sends nothing more: it may have disconnected."""
 
 
 class ClientTalk:
@@ -33,27 +33,27 @@ class ClientTalk:
         self.writer = writer
         self.reads = asyncio.Lock()
         self.requested = asyncio.get_running_loop().time()
-        """When a request came last, on the loop's clock."""
+        """When its last request came, on the loop's clock."""
         self.goes = False
-        """True if it is about to end for another one."""
+        """True if it will be closed to make room."""
         self._under_way: set[asyncio.Task[None]] = set()
         self._writes: set[asyncio.Task[None]] = set()
 
     @property
     def full(self) -> bool:
-        """True if no further read is taken."""
+        """True if no further read is accepted."""
         return len(self._under_way) >= MOST_AT_ONCE
 
     @property
     def place(self) -> ServedConnection:
-        """As it counts when one more client comes."""
+        """Its data for the choice of the connection to close."""
         waits = bool(self._under_way) and not self._writes
         idle = 0.0 if waits else asyncio.get_running_loop().time() - self.requested
         host = host_of(self.writer.get_extra_info("peername"))
         return ServedConnection(host, idle, writes=bool(self._writes))
 
     def turn(self) -> Callable[[], Awaitable[None]]:
-        """The turn of a write that comes now."""
+        """The turn of a write that arrives now."""
         before = tuple(self._writes)
 
         async def turn() -> None:
@@ -75,12 +75,12 @@ class ClientTalk:
         return task
 
     def make_room(self) -> None:
-        """End the connection for another one, but carry out the writes that came before."""
+        """Close the connection to make room, but carry out the writes that came before."""
         self.goes = True
         self.writer.transport.abort()
 
     def cancel(self) -> None:
-        """Answer nothing any more."""
+        """Stop answering."""
         for task in self._under_way - self._writes if self.goes else self._under_way:
             task.cancel()
 

@@ -1,1 +1,1 @@
-"""A line that several programs share: who owns it, how the others attach, what all must know."""
+"""A line that several programs share: its owner, attaching to it, and their common state."""

@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 MOST_ASKED = 256
 """Requests of one client that may wait."""
 MOST_UNREAD = 1 << 23
-"""Bytes that a client may leave unread; one that stalls is let go, and may come back."""
+"""Most unread bytes of a client; one that stalls is disconnected, and may attach again."""
 
 
 @dataclass(eq=False, slots=True)
@@ -53,14 +53,14 @@ class Client:
     """Number of frames of the line sent to it."""
     limits: dict[int, Limits] = field(default_factory=dict)
     stops_left: list[Job] = field(default_factory=list)
-    """Stops that it had asked when it went."""
+    """Stops that it had requested when it left."""
     stops_due: dict[int, float] = field(default_factory=dict)
-    """When it stopped devices, by device, that have not answered a word of it yet."""
+    """Time of its stops, by device, until the device has answered a stop word of it."""
     requested: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
     counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
     heard: float = 0.0
-    """When it last said anything."""
+    """When its last message came."""
     looks: int = 0
     """Number of checks without a heartbeat since the last one."""
 
@@ -81,30 +81,30 @@ class Client:
         return self.writer.transport.get_write_buffer_size()
 
     def due_stops(self, now: float) -> tuple[int, ...]:
-        """Devices that it has stopped of late, and that have answered no word of it."""
+        """Devices that it has stopped recently, and that have answered no stop word of it."""
         return tuple(number for number, when in self.stops_due.items() if now - when < STOP_DUE)
 
     def hears(self, message: AnyMessage, now: float) -> None:
-        """It said something; a stop is acknowledged on receipt."""
+        """Note a message of it; a stop is acknowledged on receipt."""
         self.heard, self.looks = now, 0
         if is_stop(message):
             self.say(Alive())
 
     def is_silent(self, now: float, looks: int) -> bool:
-        """True if it gave no sign of life for too long, however often one was looked for.
+        """True if it sent no heartbeat for too long, in time and in checks.
 
-        By looks, too: where this program got no time to look, the client may be well.
+        The number of checks counts too: if this program was delayed itself, the client may be well.
         """
         self.looks += 1
         return now - self.heard > SILENT_CLIENT and self.looks > looks
 
     def drop(self) -> None:
-        """Have nothing to do with it any more; it may come back."""
+        """Disconnect it; it may attach again."""
         self.forget()
         self.writer.transport.abort()
 
     def forget(self) -> list[Job]:
-        """Drop what it asked, except stops: they are sent although no program waits for them."""
+        """Cancel its requests, except stops: they are sent although no program waits for them."""
         requested, self.requested = self.requested, {}
         for job in requested.values():
             if job.request.changes and (job.begun or job.priority is Priority.STOP):
@@ -116,7 +116,7 @@ class Client:
         return self.stops_left
 
     def ask(self, inside: LineInside, message: Asking) -> None:
-        """A request of the program to the line. Raises NoMessage."""
+        """Pass a request of the program to the line. Raises NoMessage."""
         if len(self.requested) >= MOST_ASKED:
             raise NoMessage("too many requests at once")
         try:
@@ -151,7 +151,7 @@ class Client:
             self.say(Answer(number, reply.pdu, reply.time))
 
     def withdraw(self, number: int) -> None:
-        """It does not wait for a request any more."""
+        """Cancel a request that it no longer waits for."""
         job = self.requested.get(number)
         if job is not None:
             job.answer.cancel()

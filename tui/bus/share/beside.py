@@ -36,9 +36,9 @@ from .place import Owner, Peer, reached
 STOP_HEAD, LOOK_HEAD, PAST_HEAD = b"STOP", b"LOOK", b"PAST"
 GIVEN = b"GIVEN\n"
 LONGEST_PLAIN_STOP = 1100
-"""Bytes of a stop after its head; all addresses take fewer."""
+"""Most bytes of a stop after its head; all addresses take fewer."""
 GIVEN_WITHIN, LOOK_WITHIN, PAST_WITHIN = 0.5, 0.5, 5.0
-"""Seconds for each step of a stop, and for the whole of the others."""
+"""Timeout in seconds of each step of a stop, and of the other two as a whole."""
 LONGEST_LOOK_ANSWER = 1 << 16
 FRAMES_KEPT = 20_000
 """Frames that a keeper keeps: minutes of a serial line, some megabytes."""
@@ -51,9 +51,9 @@ _BY = "drivepanel stop"
 async def plain_stop(
     reader: asyncio.StreamReader, known: Collection[int], peer: Peer | None
 ) -> StopGiven:
-    """The stop of a program that has sent its head; a program of its own gives it.
+    """The stop of a program that has sent its head, in the name of a program of its own.
 
-    `known` are the devices that are meant by all. Raises NoMessage, EOFError, OSError.
+    `known` are the devices that `all` stands for. Raises NoMessage, EOFError, OSError.
     """
     try:
         line = await reader.readuntil(b"\n")
@@ -88,7 +88,7 @@ def stop_devices(line: bytes, known: Collection[int]) -> tuple[int, ...]:
 
 
 class LineClient(msgspec.Struct, frozen=True):
-    """A program on a line, and the share of the line's time that it has had of late."""
+    """A program on a line, and its recent share of the line's time."""
 
     program: Word
     pid: Number
@@ -140,7 +140,7 @@ class LinePast(msgspec.Struct, frozen=True):
 async def send_directly(
     writer: asyncio.StreamWriter, frames: Sequence[Frame], notes: Sequence[LineNote]
 ) -> None:
-    """Send the past in pieces, so that the line has its turns in between; the first is empty."""
+    """Send the past in pieces, so that the line can be served in between; the first is empty."""
     await _send(writer, LinePast())
     for at in range(0, len(frames), MOST_FRAMES):
         await _send(writer, LinePast(frames=tuple(frames[at : at + MOST_FRAMES])))

@@ -114,7 +114,7 @@ _KINDS: Mapping[type[LineError], tuple[str, ...]] = {
     PortMissing: ("path", "ports"),
     PortRefused: ("path", "reason"),
 }
-"""The fields of which each error is made; of its text where it has none."""
+"""The fields from which each error is made; without any, it is made from its text."""
 _NAMED = {kind.__name__: kind for kind in _KINDS}
 
 
@@ -126,7 +126,7 @@ def error_form(error: BaseException) -> ErrorForm:
 
 
 def _clipped(value: Any) -> Any:
-    """A text or bytes without its beginning, if it is longer than a message may carry."""
+    """The end of a text or bytes, if it is longer than a message may carry."""
     if isinstance(value, tuple):
         return value[:MOST_PORTS]
     return value[-MOST_BYTES:] if isinstance(value, str | bytes) else value
@@ -140,20 +140,20 @@ def error_from(form: ErrorForm) -> LineError:
 
 
 class Subscribe(msgspec.Struct, frozen=True, tag=True):
-    """A program wants the cycles of a plan, in place of an earlier one of that number."""
+    """Request for the cycles of a plan; replaces an earlier one of that number."""
 
     number: Number
     plan: PollPlan
 
 
 class Unsubscribe(msgspec.Struct, frozen=True, tag=True):
-    """A program wants no more cycles of a plan."""
+    """End of the cycles of a plan."""
 
     number: Number
 
 
 class PolledReply(msgspec.Struct, frozen=True, array_like=True):
-    """A reply of a cycle, or the error that came instead."""
+    """A reply of a cycle, or its error."""
 
     pdu: ByteString
     time: MonotonicTime

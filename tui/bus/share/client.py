@@ -73,7 +73,7 @@ class NewsHeard:
         self._failure: LineError | None = None
 
     def hear(self, news: News) -> None:
-        """Take the news over."""
+        """Store the news."""
         inside = self._inside
         for device, state in news.devices.items():
             inside.devices.copy(device, state)
@@ -94,17 +94,18 @@ class NewsHeard:
             self._say(self._state.status, reason, self._failure)
 
     def _shared_with(self) -> str:
-        """The programs that share the line, and its settings if others were meant."""
+        """The programs that share the line, and its settings if they differ from the requested
+        ones."""
         names = ", ".join(other.text for other in self._inside.facts.others)
         return f"{f'Shared with {names}.' if names else ''}{self.note}".strip()
 
 
 class OwnerAway(Exception):
-    """Nobody answers on the owner's socket: it is just beginning, or has just ended."""
+    """No process answers on the owner's socket: the owner is starting, or has just ended."""
 
 
 class ShareClient:
-    """Attached to one owner until it ends; lives in the line's loop, and is its facts' voice."""
+    """Attachment to one owner until it ends; lives in the line's loop, and publishes its state."""
 
     def __init__(self, inside: LineInside, owner: Owner, say: Say) -> None:
         self._inside = inside
@@ -127,7 +128,7 @@ class ShareClient:
     async def serve(self) -> None:
         """Serve this program's requests until the owner ends.
 
-        Raises OwnerAway where there is none, NotShared where it takes nobody in.
+        Raises OwnerAway if there is none, NotShared if it rejects this program.
         """
         try:
             with short_path(Path(self._owner.socket)) as address:
@@ -145,7 +146,7 @@ class ShareClient:
             self._inside.facts.voice = None
             self._inside.pace.carrier, self._inside.pace.stretch = None, 1.0
             self._polls.lose_all()
-            # what is said from here on would not be heard: a stop takes another way
+            # later messages would not be received: a stop takes another way
             self.writer = None
             self.watching.close()
             if self._heartbeat is not None:
@@ -178,7 +179,7 @@ class ShareClient:
 
     def _greet(self) -> None:
         facts = self._inside.facts
-        # first: what is given from here on is told by itself, what was before in the greeting
+        # first: later stops are sent as messages, earlier ones in the greeting
         facts.voice = LinePublisher(self._soon, self._owner.socket)
         given, times = facts.stops.plain, facts.stops.late_times
         self._tell(Hello(VERSION, facts.me, label(self._inside.link), given, times))
@@ -205,7 +206,7 @@ class ShareClient:
         self._claim()
 
     def _claim(self) -> None:
-        """Report to the owner what this program commands, or give it up if it counts as exited."""
+        """Report this program's drives to the owner, or give them up if it counts as exited."""
         facts = self._inside.facts
         if self._gone:
             give_up_own(facts, STOOD_STILL)
@@ -228,7 +229,7 @@ class ShareClient:
     # Requests
 
     async def _forward(self) -> None:
-        """Hand on what this program asks, as soon as it asks."""
+        """Pass this program's requests to the owner immediately."""
         dispatcher = self._inside.dispatcher
         while True:
             for job in await dispatcher.all_waiting():
@@ -237,7 +238,7 @@ class ShareClient:
     # An owner that is frozen
 
     async def _watch(self) -> None:
-        """Notice an owner that does not answer any more, and one that does again."""
+        """Detect an owner that no longer answers, and one that answers again."""
         notes = iter(self._inside.facts.notes.all)
         while True:
             await asyncio.sleep(WATCH_INTERVAL)
@@ -260,7 +261,7 @@ class ShareClient:
             self._news.tell_state()
 
     def _wait_for_owner(self) -> None:
-        """Fail what waits for a frozen owner, once it is known that this program cannot end it."""
+        """Fail the requests to a frozen owner, once it is known that this program cannot end it."""
         remedy = self.watching.remedy
         reported = f"{self._owner.program.text} {OWNER_SILENT}. {remedy}".rstrip()
         if reported != self._reported:
@@ -272,7 +273,7 @@ class ShareClient:
         if remedy:
             self._requested.fail_all(reported)
 
-    # What the owner says
+    # Messages of the owner
 
     def _hear(self, message: AnyMessage) -> None:
         facts, inside = self._inside.facts, self._inside
@@ -319,7 +320,7 @@ class ShareClient:
             self._loop.call_soon_threadsafe(self._tell, message)
 
     def pass_on(self, stop: bytes) -> bool:
-        """Send a finished stop to the owner; False if it takes none."""
+        """Send a finished stop to the owner; False if no owner accepts it."""
         if self.writer is None or self.watching.frozen:
             return False
         self.writer.write(stop)

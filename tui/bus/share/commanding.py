@@ -23,7 +23,7 @@ from .messages import (
 
 
 class Commanding:
-    """Grants and hands on for the programs of one line; in the line's loop."""
+    """Grants devices and passes requests on, for the programs of one line; in the line's loop."""
 
     def __init__(
         self,
@@ -36,7 +36,8 @@ class Commanding:
         self._tell_facts = tell_facts
 
     def hears(self, program: Program, message: AnyMessage) -> bool:
-        """Do what a program, perhaps this one, says of a device; False if it is something else."""
+        """Carry out a message about a device, perhaps this program's; False for any other
+        message."""
         facts = self._facts
         match message:
             case Claim():
@@ -59,12 +60,13 @@ class Commanding:
         return True
 
     def _armed(self, program: Program, message: Armed) -> None:
-        """A program may write to a device, or no more; care that nobody here can use is none."""
+        """Grant or end a lease; care that this program cannot use counts as none."""
         facts, device, care = self._facts, message.device, message.care
         lease = WriteLease(message.stamp, message.until, care)
         if not lease.has_ended:
             for client in self._clients.values():
-                client.stops_due.pop(device, None)  # whoever arms it now knows of that stop
+                # the program that arms it now knows of that stop
+                client.stops_due.pop(device, None)
         if program.id == facts.me.id:
             return  # granted already
         # one that commands it now knows better how to stop it than one that armed it before
@@ -99,7 +101,7 @@ class Commanding:
             client.say(DriveRequested(device, program))
 
     def replied(self, program: Program, reply: RequestGranted) -> None:
-        """Hand an answer on to the program that asked; a yes frees the device."""
+        """Pass an answer to the requesting program; a yes frees the device."""
         facts = self._facts
         if reply.yes and facts.commanders.get(reply.device) == program.id:
             facts.note_commander(reply.device, None)

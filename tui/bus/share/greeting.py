@@ -1,7 +1,7 @@
 """The socket on which the owner of a line listens: private, newly made, never left after its end.
 
-And the first message of a program there, with its answer: it is taken in, or not. What is asked
-without being attached takes the place of that message.
+Also the first message of a program there, which is admitted or not. A request without attaching
+replaces that message.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ log = logging.getLogger(__name__)
 HELLO_WITHIN = 2.0
 """Seconds that a program has for its greeting."""
 KEEPING_ENDS = 0.5
-"""Seconds that a note on the disk has to end before the next owner writes its own."""
+"""Seconds to wait for a write to the disk before the next owner writes its own."""
 
 TakeIn = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -78,7 +78,7 @@ class Greeting:
         holder: Sharing,
         stopped: Callable[[StopGiven], None],
     ) -> None:
-        """`stopped` hears a stop that takes the place of a greeting."""
+        """`stopped` is called with a stop that replaces a greeting."""
         self._stopped = stopped
         self._inside = inside
         self._group = group
@@ -90,10 +90,10 @@ class Greeting:
         writer: asyncio.StreamWriter,
         present: Mapping[str, Client],
     ) -> Hello | None:
-        """The greeting of a program that is taken in; None for one that is not, and knows why.
+        """The greeting of an admitted program; None for a rejected one, which has its reason.
 
-        `present` are the programs that are attached, by id. Raises NoMessage, EOFError,
-        OSError, TimeoutError.
+        `present` are the attached programs, by id. Raises NoMessage, EOFError, OSError,
+        TimeoutError.
         """
         async with asyncio.timeout(HELLO_WITHIN):
             head = await reader.readexactly(LENGTH)
@@ -122,7 +122,7 @@ class Greeting:
         present: Mapping[str, Client],
         program: str,
     ) -> None:
-        """Hear the heartbeat of a program while it is attached; of the process itself alone."""
+        """Receive the heartbeat of an attached program; only from its own process."""
         peer = peer_of(writer.get_extra_info("socket"))
         message: AnyMessage = Alive()
         while isinstance(message, Alive) and (client := present.get(program)) is not None:
@@ -150,7 +150,7 @@ class Greeting:
         self._stopped(stop)
         facts.events.emit(StopDue(stop.devices, stop.program.text))
         self._holder.moved(arrived=False)  # its port may be closed
-        # nobody of this name comes back: its stops count on without it
+        # no program of this name returns: its stops still count, without its name
         facts.stops.fold({stop.program.id})
         writer.write(GIVEN)
 
@@ -164,7 +164,8 @@ class Greeting:
         return hello.version == VERSION and hello.label == label(self._inside.link)
 
     def _refusal(self, hello: Hello, writer: asyncio.StreamWriter, present: Collection[str]) -> str:
-        """Why a program may not share the line, or empty; its user as by the socket's mode."""
+        """Reason if a program may not share the line, else empty; the socket's mode checks its
+        user."""
         if self._is_stranger(writer):
             return "This line is shared with other users only."
         if hello.version != VERSION:
@@ -192,7 +193,7 @@ class Listening:
         self._keeping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen in the first folder that takes a socket. Raises OSError where none does."""
+        """Listen in the first folder that accepts a socket. Raises OSError if none does."""
         trouble: OSError = FileNotFoundError("no folder for the socket of the line")
         for folder in self._place.socket_folders:
             try:
@@ -205,7 +206,7 @@ class Listening:
 
     async def _listen(self, folder: Path) -> None:
         shared = self._place.group is not None
-        # nobody else may enter it, so that nobody connects before the socket has its own mode
+        # only its owner may enter it, so that no program connects before the socket has its mode
         make_private(folder, shared=shared)
         path = folder / f"{self._place.name}.sock"
         with suppress(FileNotFoundError):
@@ -233,7 +234,7 @@ class Listening:
             self._keeping = asyncio.create_task(self._keep(), name="socket of the line")
 
     async def _keep(self) -> None:
-        """Make the socket again if its folder was removed, as at the end of a log-in.
+        """Make the socket again if its folder was removed, for example at the end of a login.
 
         The lock is taken again if its file was removed.
         """
@@ -247,7 +248,7 @@ class Listening:
             await self.start()
 
     def _note(self, path: Path) -> bool:
-        """Write down what was stopped since; False if the socket is gone."""
+        """Record recent stops; False if the socket was removed."""
         if self._facts.stops.late_times != self._stopped:
             with suppress(OSError):
                 self._tell()
@@ -267,7 +268,7 @@ class Listening:
         )
 
     async def close(self) -> None:
-        """Listen no more, and leave no socket behind."""
+        """Stop listening, and remove the socket."""
         if self._keeping is not None:
             await asyncio.wait((self._keeping,), timeout=KEEPING_ENDS)
             self._keeping.cancel()

@@ -1,4 +1,4 @@
-"""Signs of life: an owner's, what it does after it gave none, and the heartbeats of programs."""
+"""Heartbeats: the owner's, its actions after a pause of its own, and those of programs."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ log = logging.getLogger(__name__)
 LOOKS_IN_VAIN = int(SILENT_CLIENT / OWNER_BEAT_INTERVAL)
 """Looks at a client before it counts as frozen."""
 HEARD_TIME, HEARD_TURNS = 0.05, 20
-"""Seconds, and turns of the loop, in which all that programs have said meanwhile is heard."""
+"""Seconds, and turns of the loop, to receive all that programs have sent in the meantime."""
 BACK_LOOK = 0.1
-"""Seconds between two looks. A late one counts as one: nobody was served in the meantime."""
+"""Seconds between two checks. A late check counts once: no program was served meanwhile."""
 _ALIVE = packed(Alive())
 
 
@@ -43,10 +43,10 @@ async def programs_back(
     now: Callable[[], float] = monotonic,
     pause: Callable[[float], Awaitable[None]] = asyncio.sleep,
 ) -> None:
-    """Wait until every program of the previous holder has had its time to attach to this one.
+    """Wait until every program of the previous holder has had time to attach to this one.
 
-    A computer that is short of time, as in a container with a quota, does not run this process
-    for long: a program that has called in the meantime is heard first.
+    A computer short of time, for example a container with a quota, may suspend this process for
+    long: a program that has connected in the meantime is served first.
     """
     left, latest = BACK_WITHIN, now() + BACK_AT_LATEST
     while (left > 0 or is_greeting()) and now() < latest:
@@ -55,7 +55,7 @@ async def programs_back(
 
 
 class HeartbeatSender:
-    """Reports to the clients of a line repeatedly that its owner is well; in the line's loop."""
+    """Sends the owner's heartbeat to the clients of a line; in the line's loop."""
 
     def __init__(
         self,
@@ -97,12 +97,12 @@ class HeartbeatSender:
                     beat = self._inside.clock()
                 self._tell()
             except Exception:
-                # without signs of life the line would be held back for good
+                # without heartbeats the line would be held back permanently
                 log.exception("telling the news of the line failed")
             self._beat = beat
 
     def _let_silent_go(self) -> None:
-        """A client that is frozen counts as gone: its motor must not be fed by the others."""
+        """Disconnect frozen clients: the others must not keep their motors alive."""
         now = self._inside.clock()
         for client in self._clients():
             if client.is_silent(now, LOOKS_IN_VAIN):
@@ -110,7 +110,7 @@ class HeartbeatSender:
                 client.drop()
 
     async def _hear_stops(self) -> None:
-        """This program stood still: what waits in it may have been stopped meanwhile."""
+        """Receive stops after this program was suspended: they may cancel its waiting requests."""
         stood, why = self._stood, was_suspended(self._stood)
         log.warning("%s", why)
         if stood > COMMAND_TOO_LATE:
@@ -120,10 +120,10 @@ class HeartbeatSender:
 
 
 class Heartbeat:
-    """The heartbeat of an attached program, sent by a thread on a connection of its own.
+    """The heartbeat of an attached program, sent by a thread on a separate connection.
 
-    It shows that the process lives: one that is stopped or swapped out sends none. A loop of the
-    line that is busy for a moment does not hold it up. One that hangs ends it.
+    It shows that the process runs: a stopped or swapped-out one sends none. A line's loop that is
+    busy for a moment does not delay it. One that hangs ends it.
     """
 
     def __init__(self, holder: str, program: str) -> None:
@@ -135,11 +135,11 @@ class Heartbeat:
         threading.Thread(target=self._work, name="heartbeat", daemon=True).start()
 
     def turn(self) -> None:
-        """The loop of the line has turned."""
+        """Note that the loop of the line runs."""
         self._turned = monotonic()
 
     def close(self) -> None:
-        """Beat no more."""
+        """End the heartbeat."""
         self._ended.set()
 
     def _work(self) -> None:
@@ -152,7 +152,7 @@ class Heartbeat:
             connection.close()
 
     def _beat(self, connection: socket.socket | None) -> socket.socket | None:
-        """Beat once; returns the connection for the next beat, None if there is none."""
+        """Send one heartbeat; returns the connection for the next one, None if it failed."""
         try:
             if connection is None:
                 connection = reached(self._holder, BEAT_WITHIN)

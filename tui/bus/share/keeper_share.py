@@ -21,7 +21,7 @@ from .sharing import Sharing
 ALARM_RENEWED = 0.25
 """Seconds between two renewals of the alarm that ends a keeper whose loop hangs."""
 PROCESS_ENDS_WITHIN = 20.0
-"""Seconds that the process has to end once that loop has."""
+"""Seconds in which the process must end after that loop."""
 CARE_INTERVAL = 0.005
 """Seconds between two looks whether a motor is still to be stopped."""
 
@@ -35,7 +35,7 @@ class Keeping:
     before: tuple[Program, ...]
     """Programs that were on the line until now."""
     end: Callable[[], None]
-    """Called in the line's thread when no program needs this keeper any more."""
+    """Called in the line's thread when no program needs this keeper."""
     cares: Callable[[], bool]
     """True while a motor is still to be stopped."""
     alarm: Callable[[float], object]
@@ -75,7 +75,8 @@ class KeeperShare(Sharing):
         self._open = True
 
     async def _renew_alarm(self) -> None:
-        """Have this process ended if this loop hangs, or was frozen: what it would send is old."""
+        """Renew the alarm that ends this process if its loop hangs: its requests would be too
+        old."""
         try:
             while True:
                 self._keeping.alarm(ALARM_AFTER)
@@ -84,14 +85,14 @@ class KeeperShare(Sharing):
             self._keeping.alarm(PROCESS_ENDS_WITHIN)
 
     async def unwanted(self) -> None:
-        """Return once no program is there and no motor is to be stopped."""
+        """Return once no program is attached and no motor must be stopped."""
         await self._until(lambda: not self._here)
         while self._needed:
             await asyncio.sleep(CARE_INTERVAL)
             await self._until(lambda: not self._here)
 
     async def pause(self, seconds: float) -> None:
-        """Wait before a lost line is tried again; a program that comes ends the wait."""
+        """Wait before the next attempt on a lost line; a program that attaches ends the wait."""
         self._open = False
         self._moved.set()
         self._arrived.clear()
@@ -99,7 +100,7 @@ class KeeperShare(Sharing):
             await asyncio.wait_for(self._arrived.wait(), seconds)
 
     def rest(self, quiet: float) -> None:
-        """The port is closed; a reply may still come for `quiet` seconds."""
+        """Note that the port is closed; a reply may still come for `quiet` seconds."""
         super().rest(quiet)
         self._open = False
         self._moved.set()
@@ -107,7 +108,7 @@ class KeeperShare(Sharing):
     # What the server reports
 
     def moved(self, *, arrived: bool) -> None:
-        """A program came, or one has gone."""
+        """Note that a program has attached or left."""
         self._moved.set()
         if self._ending is not None:
             self._ending.cancel()
@@ -129,7 +130,7 @@ class KeeperShare(Sharing):
                 await self._until(lambda: not self._open or self._here)
 
     async def makes_way(self) -> bool:
-        """End if nobody is served; True then. Waits a moment for a look at motors."""
+        """End if no program is attached; True then. Waits a moment for a check of the motors."""
         end = self._inside.clock() + LEAVE_WITHIN
         while self._needed and not self._here and self._inside.clock() < end:  # noqa: ASYNC110
             await asyncio.sleep(CARE_INTERVAL)

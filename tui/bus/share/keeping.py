@@ -20,17 +20,17 @@ from .place import Owner, OwnerLock, SharePlace, reached
 MODULE = "tui.keeper"
 """Started by its name: it belongs above the bus, which does not import it."""
 NO_KEEPER = "DRIVEPANEL_NO_KEEPER"
-"""Set by tests: a program that opens a line first holds it itself, as where no process can."""
+"""Set by tests: the first program holds the line itself, as on systems that cannot start one."""
 
 PATHS = ("DRIVEPANEL_STATE", "DRIVEPANEL_CONFIG", "DRIVEPANEL_SHARE_FOLDER", "XDG_RUNTIME_DIR")
 """Environment variables that may hold a path which counts from the folder of this program."""
 
 MAKES_WAY_WITHIN = 1.0
-"""Seconds that a keeper which serves nobody has to end when it is asked to."""
+"""Seconds in which a keeper without clients must end when requested."""
 LOCK_INTERVAL = 0.01
 
 _STARTED: list[subprocess.Popen[bytes]] = []
-"""Keepers that were started here and may live; one that has ended is let go with the next."""
+"""Keepers that this program has started; one that has ended is removed at the next start."""
 
 
 class KeeperOrder(msgspec.Struct, frozen=True):
@@ -43,7 +43,7 @@ class KeeperOrder(msgspec.Struct, frozen=True):
     socket_folders: tuple[Text, ...]
     group: int | None
     before: tuple[Program, ...] = ()
-    """Programs on the line until now; one that does not come back is gone."""
+    """Programs on the line so far; one that does not attach counts as exited."""
     version: Number = VERSION
     """Of the messages of the program that starts it."""
 
@@ -62,9 +62,9 @@ class KeeperOrder(msgspec.Struct, frozen=True):
 
 
 def ends_unneeded(owner: Owner, lock: OwnerLock) -> bool:
-    """Ask a keeper to end, and take its lock; False if it serves a program. Raises OSError.
+    """Request the end of a keeper, and take its lock; False if it serves a program.
 
-    Waits MAKES_WAY_WITHIN seconds at most; for a program that needs the line to itself.
+    Waits MAKES_WAY_WITHIN seconds at most; for a program that needs the line alone. Raises OSError.
     """
     if owner.program.name != KEEPER:
         return False
@@ -117,7 +117,7 @@ def start_keeper(
 
 
 def _environment() -> dict[str, str]:
-    """This program's, and the place of this package if Python does not look there."""
+    """This program's environment, with the path of this package if Python does not find it."""
     environment = dict(os.environ)
     for name in PATHS:
         if environment.get(name):

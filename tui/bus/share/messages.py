@@ -52,12 +52,12 @@ class Message(msgspec.Struct, frozen=True, tag=True):
 
 
 class Hello(Message, frozen=True):
-    """A program wants to attach."""
+    """A program requests to attach."""
 
     version: Number
     program: Program
     label: Text
-    """The line as it was meant, with its settings."""
+    """The line as requested, with its settings."""
     stops: StopsByDevice
     """The stops that it knows of, by device and program."""
     stopped: StopTimes = {}
@@ -65,19 +65,19 @@ class Hello(Message, frozen=True):
 
 
 class Welcome(Message, frozen=True):
-    """The owner takes a program in."""
+    """The owner admits a program."""
 
     owner: Program
     label: Text
-    """The line as it is open."""
+    """The line with its actual settings."""
     requested: bool = True
-    """True if it is open with the settings that were meant."""
+    """True if these are the requested settings."""
     gone: bool = False
-    """True if it was taken for gone meanwhile: it commands nothing any more."""
+    """True if it counted as exited in the meantime: it commands nothing any more."""
 
 
 class TurnedAway(Message, frozen=True):
-    """The owner takes a program not in, and why."""
+    """The owner rejects a program, with the reason."""
 
     why: Text
 
@@ -104,11 +104,11 @@ class Asking(Message, frozen=True):
     limits: Limits | None = None
     """Limits if they differ from the device's: of a broadcast."""
     within: Seconds | None = None
-    """Seconds in which the answer is to begin, where the asker says it."""
+    """Timeout in seconds, if the requester sets it."""
 
 
 class Withdraw(Message, frozen=True):
-    """Nobody waits for a request any more."""
+    """The requester no longer waits for a request."""
 
     number: Number
 
@@ -129,7 +129,7 @@ class Failed(Message, frozen=True):
 
 
 class StopGiven(Message, frozen=True):
-    """Somebody stops devices: all that was meant for them before is void."""
+    """A program stops devices: all earlier commands to them are canceled."""
 
     devices: DeviceIds
     counts: Annotated[tuple[StopCount, ...], Meta(max_length=MOST_DEVICES)]
@@ -145,17 +145,18 @@ class StopGiven(Message, frozen=True):
 
 
 class Alive(Message, frozen=True):
-    """A program's sign of life: one that gives none for long is let go. Answers each stop, too."""
+    """A program's heartbeat: one that sends none for long is disconnected. Also acknowledges
+    stops."""
 
 
 class Pulse(Message, frozen=True):
-    """In place of a Hello: this connection brings the heartbeat of a program that is attached."""
+    """Sent instead of a Hello: this connection carries the heartbeat of an attached program."""
 
     program: ProgramId
 
 
 class Claim(Message, frozen=True):
-    """A program wants to command a device, or no longer."""
+    """A program takes command of a device, or releases it."""
 
     device: DeviceId
     take: bool
@@ -180,7 +181,7 @@ class RequestDenied(Message, frozen=True):
 
 
 class DriveRequested(Message, frozen=True):
-    """A program asks the one that commands a device to leave it."""
+    """A program requests a device from its commander."""
 
     device: DeviceId
     program: Program
@@ -196,21 +197,22 @@ class RequestGranted(Message, frozen=True):
 
 
 class PollPause(Message, frozen=True):
-    """A device is left alone, or with no reason no longer."""
+    """Polling of a device is paused; an empty reason resumes it."""
 
     device: DeviceId
     why: Notice
 
 
 class Notified(Message, frozen=True):
-    """Something that every person on the line is to read."""
+    """A notice for every person on the line."""
 
     device: DeviceId
     text: Text
 
 
 class PollWish(Message, frozen=True):
-    """The share of the line's time that polls take, by device; `trace` where frames are shown."""
+    """A client's share of the line's time for polls, by device; `trace` is True if it shows
+    frames."""
 
     shares: Shares
     trace: bool
@@ -240,7 +242,7 @@ class News(Message, frozen=True):
     devices: Annotated[dict[DeviceId, DeviceState], Meta(max_length=MOST_DEVICES)]
     """Those that have changed."""
     shares: Shares
-    """The share of the line's time that all other programs' polls take, by device."""
+    """The share of the line's time for polls of all other programs, by device."""
     failure: ErrorForm | None = None
     """The error of a line that is lost."""
     frames: Annotated[tuple[Frame, ...], Meta(max_length=MOST_FRAMES)] = ()
@@ -251,9 +253,9 @@ class News(Message, frozen=True):
 
 
 class Goodbye(Message, frozen=True):
-    """A client leaves. The owner closes the connection: after the port, if it was the last.
+    """A client leaves. The owner closes the connection: after the port, if it was the last client.
 
-    In place of a Hello it asks a keeper that serves nobody to end.
+    Instead of a Hello, it requests the end of a keeper without clients.
     """
 
 
@@ -273,7 +275,7 @@ class NoMessage(Exception):
 
 
 def packed(message: AnyMessage) -> bytes:
-    """A message as it goes over the socket."""
+    """A message with its length, as sent over the socket."""
     data = _ENCODER.encode(message)
     return len(data).to_bytes(LENGTH, "big") + data
 

@@ -1,4 +1,4 @@
-"""True if the owner of a line lives, by what a client hears of it, and what is done if it hangs."""
+"""Supervision of the owner of a line by its messages, and the end of an owner that hangs."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ BY_HAND = "End that program (kill -9 {pid}). Then stops are sent."
 
 
 class KeeperProcess:
-    """A process that was started as a keeper, by a handle that no other process ever gets.
+    """A process that was started as a keeper, by a handle that is never reused.
 
-    Nothing else is killed: not a program that holds the line itself, not one of another version.
+    No other process is killed: not a program that holds the line itself, not one of another
+    version.
     """
 
     def __init__(self, owner: Owner, connection: socket.socket) -> None:
@@ -79,7 +80,7 @@ class KeeperProcess:
         return True
 
     def close(self) -> None:
-        """Let go of the handle."""
+        """Close the handle."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
@@ -88,7 +89,7 @@ class KeeperProcess:
 WATCH_INTERVAL = 0.1
 """Seconds between two looks at the owner."""
 DIES_WITHIN = 1.0
-"""Seconds that a process has to end once it is killed."""
+"""Seconds in which a killed process must end."""
 
 
 class OwnerWatch:
@@ -115,7 +116,7 @@ class OwnerWatch:
         self._process = KeeperProcess(self._owner, connection)
 
     def close(self) -> None:
-        """Watch no more."""
+        """End the supervision."""
         if self._process is not None:
             self._process.close()
 
@@ -124,7 +125,7 @@ class OwnerWatch:
         self._stops.append(self._clock())
 
     def hear(self, message: AnyMessage) -> None:
-        """The owner said something: it lives."""
+        """Note a message of the owner."""
         self.heard, self._looks, self._killed = self._clock(), 0, None
         self.frozen, self.remedy = False, ""
         if isinstance(message, Alive) and self._stops:

@@ -46,13 +46,13 @@ class Owner(msgspec.Struct, frozen=True):
     socket: Text
     """Address of its socket; empty before it listens and after it ended."""
     quiet_until: MonotonicTime = 0.0
-    """Monotonic time until which a reply to an owner that has ended may come."""
+    """Monotonic time until which a reply to the previous owner may come."""
     stopped: StopTimes = {}
-    """When each device was stopped of late (monotonic)."""
+    """When each device was stopped recently (monotonic)."""
     line: Text = ""
-    """The line as it is open, while its owner listens."""
+    """The line with its actual settings, while its owner listens."""
     deaths: Annotated[tuple[MonotonicTime, ...], Meta(max_length=MOST_DEATHS)] = ()
-    """When keepers of the line died of late (monotonic)."""
+    """Recent deaths of keepers of the line (monotonic)."""
 
     @property
     def is_dead(self) -> bool:
@@ -79,14 +79,13 @@ class SharePlace:
 
     @property
     def name(self) -> str:
-        """A file name of the line: something to read, and a digest that distinguishes it from
-        others."""
+        """A file name of the line: a readable part, and a digest that makes it unique."""
         readable = re.sub(r"[^A-Za-z0-9]+", "-", self.key).strip("-")[-24:]
         return f"{readable}-{hashlib.sha256(self.key.encode()).hexdigest()[:12]}"
 
     @property
     def lock_path(self) -> Path:
-        """The file whose lock makes an owner."""
+        """The file whose lock decides about the owner."""
         return self.lock_folder / f"{self.name}.lock"
 
 
@@ -109,7 +108,7 @@ class OwnerLock:
         self._place = place
         self._file: IO[bytes] | None = None
         self.deaths: tuple[float, ...] = ()
-        """When keepers of the line died of late, as the lock file knows."""
+        """Recent deaths of keepers of the line, by the lock file."""
 
     @property
     def held(self) -> bool:
@@ -117,7 +116,7 @@ class OwnerLock:
         return self._file is not None
 
     def take(self) -> bool:
-        """Try to own the line; True where this program does. Raises OSError."""
+        """Try to own the line; True on success. Raises OSError."""
         import fcntl
 
         if self._file is not None:
@@ -135,7 +134,7 @@ class OwnerLock:
                     os.fchown(descriptor, -1, self._place.group or -1)
                     os.fchmod(descriptor, SHARED_FILE)
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # a file that was taken away meanwhile locks nobody out
+            # a file that was removed in the meantime excludes no program
             if os.fstat(descriptor).st_ino != path.stat().st_ino:
                 raise BlockingIOError
         except (BlockingIOError, FileNotFoundError):
@@ -174,7 +173,7 @@ class OwnerLock:
             self._file = None
 
     def tell(self, owner: Owner) -> None:
-        """Write down who owns the line and where it listens."""
+        """Record the owner of the line and its socket."""
         if self._file is not None:
             data = msgspec.json.encode(msgspec.structs.replace(owner, deaths=self.deaths))
             os.pwrite(self._file.fileno(), data, 0)
@@ -182,7 +181,7 @@ class OwnerLock:
 
     @property
     def stands(self) -> bool:
-        """True if the lock file is still the one that others would try."""
+        """True if the lock file is still the one that other programs would lock."""
         if self._file is None:
             return False
         try:
@@ -191,9 +190,9 @@ class OwnerLock:
             return False
 
     def renew(self) -> bool:
-        """Lock the file that is there now, where the one before was taken away.
+        """Lock the present file, if the previous one was removed.
 
-        Returns False where another program was quicker. Raises OSError.
+        Returns False if another program was first. Raises OSError.
         """
         before, self._file = self._file, None
         try:
@@ -206,7 +205,7 @@ class OwnerLock:
         return taken
 
     def give_back(self, last: Owner | None = None) -> None:
-        """Own the line no more; `last` is what the next owner has to know."""
+        """Release the line; `last` is the information for the next owner."""
         if self._file is not None:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), 0)

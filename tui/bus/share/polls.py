@@ -36,7 +36,7 @@ SHARED_OUT_EVERY = 0.5
 CLOCK_STEP = 1e-6
 """Seconds by which a reply is newer than another, at least."""
 READ_CHARACTERS = 13
-"""Characters of a read and its reply, beside the words."""
+"""Characters of a read and its reply, besides the words."""
 
 
 @dataclass(eq=False, slots=True)
@@ -87,28 +87,28 @@ class PollsServed:
         served_plan.task.add_done_callback(_note_error)
 
     def end(self, client: Client, number: int) -> None:
-        """Poll for a plan no longer."""
+        """End a plan."""
         plan = self._served.get(client, {}).pop(number, None)
         if plan is not None and plan.task is not None:
             plan.task.cancel()
 
     def end_all(self, client: Client) -> None:
-        """A program has left."""
+        """End all plans of a program that has left."""
         for number in list(self._served.get(client, {})):
             self.end(client, number)
         self._served.pop(client, None)
 
     def close(self) -> None:
-        """Poll for nobody any more."""
+        """End all plans."""
         for client in list(self._served):
             self.end_all(client)
 
     # The time of the line
 
     def share_out(self, wishes: Mapping[int, float]) -> None:
-        """Find the factor for the periods of all polls; `wishes` are those of the programs.
+        """Calculate the factor for the periods of all polls; `wishes` are those of the programs.
 
-        To be called again and again; it is looked up again once in a while.
+        To be called often; the factor is calculated once every SHARED_OUT_EVERY seconds.
         """
         pace, now = self._inside.pace, self._inside.clock()
         if now - self._shared_out < SHARED_OUT_EVERY:
@@ -156,7 +156,7 @@ class PollsServed:
             due = begun + plan.period * self._inside.pace.stretch
 
     async def _cycle(self, plan: ServedPlan, turn: int) -> tuple[PolledReply, ...]:
-        """The replies of one cycle; a device that is silent is not asked for the rest of it."""
+        """The replies of one cycle; a silent device is not polled for the rest of it."""
         found: list[PolledReply] = []
         for read in plan.message.plan.turns[turn]:
             try:
@@ -239,13 +239,13 @@ class PollsSubmitted:
             self._tell(Unsubscribe(number))
 
     def hear(self, message: Polled) -> None:
-        """A cycle has come. Raises NoMessage."""
+        """Pass on a cycle. Raises NoMessage."""
         found = self._subscriptions.get(message.number)
         closed = any(
             reply.failure and reply.failure.kind == "LineClosed" for reply in message.replies
         )
         if found is None or closed:
-            return  # on its way when the plan ended, or the owner, whose end is not this program's
+            return  # sent before the plan or its owner ended, which does not concern this program
         plan = found.plan
         if message.turn >= len(plan.turns):
             raise NoMessage(f"turn {message.turn} of {len(plan.turns)}")
@@ -260,7 +260,7 @@ class PollsSubmitted:
         found.hear(PolledTurn(message.turn, message.begun, answers))
 
     def lose_all(self) -> None:
-        """The owner is gone, or does not answer: it is to carry nothing out when it does again."""
+        """End all plans: the owner has exited, or does not answer, and must not resume them."""
         lost, self._subscriptions = self._subscriptions, {}
         for number, subscription in lost.items():
             subscription.lose()

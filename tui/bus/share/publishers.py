@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, slots=True)
 class LinePublisher:
-    """The way to the other programs on a line; used in any thread."""
+    """Connection to the other programs on a line; used in any thread."""
 
     send: Callable[[AnyMessage], None]
     """Has a message handed on to them."""
@@ -25,18 +25,18 @@ class LinePublisher:
     """The socket of another program that holds the line; empty if this one does."""
 
     def stop_directly(self, devices: tuple[int, ...]) -> None:
-        """Have another holder of the line stop devices, around a loop that hangs here.
+        """Have another holder of the line stop devices, without the loop of this program.
 
-        Raises OSError; waits a moment at most.
+        Raises OSError; waits for a moment at most.
         """
         if self.holder:
             send_plain_stop(Path(self.holder), devices)
 
 
 def tell_own(facts: SharedState, send: Callable[[AnyMessage], None]) -> None:
-    """Send the holder of a line what this program has armed, commands, keeps or leaves alone.
+    """Send the holder of a line what this program has armed, commands, keeps alive or pauses.
 
-    Of drives that it has armed before, how to stop them.
+    For drives that it had armed before, the care for them.
     """
     me = facts.me.id
     for device, lease in facts.leases.of(me).items():
@@ -52,7 +52,7 @@ def tell_own(facts: SharedState, send: Callable[[AnyMessage], None]) -> None:
 
 
 def give_up_own(facts: SharedState, why: str) -> None:
-    """Command and write to no drive any more: this program was taken for gone."""
+    """Give up all drives: this program counted as exited."""
     me = facts.me.id
     for device in facts.leases.of(me):
         facts.leases.disarm(device)

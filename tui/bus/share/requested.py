@@ -29,7 +29,7 @@ class RequestsAsked:
         self._numbers = itertools.count(1)
         self._requested: dict[int, Job] = {}
         self._left: set[int] = set()
-        """Stops that nobody waits for any more."""
+        """Stops that have no waiting caller."""
         self._described: dict[int, object] = {}
 
     def send(self, job: Job) -> None:
@@ -54,13 +54,13 @@ class RequestsAsked:
         )  # fmt: skip
 
     def describe(self, device: int, limits: Limits) -> None:
-        """Have the owner know what a device may be sent."""
+        """Report the requests that a device accepts to the owner."""
         if device != BROADCAST and self._described.get(device) is not limits:
             self._described[device] = limits
             self._tell(Describe(device, limits))
 
     def _withdrawn(self, number: int, cancelled: bool) -> None:
-        """Called in any thread: nobody waits for the answer any more."""
+        """Called in any thread: the caller no longer waits for the answer."""
         if cancelled:
             with suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._withdraw, number)
@@ -89,7 +89,7 @@ class RequestsAsked:
             job.fail(error_from(message.form))
 
     def fail_all(self, why: str) -> None:
-        """Fail all that waits. Nothing of it is sent later, except the words of stops."""
+        """Fail all waiting requests; later only stop words are still sent."""
         for number, job in list(self._requested.items()):
             stops = job.priority is Priority.STOP
             if stops and job.request.changes:
@@ -107,7 +107,7 @@ class RequestsAsked:
                 job.fail(LineLost(why + (OUTCOME_UNKNOWN if job.request.changes else "")))
 
     def give_up_all(self, *, closing: bool) -> None:
-        """The owner is gone, or `closing`: this program leaves it."""
+        """Give up all requests: the owner has exited, or this program leaves it (`closing`)."""
         requested, self._requested = self._requested, {}
         for job in requested.values():
             if closing and job.request.changes:
@@ -133,7 +133,7 @@ class RequestsAsked:
 
 
 def _without_asker(job: Job) -> Job:
-    """The same job, for whose answer nobody waits."""
+    """A copy of a job whose reply has no receiver."""
     again = Job(job.request, job.priority, job.limits)
     again.program, again.requested = job.program, job.requested
     return again

@@ -1,4 +1,4 @@
-"""The owner's side of a shared line: takes the requests of other programs into its one queue."""
+"""The owner's side of a shared line: puts the requests of other programs into its one queue."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class ShareServer:
         self._coming_back: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen. Raises OSError where no socket can be made."""
+        """Listen. Raises OSError if no socket can be made."""
         facts = self._inside.facts
         facts.set_programs((facts.me,))
         facts.voice = LinePublisher(self._say)
@@ -76,7 +76,7 @@ class ShareServer:
         self._coming_back = self._loop.create_task(self._miss_late(), name="programs before")
 
     async def close(self) -> None:
-        """Listen no more, and leave no socket behind; the programs start the next keeper."""
+        """Stop listening, and remove the socket; the programs start the next keeper."""
         self._inside.facts.voice = None
         self._signs.close()
         if self._coming_back is not None:
@@ -98,12 +98,12 @@ class ShareServer:
         return bool(self._clients)
 
     def _is_greeting(self) -> bool:
-        """True while a program has called that is not attached yet."""
+        """True while a program has connected that is not attached yet."""
         return len(self._handling) > len(self._clients)
 
     @property
     def stops_wait(self) -> bool:
-        """True while a stop is not sent yet that a program has left behind."""
+        """True while a stop of a program that has left is not sent yet."""
         return not all(job.answer.done() for job in self._stops_left)
 
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -123,7 +123,7 @@ class ShareServer:
         except asyncio.CancelledError:
             pass
         except Exception:
-            # what one program says must not take the line from the others
+            # one program's message must not take the line from the others
             log.exception("serving a program on the line failed")
         finally:
             self._handling.discard(task)
@@ -166,7 +166,7 @@ class ShareServer:
         return client
 
     def _gone(self, client: Client) -> None:
-        """A program went: what it asked is dropped, what it commanded is free."""
+        """Cancel the requests of a program that has left, and free its drives."""
         self._polls.end_all(client)
         self._stops_left += client.forget()
         if self._clients.get(client.program.id) is not client:
@@ -186,7 +186,7 @@ class ShareServer:
         self._miss_departed()
 
     def _miss_departed(self, *, ended: bool = False) -> None:
-        """Programs of an owner before are gone: they are not back, or surely have `ended`."""
+        """Treat programs of the previous owner as exited if they are not back, or have `ended`."""
         facts = self._inside.facts
         here = {item.id for item in facts.programs}
         for program in facts.departed:
@@ -210,7 +210,7 @@ class ShareServer:
         commanders, paused, gone = dict(facts.commanders), dict(facts.paused), facts.departed
         self._tell_all(Facts(facts.programs, commanders, given, paused, times, gone))
 
-    # What clients say
+    # Messages of clients
 
     def _hear(self, client: Client, message: AnyMessage) -> None:
         client.hears(message, self._inside.clock())
@@ -252,11 +252,11 @@ class ShareServer:
             case _ if not self._commanding.hears(client.program, message):
                 raise NoMessage(type(message).__name__)
 
-    # What this program says
+    # Messages of this program
 
     def _say(self, message: AnyMessage) -> None:
         """Called in any thread."""
-        with suppress(RuntimeError):  # the loop has ended, and with it whoever would hear
+        with suppress(RuntimeError):  # the loop has ended, and with it every receiver
             self._loop.call_soon_threadsafe(self._message, message)
 
     def _message(self, message: AnyMessage) -> None:
@@ -272,7 +272,7 @@ class ShareServer:
                 self._tell_all(message)
 
     def _stopped(self, stop: StopGiven) -> None:
-        """Another program stops devices; told twice it counts once."""
+        """Another program stops devices; a repeated message counts once."""
         facts, program = self._inside.facts, stop.program
         by = f"{stop.by}, {program.text}"
         if new := facts.stops.note(program.id, stop.devices, stop.counts, by, stop.when):
@@ -299,7 +299,7 @@ class ShareServer:
         self.tell_state()
 
     def tell_state(self) -> None:
-        """The line's state has changed: say so at once."""
+        """Send the changed state of the line immediately."""
         for client in self._all():
             self._tell_line(client)
 

@@ -45,12 +45,12 @@ UNKEPT = (
     " stops the motors that it has started."
 )
 DISK_WITHIN = 2.0
-"""Seconds that the system has to lock a file: after them the line is used without a lock."""
+"""Timeout in seconds for locking a file; then the line is used without a lock."""
 NO_DISK = "the system does not answer"
 DIED_OFTEN = f"has died {MOST_DEATHS} times within a minute"
 HOLDER_AWAY = "The process that held the line has ended; the next one starts."
 KEEPER_STARTS = 20.0
-"""Seconds that the keeper of a line has to listen: a small computer starts it slowly."""
+"""Seconds in which the keeper of a line must listen: a small computer starts it slowly."""
 
 
 class Sharing:
@@ -86,7 +86,7 @@ class Sharing:
     async def own(self, say: Say) -> None:
         """Return when this program owns the line; until then serve it as a client.
 
-        Raises NotShared where the owner takes nobody in.
+        Raises NotShared if the owner rejects this program.
         """
         if self._lock.held or self._off:
             return
@@ -135,17 +135,17 @@ class Sharing:
         self._doubt_replies()
 
     def _find_holder(self) -> tuple[Owner | None, str]:
-        """Take the lock or see who has it, in a thread: the disk may take nothing.
+        """Take the lock or find its owner, in a thread: the disk may hang.
 
-        The line's keeper is started with the lock; if it cannot be, this program keeps the lock,
-        and the text is why. Raises OSError.
+        The line's keeper is started with the lock. If that fails, this program keeps the lock, and
+        the text is the reason. Raises OSError.
         """
         taken = self._lock.take()
         owner = owner_of(self._place)
         return owner, self._give_to_keeper() if taken and self._keeper else ""
 
     def _drop_lock(self, _: object) -> None:
-        """The lock came when nothing waited for it any more; in the thread that has used it."""
+        """Release a lock that came too late; in the thread that has used it."""
         self._lock.hand_over()
 
     def _give_to_keeper(self) -> str:
@@ -192,7 +192,7 @@ class Sharing:
             self._client = None
             self._attached = self._attached or client.taken_in
         log.info("%s does not own the line any more", owner.program.text)
-        self._keeper_lives()  # takes note of its end, if this program has started it
+        self._keeper_lives()  # collects its exit status, if this program has started it
         self._keeper_lives, self._starts_until = bool, 0.0
 
     async def _listen(self) -> bool:
@@ -230,13 +230,15 @@ class Sharing:
         await asyncio.Event().wait()
 
     def moved(self, *, arrived: bool) -> None:
-        """A program came, or one has gone."""
+        """Note that a program has attached or left."""
 
     async def port_left(self) -> None:
-        """Return once a program that leaves may count on it that the port is closed, or in use."""
+        """Return once the port is closed, or in use by others; a program that leaves relies on
+        that."""
 
     async def makes_way(self) -> bool:
-        """End if nobody is served; True then. This program is served itself."""
+        """End if no program is served, and return True; not this program, which uses the line
+        itself."""
         return False
 
     async def pause(self, seconds: float) -> None:
@@ -244,12 +246,12 @@ class Sharing:
         await asyncio.sleep(seconds)
 
     def rest(self, quiet: float) -> None:
-        """The port is closed; a reply may still come for `quiet` seconds."""
+        """Note that the port is closed; a reply may still come for `quiet` seconds."""
         if quiet > 0:
             self._quiet_until = max(self._quiet_until, self._inside.clock() + quiet)
 
     def pass_on(self, message: bytes) -> bool:
-        """Send a finished message to the owner; False if none takes it."""
+        """Send a finished message to the owner; False if no owner accepts it."""
         return self._client is not None and self._client.pass_on(message)
 
     def tell_state(self) -> None:
@@ -264,7 +266,7 @@ class Sharing:
         if self._server is not None:
             await self._server.close()
             self._server = None
-        # whoever comes next may not have been attached
+        # the next owner may not have been attached
         me, stopped = self._inside.facts.me, self._inside.facts.stops.late_times
         last = Owner(VERSION, me, "", now + quiet if quiet > 0 else 0.0, stopped)
         if not self._finding:
