@@ -266,8 +266,8 @@ DEFECTS = (
     Defect(
         "only-two-signals-stop-a-motor",
         "tui/session/signals.py",
-        "for number in ending_signals() - kept}",
-        'for number in signal_numbers(("SIGHUP", "SIGTERM", *OF_KEYS[:1])) - kept}',
+        "for n in ending_signals() - signal_numbers((but,))}",
+        'for n in signal_numbers(("SIGHUP", "SIGTERM", *OF_KEYS[:1])) - signal_numbers((but,))}',
         "Ctrl-\\ or SIGUSR1 ends the program, and its motor keeps running.",
         ("tests/line/test_signals.py",),
     ),

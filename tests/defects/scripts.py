@@ -5,6 +5,8 @@ from __future__ import annotations
 from .defect import Defect
 
 INPUTS = "tests/line/test_simulate_inputs.py"
+RUNNING = "tests/session/test_running_motor.py"
+ASYNC = "tests/session/test_api_async.py"
 
 DEFECTS = (
     Defect(
@@ -177,5 +179,99 @@ DEFECTS = (
         "stream.write(line.decode()); stream.flush(); line = b''",
         "A program aborts at its end if nothing reads the output of one of its threads.",
         (f"{INPUTS}::test_it_ends_well_while_nobody_reads_what_it_says",),
+    ),
+    Defect(
+        "cancelled-write-goes-on",
+        "tui/session/api/work.py",
+        "        future.cancel()\n        call.cancel()",
+        "        future.cancel()",
+        "Settings are written after the task of a script was cancelled.",
+        (f"{ASYNC}::test_nothing_more_of_a_cancelled_write_is_sent",),
+    ),
+    Defect(
+        "opening-line-left-open",
+        "tui/session/api/work.py",
+        "        except asyncio.CancelledError as error:\n            cancelled = error",
+        "        except asyncio.CancelledError:\n            raise",
+        "A cancelled script keeps a serial port, and its drives are polled on.",
+        (f"{ASYNC}::test_a_line_whose_opening_is_cancelled_is_closed",),
+    ),
+    Defect(
+        "script-starts-a-motor-unarmed",
+        "tui/session/api/running_motor.py",
+        'self._run.begin(self._calls.permit("Run it"))',
+        "self._run.begin(self._calls.session.work.permit())"
+        " if self._calls.session.arming.arm() is None else None",
+        "A script without `armed()` starts a motor.",
+        (f"{RUNNING}::test_nothing_is_started_without_arming",),
+    ),
+    Defect(
+        "start-of-a-script-not-recorded",
+        "tui/session/api/line_calls.py",
+        'None if opened.simulation else StartKeeper("script")',
+        "None",
+        "The motor of a killed script runs on.",
+        (f"{RUNNING}::test_the_start_is_on_record_while_it_runs",),
+    ),
+    Defect(
+        "own-handler-ends-the-wait-for-standstill",
+        "tui/session/api/running_motor.py",
+        "                interruption = interruption or late",
+        "                raise",
+        "A second signal to a script that handles it ends the wait while the motor still turns.",
+        (f"{RUNNING}::test_an_own_handler_that_raises_during_the_stop_ends_no_wait",),
+    ),
+    Defect(
+        "outer-motor-runs-on-after-a-signal",
+        "tui/session/api/end_by_signal.py",
+        "    for guard in tuple(_guards):",
+        "    for guard in _guards[-1:]:",
+        "After a signal to a script with two motors, the second runs on for the ramp of the first.",
+        (f"{RUNNING}::test_a_signal_stops_the_motors_of_nested_blocks_together",),
+    ),
+    Defect(
+        "handler-of-a-script-replaced",
+        "tui/session/signals.py",
+        "    if in_script:",
+        "    if not in_script:",
+        "A signal that a script handles ends it, or Ctrl-C ends `run` before standstill.",
+        (
+            f"{RUNNING}::test_a_signal_ends_an_async_script_after_standstill",
+            f"{RUNNING}::test_a_signal_that_the_script_handles_is_left_to_it",
+            f"{RUNNING}::test_a_ctrl_c_while_it_starts_leaves_none_running",
+            "tests/line/test_signals.py",
+        ),
+    ),
+    Defect(
+        "early-stop-hidden-from-a-script",
+        "tui/session/api/running_motor.py",
+        "if error is None or isinstance(found, NotStopped):",
+        "if isinstance(found, NotStopped):",
+        "A script takes a motor that tripped for one that has done its work.",
+        (f"{RUNNING}::test_a_trip_is_reported_at_the_end_and_at_once_by_wait",),
+    ),
+    Defect(
+        "stop-just-before-the-end-hidden",
+        "tui/session/running/motor_run.py",
+        "return self._stop_of_others()",
+        'return ""',
+        "A script does not learn that another program stopped its motor.",
+        (f"{RUNNING}::test_a_stop_of_another_program_just_before_the_end_is_reported",),
+    ),
+    Defect(
+        "not-stopped-hidden-by-an-error",
+        "tui/session/api/running_motor.py",
+        "if error is None or isinstance(found, NotStopped):",
+        "if error is None:",
+        "A motor runs on after an error of a script, which shows that error alone.",
+        (f"{RUNNING}::test_a_motor_that_is_not_stopped_replaces_every_error",),
+    ),
+    Defect(
+        "line-closed-before-its-motor-rests",
+        "tui/session/api/line_calls.py",
+        "        self._runs.close(STANDS_WITHIN)\n",
+        "",
+        "A script that closes its line leaves a motor running.",
+        (f"{RUNNING}::test_closing_the_line_in_the_block_stops_the_motor_first",),
     ),
 )

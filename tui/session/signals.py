@@ -49,19 +49,26 @@ def signal_numbers(names: Collection[str]) -> frozenset[int]:
 
 
 @contextmanager
-def handled(handle: Handler, *, but: str = "", always: str = "") -> Iterator[None]:
+def handled(
+    handle: Handler, *, but: str = "", always: str = "", in_script: bool = False
+) -> Iterator[None]:
     """While inside, signals that would end the process go to a handler instead.
 
     A signal that the person ignores on purpose (nohup) stays ignored, unless keys send it or it is
     the one named by `always`. One that other code of this process handles stays with it, and the
-    one named by `but`. Outside the main thread nothing changes.
+    one named by `but`. `in_script`: this also applies to keys. Outside the main thread nothing
+    changes.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    kept, wanted = signal_numbers((but,)), signal_numbers((*OF_KEYS, always)) | _taken
-    before = {number: signal.getsignal(number) for number in ending_signals() - kept}
-    before = {n: h for n, h in before.items() if h == signal.SIG_DFL or (n in wanted and h)}
+    before = {n: signal.getsignal(n) for n in ending_signals() - signal_numbers((but,))}
+    if in_script:
+        usual = (signal.SIG_DFL, signal.default_int_handler)
+        before = {n: h for n, h in before.items() if h in usual}
+    else:
+        wanted = signal_numbers((*OF_KEYS, always)) | _taken
+        before = {n: h for n, h in before.items() if h == signal.SIG_DFL or (n in wanted and h)}
     new = before.keys() - _taken
     _taken.update(new)
     for number in before:

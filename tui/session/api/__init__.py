@@ -7,24 +7,29 @@ line, DriveError by the drive, its profile, or a check of this package.
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
-from ..running.errors import NotStopped
+from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from ..settings.typed import WouldRound
 from .async_drive import AsyncDrive
 from .async_line import AsyncDriveLine, open_drives_async
 from .drive import Drive
 from .line import DriveLine, open_drives
+from .running_motor import AsyncRunningMotor, RunningMotor
 from .values import DriveValue, NotWritten, Sample
 
 __all__ = [
     "AsyncDrive",
     "AsyncDriveLine",
+    "AsyncRunningMotor",
     "Drive",
     "DriveError",
     "DriveLine",
     "DriveValue",
     "LineError",
+    "MotorStopped",
+    "MotorTripped",
     "NotStopped",
     "NotWritten",
+    "RunningMotor",
     "Sample",
     "WouldRound",
     "open_drives",

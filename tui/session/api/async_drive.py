@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator, Mapping
 
 from .drive import ScriptedDrive
 from .drive_calls import STANDS_WITHIN
+from .running_motor import AsyncRunningMotor
 from .values import DriveValue, Sample
 from .work import awaited
 
@@ -40,6 +41,10 @@ class AsyncDrive(ScriptedDrive):
         """As `Drive.save`."""
         permit = self._calls.permit()
         return await awaited(self._calls.line, lambda: self._calls.save(permit))
+
+    def running(self, reference: str | None = None, *, reverse: bool = False) -> AsyncRunningMotor:
+        """As `Drive.running`, for `async with`."""
+        return AsyncRunningMotor(self._calls, "reverse" if reverse else "forward", reference)
 
     async def stop(self) -> str:
         """As `Drive.stop`; the stop is carried out even if this task is cancelled."""

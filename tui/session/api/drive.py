@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 
 from .drive_calls import STANDS_WITHIN, DriveCalls
+from .running_motor import RunningMotor
 from .values import DriveValue, Sample
 from .work import waited
 
@@ -70,6 +71,15 @@ class Drive(ScriptedDrive):
         """Keep the settings in the drive's EEPROM; armed. Returns what was done."""
         permit = self._calls.permit()
         return waited(self._calls.line, lambda: self._calls.save(permit))
+
+    def running(self, reference: str | None = None, *, reverse: bool = False) -> RunningMotor:
+        """Run the motor for a `with` block, which stops it at every end; armed.
+
+        `reference` is as typed: 20Hz, 900rpm; None for the present one. Entering the block raises
+        DriveError and LineError if the motor is not started. Leaving it raises NotStopped, and
+        MotorStopped if the motor was stopped before.
+        """
+        return RunningMotor(self._calls, "reverse" if reverse else "forward", reference)
 
     def stop(self) -> str:
         """Stop the motor on its ramp and wait for standstill; needs no arming.

@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from tui.bus.api import ModbusLine
+from tui.drive.chart import Direction
 from tui.drive.errors import DriveError
 
 from ..arming import NotArmed
 from ..command.stop_report import StopSummary
-from ..drive import DriveSession
+from ..console import DriveConsole
 from ..fleet import Fleet
 from ..read.reader import Reader
 from ..running.errors import NotStopped
@@ -19,6 +20,7 @@ from ..settings.apply import apply_edits
 from ..settings.eeprom import save_to_eeprom
 from ..settings.typed import stage_typed
 from ..work import Permit
+from .guarded_run import GuardedRun, GuardedRuns
 from .samples import SampleFeed
 from .values import DriveValue, NotWritten, value_from
 
@@ -29,9 +31,11 @@ STANDS_WITHIN = 120.0
 class DriveCalls:
     """One drive of an open line. Coroutines run in the line's loop, the rest in any thread."""
 
-    def __init__(self, session: DriveSession, fleet: Fleet) -> None:
-        self.session = session
+    def __init__(self, console: DriveConsole, fleet: Fleet, runs: GuardedRuns) -> None:
+        self.session = console.session
         self.fleet = fleet
+        self._console = console
+        self._runs = runs
 
     @property
     def line(self) -> ModbusLine:
@@ -61,11 +65,11 @@ class DriveCalls:
         finally:
             self.session.arming.disarm()
 
-    def permit(self) -> Permit:
-        """The right to write from now on. Raises NotArmed."""
+    def permit(self, does: str = "Write") -> Permit:
+        """The right to write from now on. Raises NotArmed, which says what to do when armed."""
         if not self.session.arming.armed:
             why = self.session.arming.why_disarmed or "Not armed."
-            raise NotArmed(f"{why} Write inside `with drive.armed():`.")
+            raise NotArmed(f"{why} {does} inside `with drive.armed():`.")
         return self.session.work.permit()
 
     async def write(
@@ -86,8 +90,13 @@ class DriveCalls:
         """Keep the settings in the drive's EEPROM; returns what was done."""
         return await save_to_eeprom(self.session, self.fleet.journal, permit)
 
+    def run(self, direction: Direction, reference: str | None) -> GuardedRun:
+        """Prepare a run of the motor; nothing is sent before it begins."""
+        return GuardedRun(self._runs, self.fleet, self._console, direction, reference)
+
     def order_stop(self) -> None:
         """Order the ramp stop; no loop is waited for. Raises LineClosed."""
+        self._runs.end(self.session.device, "stopped by the script")
         self.fleet.stop([self.session], by="a script")
 
     @staticmethod

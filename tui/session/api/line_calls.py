@@ -20,8 +20,10 @@ from ..journal import Journal
 from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..sharing.orphan_motors import OrphanMotorGuard
+from ..starts.keeper import StartKeeper
 from ..teaching.teacher import Teacher
-from .drive_calls import DriveCalls
+from .drive_calls import STANDS_WITHIN, DriveCalls
+from .guarded_run import GuardedRuns
 
 CONNECTED_WITHIN = 5.0
 """Seconds in which a line is to be connected."""
@@ -51,7 +53,10 @@ class LineCalls:
     def __init__(self, opened: OpenLine) -> None:
         self._opened = opened
         self._journal = Journal(on_trouble=_warn)
-        self.fleet = Fleet(opened.line, self._journal)
+        # the motors of a simulated line end with it
+        self._starts = None if opened.simulation else StartKeeper("script")
+        self.fleet = Fleet(opened.line, self._journal, self._starts)
+        self._runs = GuardedRuns()
         self._orphan_guard = OrphanMotorGuard(opened.line, self._journal)
 
     @property
@@ -68,7 +73,7 @@ class LineCalls:
         """Find a drive and keep polling it. Raises as `DriveLine.drive`."""
         session = await self._session(address, profile)
         await asyncio.to_thread(Teacher(session).recall)
-        return DriveCalls(self.fleet.take(session).session, self.fleet)
+        return DriveCalls(self.fleet.take(session), self.fleet, self._runs)
 
     async def _session(self, address: int, profile: str | None) -> DriveSession:
         line = self._opened.line
@@ -93,8 +98,11 @@ class LineCalls:
         return session
 
     def close(self) -> None:
-        """Close the line; waits until its thread has ended."""
+        """Close the line; waits until motors of blocks are at rest and its thread has ended."""
+        self._runs.close(STANDS_WITHIN)
         self._orphan_guard.close()
         self.fleet.forget()
         self._opened.close()
         self._journal.close()
+        if self._starts is not None:
+            self._starts.close()

@@ -63,10 +63,10 @@ class MotorRun:
     seconds: float | None = None
     """The duration; None for no limit."""
     leave_running: bool = False
+    is_stopped_here: Callable[[], bool] = lambda: False
+    """Returns True if this program has given a stop of its own: no other program did."""
     watch: TimeoutWatch | None = field(default=None, init=False)
     """The drive's communication timeout, once it is known."""
-    is_stopped_here: bool = field(default=False, init=False)
-    """True if this program has given a stop of its own: no other program stopped the motor."""
     _commanding: bool = field(default=False, init=False)
     """True if the run command is on its way, so that it may be sent at any time."""
     _earlier: tuple[Entry, ...] = field(init=False)
@@ -92,7 +92,9 @@ class MotorRun:
         if left:
             self.observer.report("left-running", self._left_alone())
         elif stopped:
-            raise MotorStopped(self._stop_text(latest_of(self.console), stopped))
+            raise MotorStopped(
+                f"Device {self.console.device} was stopped {stopped} before the end."
+            )
 
     @property
     def may_turn(self) -> bool:
@@ -110,6 +112,8 @@ class MotorRun:
 
     async def _started(self) -> bool:
         """Give the run command; False where the end came first."""
+        if self.ending.event.is_set():
+            return False
         start = asyncio.create_task(self._start())
         end = asyncio.create_task(self.ending.event.wait())
         try:
@@ -162,7 +166,7 @@ class MotorRun:
     def _stop_of_others(self) -> str:
         """Name the source of a stop since the run began; empty for none or one of this program."""
         work = self.console.session.work
-        is_other = work.stops > self._stops and not self.is_stopped_here
+        is_other = work.stops > self._stops and not self.is_stopped_here()
         return f"by {work.stopped_by}" if is_other else ""
 
     def _at_rest(self, latest: Snapshot) -> bool:
@@ -193,11 +197,10 @@ class MotorRun:
             how = f"by another program or master on the line: {lost}"
         elif latest.state.local:
             how = "at its terminals or keypad"
-        return MotorStopped(self._stop_text(latest, how))
-
-    def _stop_text(self, latest: Snapshot, how: str) -> str:
         state = latest.state.headline
-        return f"Device {self.console.device} no longer runs: {state}. It was stopped {how}."
+        return MotorStopped(
+            f"Device {self.console.device} no longer runs: {state}. It was stopped {how}."
+        )
 
     async def _bring_to_rest(self) -> None:
         """Stop the motor and wait for its standstill; on a lost line as soon as that is back.
