@@ -231,7 +231,7 @@ def test_links_of_readme_lead_somewhere() -> None:
 def test_readme_names_every_profile_and_its_page_every_command() -> None:
     for path in (ROOT / "profiles").glob("*.toml"):
         assert f"`{path.stem}`" in README
-    from tui.cli.main import COMMANDS
+    from tui.cli.command_index import COMMANDS
 
     assert "](docs/cli.md)" in README
     page = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")

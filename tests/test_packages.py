@@ -141,7 +141,7 @@ def test_a_source_package_passes_tests_of_its_own(unpacked: Path) -> None:
 
 
 def test_the_manual_page_is_what_the_commands_say() -> None:
-    assert PAGE.read_text("utf-8") == man_page(), "python -m tui.cli.man_page > docs/drivepanel.1"
+    assert PAGE.read_text("utf-8") == man_page(), "python -m tui.cli.derived"
 
 
 def test_the_manual_page_has_every_command_and_option() -> None:

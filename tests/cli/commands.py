@@ -6,13 +6,18 @@ import socket
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 
+import click
 from click.testing import CliRunner, Result
 
 from tests.programs import drivepanel
+from tui.cli.command_index import COMMANDS
 from tui.cli.commands.simulate import simulate, simulation_of
 from tui.cli.main import main
+from tui.cli.shared.errors import OWN_ERROR
+from tui.cli.shared.registration import RegisteredCommand
 
 from .printed import forms_of
 
@@ -37,13 +42,26 @@ def invoked(*arguments: str | Path) -> Result:
 
 
 def ended(status: int, *arguments: str | Path) -> Result:
-    """Run a command to this exit status, without a traceback; its JSON fits the schema."""
+    """Run a command to this exit status, without a traceback.
+
+    Its JSON must fit the schema, and the status must be registered.
+    """
     done = invoked(*arguments)
     assert done.exit_code == status, done.output
+    if (name := next((str(word) for word in arguments if word in COMMANDS), None)) is not None:
+        assert status in statuses_of(name) or status >= OWN_ERROR, f"register {status} of {name}"
     assert "Traceback" not in done.stderr
     if "--json" in arguments and "--help" not in arguments:
         forms_of(done.stdout)
     return done
+
+
+@lru_cache
+def statuses_of(name: str) -> list[int]:
+    """The registered exit statuses of a command."""
+    command = main.get_command(click.Context(main), name)
+    assert isinstance(command, RegisteredCommand)
+    return command.all_statuses
 
 
 def run(status: int, *arguments: str | Path) -> str:

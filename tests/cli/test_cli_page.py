@@ -10,7 +10,7 @@ import pytest
 
 from tests.programs import DRIVEPANEL, drivepanel, served
 from tests.sweeps import kept
-from tui.cli.main import COMMANDS
+from tui.cli.command_index import COMMANDS
 from tui.cli.plant.metrics import METRICS
 
 from .commands import ended

@@ -13,7 +13,8 @@ import pytest
 from click.shell_completion import ShellComplete
 
 from tui.bus.transport.ports import PortInfo
-from tui.cli.main import COMMANDS, main
+from tui.cli.command_index import COMMANDS
+from tui.cli.main import main
 from tui.cli.shared.shells import BashByLine
 from tui.drive.profile import library
 

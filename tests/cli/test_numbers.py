@@ -8,7 +8,8 @@ import click
 import pytest
 
 from tui.bus.link import Link, SerialLink, TcpLink
-from tui.cli.main import COMMANDS, main
+from tui.cli.command_index import COMMANDS
+from tui.cli.main import main
 from tui.cli.shared.errors import USAGE, Failure
 from tui.cli.shared.numbers import FiniteRange, check_rate
 

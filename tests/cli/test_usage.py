@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from tui.cli.main import COMMANDS
+from tui.cli.command_index import COMMANDS
 
 from .commands import ended, invoked, refused, run
 

@@ -112,9 +112,9 @@ DEFECTS = (
     ),
     Defect(
         "lost-output-fails-a-stop",
-        "tui/cli/shared/standard_streams.py",
-        '"run", "stop", ',
-        '"run", ',
+        "tui/cli/commands/stop.py",
+        "statuses=WRITING, acts=True",
+        "statuses=WRITING",
         "On a full disk, a script takes a successful stop for a failed one.",
         (
             "tests/cli/test_journal_trouble.py"

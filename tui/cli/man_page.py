@@ -1,12 +1,8 @@
-"""The manual page, made of what the commands say of themselves.
-
-python -m tui.cli.man_page > docs/drivepanel.1
-"""
+"""The manual page, made of the help of the commands. `python -m tui.cli.derived` writes it."""
 
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator
 
 import click
@@ -14,6 +10,7 @@ import click
 import tui
 
 from .main import main
+from .shared.registration import RegisteredCommand
 
 NAME = "drivepanel"
 _LINE_HELP, _, _STATUSES = (main.epilog or "").partition("Exit status:")
@@ -73,6 +70,9 @@ def _command(name: str, top: click.Context) -> Iterator[str]:
     yield ".PP"
     yield from _paragraphs(command.help or "")
     yield from _options(command, context)
+    if isinstance(command, RegisteredCommand):
+        yield ".PP"
+        yield _text(f"Exit status: {', '.join(map(str, command.all_statuses))}.")
 
 
 def _usage(command: str, arguments: str) -> Iterator[str]:
@@ -119,7 +119,3 @@ def _text(text: str) -> str:
     """A text that roff takes as it is."""
     text = text.replace("\\", "\\e").replace("-", "\\-").replace("\b", "")
     return f"\\&{text}" if text.startswith((".", "'")) else text
-
-
-if __name__ == "__main__":
-    sys.stdout.write(man_page())

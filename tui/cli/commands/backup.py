@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
-from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure, reported
+from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure
 from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from ..shared.sets import (
     complain_absent,
@@ -22,7 +23,7 @@ from ..shared.sets import (
 STANDARD_OUTPUT = Path("-")
 
 
-@click.command()
+@command("Back up a drive's settings to a file.", statuses=ON_LINE)
 @line_argument
 @file_argument
 @force_option
@@ -32,7 +33,6 @@ STANDARD_OUTPUT = Path("-")
 @json_option
 @settings_options
 @never_forced
-@reported
 def backup(target: Target, file: Path, force: bool, everything: bool, as_json: bool) -> None:
     """Back up the settings of a drive to FILE, one line per parameter; `-` is standard output.
 

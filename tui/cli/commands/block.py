@@ -16,7 +16,6 @@ from ..shared.errors import (
     DRIVE_REFUSED,
     REFUSED_HERE,
     Failure,
-    reported,
     status_of,
 )
 from ..shared.options import (
@@ -29,6 +28,7 @@ from ..shared.options import (
     read_only_option,
     settings_options,
 )
+from ..shared.registration import WRITING, command
 from ..shared.say import say
 from ..shared.sets import dry_run_option, write_down
 from .orders import arm_option, close_journal, complain, journal_document, need_arming, permit_of
@@ -42,10 +42,12 @@ if TYPE_CHECKING:
     from ..documents.setting_documents import SlotChangeField
 
 BLOCK_COMMANDS = ("show", "verify", "set", "factory", "load", "save")
-WRITING = frozenset({"set", "factory", "load"})
+WRITING_ACTIONS = frozenset({"set", "factory", "load"})
 
 
-@click.command()
+@command(
+    "Show or change a drive's indirect block or scanner.", statuses=(DIFFERENT, *WRITING), acts=True
+)
 @line_argument
 @click.argument("action", type=click.Choice(BLOCK_COMMANDS), default="show")
 @click.argument("words", nargs=-1, metavar="[SLOT=CODE... | FILE]")
@@ -55,7 +57,6 @@ WRITING = frozenset({"set", "factory", "load"})
 @read_only_option
 @never_forced
 @settings_options
-@reported
 def block(
     target: Target,
     action: str,
@@ -80,7 +81,7 @@ def block(
     """
     wanted = Wanted(action, words, dry_run, as_json)
     _check_usage(wanted)
-    writes = action in WRITING and not dry_run
+    writes = action in WRITING_ACTIONS and not dry_run
     if writes:
         need_arming(arm, "this changes what the drive's slots are mapped to")
 
@@ -112,7 +113,7 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
         await _measure_answer(session)
         show_neighbors(session, line_text, as_json=wanted.as_json)
         return DONE
-    if wanted.action in WRITING:
+    if wanted.action in WRITING_ACTIONS:
         return await _write(session, line_text, wanted)
     views = await _looked_at(session, verify=wanted.action == "verify")
     if wanted.action == "save":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.devices import devices_option
-from ..shared.errors import USAGE, Failure, reported
+from ..shared.errors import USAGE, Failure
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -21,6 +21,7 @@ from ..shared.options import (
     on_line,
     profile_of,
 )
+from ..shared.registration import ON_LINE, command
 from ..shared.sets import refuse_existing, write_down
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 
-@click.command()
+@command("Collect all evidence about a line in one file.", statuses=ON_LINE)
 @line_argument
 @devices_option("Include this drive; several times for several (default: those known).")
 @profile_of("Use this profile for drives that do not identify themselves.")
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
 )
 @click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 @json_option
-@reported
 def bundle(
     line_text: str,
     devices: tuple[int, ...],

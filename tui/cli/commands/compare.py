@@ -10,9 +10,10 @@ import click
 
 from ..shared.completion import complete_side
 from ..shared.devices import devices_option
-from ..shared.errors import DIFFERENT, USAGE, Failure, reported
+from ..shared.errors import DIFFERENT, USAGE, Failure
 from ..shared.line_argument import LINE_VARIABLE, named_line_of
 from ..shared.options import Target, json_option, never_forced, profile_of
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 FACTORY = "factory"
 
 
-@click.command()
+@command("Compare settings of files, drives or factory defaults.", statuses=(DIFFERENT, *ON_LINE))
 @click.argument("a", shell_complete=complete_side)
 @click.argument("b", shell_complete=complete_side, envvar=LINE_VARIABLE)
 @click.option("--all", "all_rows", is_flag=True, help="Show equal settings and measurements too.")
@@ -41,7 +42,6 @@ FACTORY = "factory"
 @profile_of("Use this profile for the drives.")
 @devices_option("Use the drive at this slave address; twice if A and B are two drives.")
 @never_forced
-@reported
 def compare(
     a: str,
     b: str,

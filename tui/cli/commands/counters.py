@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure, reported
+from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
@@ -21,6 +21,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.output import drive_fields, last_minute_field, print_json
+from ..shared.registration import WRITING, command
 from ..shared.say import say, say_row
 from .orders import arm_option, close_journal, journal_document, need_arming
 
@@ -41,7 +42,7 @@ COUNTER_TITLES = 18
 """Width of the column of titles, with its gap."""
 
 
-@click.command()
+@command("Compare frame counts with the drive's own counters.", statuses=(DIFFERENT, *WRITING))
 @line_argument
 @drive_options
 @force_profile_option
@@ -64,7 +65,6 @@ COUNTER_TITLES = 18
 @arm_option
 @read_only_option
 @json_option
-@reported
 def counters(
     target: Target,
     frames: int,

@@ -11,7 +11,7 @@ import click
 
 from ..running.holding import Holding, keep_polling
 from ..shared.devices import several_devices_option
-from ..shared.errors import LINE_TROUBLE, Failure, reported, status_of
+from ..shared.errors import LINE_TROUBLE, Failure, status_of
 from ..shared.options import (
     Target,
     connect_drive,
@@ -23,6 +23,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.pending_timeouts import timeout_field
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from .orders import complain
 
@@ -47,14 +48,13 @@ class HeldTeller(Protocol):
     ) -> None: ...
 
 
-@click.command()
+@command("Keep polling drives so that they do not time out.", statuses=ON_LINE)
 @line_argument
 @several_devices_option
 @profile_option
 @force_profile_option
 @read_only_option
 @json_option
-@reported
 def hold(
     line_text: str,
     device: tuple[int, ...],

@@ -12,7 +12,7 @@ from tui.drive.plain import plain
 
 from ..shared.devices import several_devices_option
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, REFUSED_HERE, Failure, reported
+from ..shared.errors import DONE, REFUSED_HERE, Failure
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import (
     Target,
@@ -23,6 +23,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.pending_timeouts import look_after
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say_row
 
 if TYPE_CHECKING:
@@ -37,13 +38,12 @@ IDENTITY_TITLES = 11
 """Width of the column of titles, with its gap."""
 
 
-@click.command()
+@command("Show a drive's vendor, model and version.", statuses=ON_LINE)
 @line_argument
 @several_devices_option
 @hold_option
 @read_only_option
 @json_option
-@reported
 def identify(
     line_text: str,
     device: tuple[int, ...],

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import USAGE, Failure, reported
+from ..shared.errors import USAGE, Failure
 from ..shared.options import json_option
 from ..shared.output import print_json
+from ..shared.registration import command
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def since(text: str, now: datetime) -> datetime | None:
         return None
 
 
-@click.command()
+@command("Show writes made to drives by Drive Panel.")
 @click.option(
     "--drive",
     "wanted",
@@ -85,7 +86,6 @@ def since(text: str, now: datetime) -> datetime | None:
     help="Start at: 2h, 30m, 7d, 08:30 or 2026-03-01T08:30.",
 )
 @json_option
-@reported
 def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
     """Show writes to drives from this computer, trips that were seen, and timeout tests.
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import USAGE, reported
+from ..shared.errors import USAGE
 from ..shared.left_behind import LeftBehind, left_on_lines
 from ..shared.options import json_option
+from ..shared.registration import command
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -21,9 +22,8 @@ if TYPE_CHECKING:
     from ..documents.other_documents import KnownLineField, LeftOnLineDocument, OpenLineDocument
 
 
-@click.command()
+@command("List named and remembered lines.")
 @json_option
-@reported
 def lines(as_json: bool) -> None:
     """List the lines that the settings file names, and the stored adapters and drives.
 
@@ -96,7 +96,7 @@ def _faults(line: NamedLine) -> Iterator[str]:
     from tui.drive.profile import library
     from tui.session.connect.open_line import check_line
 
-    from ..main import COMMANDS
+    from ..command_index import COMMANDS
 
     if line.name.casefold() in COMMANDS:
         yield "a command has this name: the panel cannot be opened by it."

@@ -13,10 +13,11 @@ import click
 from tui.session.signals import BY_SIGNAL, signal_name
 
 from ..shared.completion import complete_line, complete_profile
-from ..shared.errors import INTERRUPTED, USAGE, Failure, reported
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, USAGE, Failure
 from ..shared.line_argument import LineArgument
 from ..shared.numbers import seconds
 from ..shared.options import json_option
+from ..shared.registration import command
 from ..shared.say import say
 from ..shared.signals import interrupted_by_signal, never_suspended
 
@@ -29,7 +30,7 @@ PROGRAM_NAME = "listen"
 LAST_ADDRESS_HEARD = 255
 
 
-@click.command()
+@command("Monitor traffic on a line; send nothing.", statuses=(LINE_TROUBLE,))
 @click.argument("line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line)
 @click.option(
     "-p",
@@ -67,7 +68,6 @@ LAST_ADDRESS_HEARD = 255
     help="Listen for S seconds, else until Ctrl-C.",
 )
 @json_option
-@reported
 def listen(
     line_text: str,
     profile_ids: tuple[str, ...],

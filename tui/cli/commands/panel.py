@@ -9,10 +9,11 @@ import click
 from ..opening import DEMO_LINE, LEAVE_RUNNING, STOP, open_panel, terminal_trouble
 from ..shared.completion import complete_line
 from ..shared.devices import SLAVE_ADDRESS, one_device
-from ..shared.errors import USAGE, Failure, reported
+from ..shared.errors import USAGE, Failure
 from ..shared.line_argument import LineArgument, share_group_option
 from ..shared.lines import is_line
 from ..shared.options import read_only_option
+from ..shared.registration import command
 
 
 def run_panel(start: str | None, device: int | None, **how: Any) -> None:
@@ -51,13 +52,12 @@ ascii_option = click.option(
 )
 
 
-@click.command()
+@command("Open the panel on five running simulated drives.")
 @low_bandwidth_option
 @on_hangup_option
 @mouse_option
 @bell_option
 @ascii_option
-@reported
 def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bool | None) -> None:
     """Open the panel on one simulated line with five running drives."""
     run_panel(
@@ -71,7 +71,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
     )
 
 
-@click.command(hidden=True)
+@command("Open the panel.", hidden=True)
 @click.argument(
     "line_text",
     required=False,
@@ -95,7 +95,6 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
 @mouse_option
 @bell_option
 @ascii_option
-@reported
 def panel(
     line_text: str | None,
     device: int | None,

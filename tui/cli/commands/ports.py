@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import click
-
-from ..shared.errors import reported
 from ..shared.options import json_option
+from ..shared.registration import command
 from ..shared.say import say
 
 
-@click.command()
+@command("List the serial ports of this computer.")
 @json_option
-@reported
 def ports(as_json: bool) -> None:
     """List the serial ports of this computer, and the programs that use them."""
     from tui.bus.transport.port_names import lasting_name

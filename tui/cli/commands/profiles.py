@@ -10,8 +10,8 @@ import click
 from tui.drive.plain import plain
 
 from ..shared.completion import complete_profile
-from ..shared.errors import reported
 from ..shared.options import json_option
+from ..shared.registration import command
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
 
 
-@click.command()
+@command("List, show or check drive profiles.")
 @click.argument(
     "profile_id",
     required=False,
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     help="Show warnings, wiring, LEDs, command words and errata.",
 )
 @json_option
-@reported
 def profiles(
     profile_id: str | None,
     more: tuple[str, ...],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import DIFFERENT, DRIVE_REFUSED, REFUSED_HERE, Failure, reported
+from ..shared.errors import DIFFERENT, DRIVE_REFUSED, REFUSED_HERE, Failure
 from ..shared.options import (
     Target,
     drive_options,
@@ -17,6 +17,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.output import drive_fields, print_json
+from ..shared.registration import WRITING, command
 from ..shared.say import say
 from .orders import arm_drive, arm_option, carried_out, complain, need_arming, watched
 
@@ -37,7 +38,7 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 """Seconds that a motor may take to its standstill after a proof on the run."""
 
 
-@click.command()
+@command("Test how a drive reacts to communication loss.", statuses=(DIFFERENT, *WRITING))
 @line_argument
 @drive_options
 @arm_option
@@ -50,7 +51,6 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 @click.option("--reset", is_flag=True, help="Reset the fault that the test has caused.")
 @read_only_option
 @json_option
-@reported
 def prove(
     target: Target,
     arm: bool,

@@ -12,10 +12,10 @@ import click
 from ..plant.broker import Broker, broker_of, mqtt_password_option
 from ..plant.publish_options import check_names
 from ..shared.completion import complete_line_or_code
-from ..shared.errors import reported
 from ..shared.numbers import check_rate
 from ..shared.options import Target, drives_options, every_option, json_option
 from ..shared.output import print_json
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from ..shared.several_lines import LineWish, further_lines, lines_argument, lines_wished, on_lines
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
 
 
-@click.command()
+@command("Publish drive values to an MQTT broker.", statuses=ON_LINE)
 @lines_argument
 @click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 @mqtt_password_option
 @every_option
 @json_option
-@reported
 def publish(
     target: Target,
     codes: tuple[str, ...],

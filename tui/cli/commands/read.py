@@ -8,7 +8,7 @@ import click
 
 from ..shared.completion import complete_code
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, DRIVE_REFUSED, reported
+from ..shared.errors import DONE, DRIVE_REFUSED
 from ..shared.options import (
     Target,
     connect_drive,
@@ -20,6 +20,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from ..documents.drive_documents import ReadDocument
 
 
-@click.command()
+@command("Read parameters from a drive.", statuses=ON_LINE)
 @line_argument
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_code)
 @drives_options
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
 @hold_option
 @read_only_option
 @json_option
-@reported
 def read(
     target: Target,
     codes: tuple[str, ...],

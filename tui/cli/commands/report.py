@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
-
-from ..shared.errors import INTERRUPTED, Failure, reported
+from ..shared.errors import INTERRUPTED, Failure
 from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
+from ..shared.registration import ON_LINE, command
 from ..shared.sets import (
     file_argument,
     force_option,
@@ -18,14 +17,13 @@ from ..shared.sets import (
 )
 
 
-@click.command()
+@command("Write a report on a drive to a file.", statuses=ON_LINE)
 @line_argument
 @file_argument
 @force_option
 @json_option
 @settings_options
 @never_forced
-@reported
 def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.
 

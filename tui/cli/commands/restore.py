@@ -10,7 +10,7 @@ import click
 
 from ..shared.devices import devices_option
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, reported
+from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -22,6 +22,7 @@ from ..shared.options import (
     profile_option,
     read_only_option,
 )
+from ..shared.registration import WRITING, command
 from ..shared.sets import (
     ResultTelling,
     codes_of,
@@ -68,7 +69,7 @@ CODES_NAMED = 12
 """Number of codes named for one reason; --dry-run names all."""
 
 
-@click.command()
+@command("Restore a parameter set to a drive.", statuses=WRITING, acts=True)
 @line_argument
 @file_argument
 @dry_run_option
@@ -87,7 +88,6 @@ CODES_NAMED = 12
     default=(1,),
     show_default=True,
 )
-@reported
 def restore(
     line_text: str,
     file: Path,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import click
 
 from ..running.motor import RunOptions, run_motor
-from ..shared.errors import reported
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
@@ -16,10 +15,11 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.registration import WRITING, command
 from .orders import arm_option, need_arming
 
 
-@click.command()
+@command("Run a motor until this command ends.", statuses=WRITING, acts=True)
 @line_argument
 @drive_options
 @click.option("--reverse", is_flag=True, help="Run reverse.")
@@ -48,7 +48,6 @@ from .orders import arm_option, need_arming
 @read_only_option
 @json_option
 @never_forced
-@reported
 def run(
     target: Target,
     reverse: bool,

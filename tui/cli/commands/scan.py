@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import INTERRUPTED, LINE_TROUBLE, REFUSED_HERE, Failure, reported
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, REFUSED_HERE, Failure
 from ..shared.options import hold_option, json_option, line_argument, on_line, read_only_option
+from ..shared.registration import ON_LINE, command
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 ALL_ADDRESSES = "1-247"
 
 
-@click.command()
+@command("Scan a line for drives.", statuses=ON_LINE)
 @line_argument
 @click.option(
     "--addresses",
@@ -41,7 +42,6 @@ ALL_ADDRESSES = "1-247"
 @hold_option
 @read_only_option
 @json_option
-@reported
 def scan(
     line_text: str,
     addresses: str,

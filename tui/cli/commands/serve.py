@@ -26,13 +26,13 @@ from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
 from ..shared.completion import complete_line
 from ..shared.devices import devices_option
-from ..shared.errors import reported
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors, say_shared
 from ..shared.numbers import SHORTEST_CYCLE, seconds
 from ..shared.options import CONNECT_WITHIN, json_option, profile_of, usual_settings
 from ..shared.output import print_json
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from ..shared.served_lines import ServedLine, served_lines
 from ..shared.signals import never_suspended
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from ..documents.other_documents import ServeReady
 
 
-@click.command()
+@command("Run headless and serve lines over Modbus TCP.", statuses=ON_LINE)
 @click.argument("lines", nargs=-1, metavar="LINE...", shell_complete=complete_line)
 @line_options
 @click.option("--tcp", metavar="HOST:PORT", help="Serve Modbus TCP (default host: loopback).")
@@ -87,7 +87,6 @@ if TYPE_CHECKING:
 @devices_option("Serve this drive, which does not identify itself; needs -p.")
 @profile_of("Use this profile for the drives of -d.")
 @json_option
-@reported
 def serve(
     lines: tuple[str, ...],
     tcp: str | None,

@@ -12,11 +12,11 @@ import click
 from tui.session.signals import handled
 
 from ..shared.completion import complete_profile
-from ..shared.errors import reported
 from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
 from ..shared.options import json_option
 from ..shared.output import json_text, print_json
+from ..shared.registration import command
 from ..shared.say import say, say_beside
 from ..shared.signals import never_suspended
 from ..shared.standard_input import typed_lines
@@ -28,7 +28,7 @@ USUAL = (19200, "8E1")
 """Baud and format of a LINE that names none."""
 
 
-@click.command()
+@command("Serve simulated drives to any Modbus client.")
 @click.argument(
     "drives",
     nargs=-1,
@@ -90,7 +90,6 @@ USUAL = (19200, "8E1")
     help="Run the motors at this frequency from the start.",
 )
 @json_option
-@reported
 def simulate(
     drives: tuple[str, ...],
     pty: str | None,

@@ -15,7 +15,7 @@ from tui.drive.reset_text import MAY_START
 from tui.session.patience import patience
 from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 
-from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, reported
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -26,6 +26,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.registration import WRITING, command
 from .orders import (
     arm_drive,
     arm_option,
@@ -71,7 +72,7 @@ def _ordered(
         print_json(CommandDocument(command=command, **fields, text=text, messages=messages.texts))
 
 
-@click.command()
+@command("Set a drive's reference.", statuses=WRITING, acts=True)
 @line_argument
 @click.argument("text", metavar="REFERENCE")
 @drive_options
@@ -79,7 +80,6 @@ def _ordered(
 @read_only_option
 @json_option
 @never_forced
-@reported
 def reference(
     target: Target,
     text: str,
@@ -97,14 +97,18 @@ def reference(
     _ordered("reference", target, read_only, work, as_json=as_json)
 
 
-@click.command(help=f"Reset a drive's fault. Its cause must be removed first.\n\n{MAY_START}")
+@command(
+    "Reset a drive's fault.",
+    statuses=WRITING,
+    acts=True,
+    help=f"Reset a drive's fault. Its cause must be removed first.\n\n{MAY_START}",
+)
 @line_argument
 @drive_options
 @arm_option
 @read_only_option
 @json_option
 @never_forced
-@reported
 def reset(
     target: Target,
     arm: bool,

@@ -9,7 +9,6 @@ import click
 from ..shared.completion import complete_line
 from ..shared.drive_status import status_document, status_of_drive
 from ..shared.drives import each_drive
-from ..shared.errors import reported
 from ..shared.every_drive import USUAL_SEARCH, every_drive
 from ..shared.line_argument import takes_line_as
 from ..shared.options import (
@@ -22,6 +21,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.registration import ON_LINE, command
 from ..shared.several_lines import FirstOfLines, LineWish, lines_wished, on_lines
 from ..shared.status_lines import StatusWish, say_in_a_line, say_status, status_of_lines
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ..documents.drive_documents import StatusDocument
 
 
-@click.command()
+@command("Show a drive's state, control source and fault.", statuses=ON_LINE)
 @takes_line_as(FirstOfLines, "LINE")
 @click.argument("more", nargs=-1, metavar="[LINE...]", shell_complete=complete_line)
 @drives_options
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 )
 @read_only_option
 @json_option
-@reported
 def status(
     target: Target,
     more: tuple[str, ...],

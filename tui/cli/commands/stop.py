@@ -16,7 +16,7 @@ from ..running.stop_targets import (
     remembered,
 )
 from ..running.stop_telling import StopTelling
-from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, reported
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure
 from ..shared.left_behind import forget_start
 from ..shared.options import (
     Target,
@@ -28,6 +28,7 @@ from ..shared.options import (
 )
 from ..shared.output import print_json
 from ..shared.pending_timeouts import PolledDrive, look_after
+from ..shared.registration import WRITING, command
 from .orders import close_journal, complain, journal_document
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ NAMES_NO_FAMILY = (
 )
 
 
-@click.command()
+@command("Stop one drive, or every drive on a line.", statuses=WRITING, acts=True)
 @line_argument
 @drives_options
 @click.option("--all", "every", is_flag=True, help="Stop every drive found on the line.")
@@ -64,7 +65,6 @@ NAMES_NO_FAMILY = (
 @click.option("--arm", is_flag=True, help="Arm the drive for --give-back; no stop needs it.")
 @read_only_option
 @json_option
-@reported
 def stop(
     target: Target,
     every: bool,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.completion import complete_code
-from ..shared.errors import DIFFERENT, reported
+from ..shared.errors import DIFFERENT
 from ..shared.options import (
     Target,
     connect_drive,
@@ -17,6 +17,7 @@ from ..shared.options import (
     never_forced,
     on_line,
 )
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -27,7 +28,12 @@ if TYPE_CHECKING:
     from ..documents.setting_documents import ScaleField, TaughtField
 
 
-@click.command(context_settings={"ignore_unknown_options": True})  # -12.5 is a VALUE
+@command(
+    "Learn a raw value's scale from the drive's display.",
+    statuses=(DIFFERENT, *ON_LINE),
+    acts=True,
+    context_settings={"ignore_unknown_options": True},
+)  # -12.5 is a VALUE
 @line_argument
 @click.argument("code", required=False, shell_complete=complete_code)
 @click.argument("value", required=False)
@@ -44,7 +50,6 @@ if TYPE_CHECKING:
 @click.option("--no-reference", is_flag=True, help="Stop using a learned code for the reference.")
 @json_option
 @never_forced
-@reported
 def teach(
     target: Target,
     code: str | None,

@@ -14,7 +14,7 @@ import click
 
 from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
-from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, reported
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure
 from ..shared.found_drives import find_drives
 from ..shared.numbers import check_rate
 from ..shared.options import (
@@ -26,6 +26,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.registration import ON_LINE, command
 from ..shared.several_lines import LineWish, further_lines, lines_argument, lines_wished, on_lines
 from ..shared.watch_outputs import (
     CsvOutput,
@@ -75,7 +76,7 @@ class CsvOptions:
         return CsvOutput(self.file, units, several)
 
 
-@click.command()
+@command("Poll parameters and print every cycle.", statuses=ON_LINE)
 @lines_argument
 @click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options
@@ -101,7 +102,6 @@ class CsvOptions:
 @force_profile_option
 @read_only_option
 @json_option
-@reported
 def watch(
     target: Target,
     codes: tuple[str, ...],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from ..shared.errors import LINE_TROUBLE, reported
+from ..shared.errors import LINE_TROUBLE
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import (
     Target,
@@ -17,6 +17,7 @@ from ..shared.options import (
     read_only_option,
     settings_options,
 )
+from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -29,12 +30,11 @@ if TYPE_CHECKING:
     from ..documents.why_document import CertaintyText, MeasuredReads, WhyDocument
 
 
-@click.command()
+@command("Diagnose why a drive does not answer.", statuses=ON_LINE)
 @line_argument
 @settings_options
 @read_only_option
 @json_option
-@reported
 def why(target: Target, read_only: bool, as_json: bool) -> None:
     """Diagnose why a drive does not answer: the cause in a sentence, and the next steps.
 

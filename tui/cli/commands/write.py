@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypedDict
 import click
 
 from ..shared.completion import complete_setting
-from ..shared.errors import DONE, REFUSED_HERE, reported
+from ..shared.errors import DONE, REFUSED_HERE
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -19,6 +19,7 @@ from ..shared.options import (
     read_only_option,
     settings_options,
 )
+from ..shared.registration import WRITING, command
 from ..shared.sets import (
     ResultTelling,
     codes_of,
@@ -50,7 +51,7 @@ class _Written(TypedDict):
     unsaved: list[str]
 
 
-@click.command()
+@command("Write settings to a drive.", statuses=WRITING, acts=True)
 @line_argument
 @click.argument(
     "wanted",
@@ -68,7 +69,6 @@ class _Written(TypedDict):
 @read_only_option
 @json_option
 @settings_options
-@reported
 def write(
     target: Target,
     wanted: tuple[str, ...],

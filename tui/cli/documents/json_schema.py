@@ -1,8 +1,7 @@
 """The JSON Schema of what `--json` prints.
 
-`python -m tui.cli.documents.json_schema` prints it; a copy is docs/cli.schema.json. Fields are
-added, never renamed, while `schema` stays 1. The schema describes output: a field is required
-unless it may be missing.
+`python -m tui.cli.derived` writes it to docs/cli.schema.json. Fields are added, never renamed,
+while `schema` stays 1. The schema describes output: a field is required unless it may be missing.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import importlib
 import json
 import pkgutil
-import sys
 from typing import Any
 
 import msgspec
@@ -64,7 +62,3 @@ def _require_printed(part: dict[str, Any]) -> None:
         del fields[name]["default"]
     if fixed:
         part["required"] = [name for name in fields if name in fixed or name in part["required"]]
-
-
-if __name__ == "__main__":
-    sys.stdout.write(documents_schema())

@@ -109,13 +109,13 @@ def status_of(error: Exception) -> int | None:
     return next((status for kind, status in table if isinstance(error, kind)), None)
 
 
-def _tell_lost_output(command: Callable[..., object]) -> None:
+def _tell_lost_output(*, acts: bool) -> None:
     """Say that the output went nowhere; Failure where it is all that the command was for."""
-    from .standard_streams import acts, output_lost
+    from .standard_streams import output_lost
 
     if lost := output_lost():
         text = f"What was printed is lost: standard output cannot be written: {lost}."
-        if not acts(command):
+        if not acts:
             raise Failure(text, OWN_ERROR)
         say(f"drivepanel: {text}", err=True)
 
@@ -156,7 +156,7 @@ def _with_writes(error: ClickError) -> ClickError:
     return click.exceptions.Exit(ENDED_AFTER_WRITING)
 
 
-def reported(command: Callable[P, R]) -> Callable[P, R]:
+def reported(command: Callable[P, R], *, acts: bool = False) -> Callable[P, R]:
     """Turn what a command raises into a message and an exit status; never a traceback."""
 
     @functools.wraps(command)
@@ -164,7 +164,7 @@ def reported(command: Callable[P, R]) -> Callable[P, R]:
         try:
             result = command(*args, **kwargs)
             sys.stdout.flush()  # here, where a closed pipe can still be told from an error
-            _tell_lost_output(command)
+            _tell_lost_output(acts=acts)
             return result
         except click.Abort:
             raise

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable
 from typing import Any, TextIO
 
 
@@ -64,12 +63,3 @@ def output_lost() -> str:
     file = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     lost = file.lost if isinstance(file, ForgivingFile) else None
     return "" if lost is None else lost.strerror or str(lost)
-
-
-def acts(command: Callable[..., object]) -> bool:
-    """Return True if a command's status reports the result for a drive, even if nothing reads its
-    output."""
-    return command.__name__ in ACTING
-
-
-ACTING = frozenset({"block", "reference", "reset", "restore", "run", "stop", "teach", "write"})

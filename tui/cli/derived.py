@@ -1,0 +1,117 @@
+"""Everything that is made from the registrations of the commands.
+
+`python -m tui.cli.derived` writes it: the index of commands, the manual page, the JSON Schema, and
+the table of commands in docs/cli.md. Tests compare each.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import pkgutil
+import re
+from pathlib import Path
+
+from tui.drive.small_file import read_small_text
+
+from . import commands
+from .command_index import COMMANDS
+from .documents.json_schema import commands_of, documents, documents_schema
+from .man_page import man_page
+from .shared.registration import RegisteredCommand
+
+CLI = Path(__file__).parent
+DOCS = CLI.parents[1] / "docs"
+INDEX_HEAD = '''"""Commands by name, each with its module and its line of help.
+
+Made by `python -m tui.cli.derived`.
+"""
+
+from __future__ import annotations
+
+COMMANDS: dict[str, tuple[str, str]] = {
+'''
+COMMAND_TABLE = re.compile(r"(<!-- commands -->\n).*?(<!-- end of commands -->)", re.DOTALL)
+
+
+def registered() -> dict[str, RegisteredCommand]:
+    """Every command by its name, hidden ones included; imports all their modules."""
+    names = sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+    modules = [importlib.import_module(f"{commands.__name__}.{name}") for name in names]
+    found = [
+        item
+        for module in modules
+        for item in vars(module).values()
+        if isinstance(item, RegisteredCommand) and _module(item) == module.__name__
+    ]
+    return {item.name or "": item for item in sorted(found, key=lambda item: item.name or "")}
+
+
+def _module(command: RegisteredCommand) -> str:
+    return command.callback.__module__
+
+
+def index() -> dict[str, tuple[str, str]]:
+    """Module and line of help of each command that is listed."""
+    return {
+        name: (_module(command).rpartition(".")[2], command.short_help or "")
+        for name, command in registered().items()
+        if not command.hidden
+    }
+
+
+def command_index() -> str:
+    """The module `command_index`, so that the help and a completion import no command."""
+    rows = (
+        f"    {_quoted(name)}: ({_quoted(module)}, {_quoted(summary)}),\n"
+        for name, (module, summary) in index().items()
+    )
+    return f"{INDEX_HEAD}{''.join(rows)}}}\n"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def with_table(page: str) -> str:
+    """The page docs/cli.md with the table of commands as they are registered."""
+    return COMMAND_TABLE.sub(lambda found: f"{found[1]}{_table()}{found[2]}", page)
+
+
+def _table() -> str:
+    forms = [(commands_of(form), form.__name__) for form in documents()]
+    rows = []
+    for name, command in registered().items():
+        if not command.hidden:
+            printed = ", ".join(f"`{form}`" for by, form in forms if name in by)
+            statuses = ", ".join(map(str, command.all_statuses))
+            link = f"[{name}](#{_anchor(name)})"
+            rows.append(f"| {link} | {command.short_help} | {statuses} | {printed} |")
+    head = ["", "| command | purpose | exit statuses | JSON |", "|---|---|---|---|"]
+    return "\n".join([*head, *rows, "", ""])
+
+
+def _anchor(name: str) -> str:
+    """The section of a command; some have one together."""
+    heads = re.findall(r"^## (.+)$", read_small_text(DOCS / "cli.md"), re.MULTILINE)
+    head = next((head for head in heads if name in head.split(", ")), "the-panel")
+    return head.lower().replace(",", "").replace(" ", "-")
+
+
+def write_derived() -> None:
+    """Write every file that is made from the registrations."""
+    found = index()
+    COMMANDS.clear()
+    COMMANDS.update(found)  # for the manual page: a command may be new
+    page = read_small_text(DOCS / "cli.md")
+    for path, text in (
+        (CLI / "command_index.py", command_index()),
+        (DOCS / "cli.schema.json", documents_schema()),
+        (DOCS / "drivepanel.1", man_page()),
+        (DOCS / "cli.md", with_table(page)),
+    ):
+        path.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_derived()
