@@ -15,7 +15,7 @@ from click.shell_completion import ShellComplete
 from tui.bus.transport.ports import PortInfo
 from tui.cli.command_index import COMMANDS
 from tui.cli.main import main
-from tui.cli.shared.shells import BashByLine
+from tui.cli.shared.completion import BashByLine
 from tui.drive.profile import library
 
 PORTS = [PortInfo("/dev/ttyUSB0", "FTDI"), PortInfo("/dev/ttyUSB1", "CH340")]

@@ -13,8 +13,8 @@ import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, served, wait_until
 from tests.sweeps import kept
-from tui.cli.shared.ending import to_its_end
 from tui.cli.shared.errors import DONE, DRIVE_REFUSED, Failure
+from tui.cli.shared.looking_after import to_its_end
 from tui.session.connect.open_line import OpenLine
 
 from .commands import ended, held, put, refused, run, tcp_line

@@ -9,9 +9,8 @@ import sys
 import pytest
 from rich.console import Console
 
-from tui.cli.shared.messages import Messages
 from tui.cli.shared.output import console, readings_table
-from tui.cli.shared.say import say, say_row
+from tui.cli.shared.say import Messages, say, say_row
 from tui.cli.shared.sets import complain_absent
 from tui.drive.profile import library
 from tui.drive.values import decode

@@ -137,7 +137,7 @@ DEFECTS = (
     ),
     Defect(
         "farewell-not-said-after-an-error",
-        "tui/cli/shared/ending.py",
+        "tui/cli/shared/looking_after.py",
         "        finally:\n            try:",
         "        else:\n            try:",
         "A failed command leaves a timeout running and does not report it.",
@@ -145,7 +145,7 @@ DEFECTS = (
     ),
     Defect(
         "signal-takes-what-was-done",
-        "tui/cli/shared/ending.py",
+        "tui/cli/shared/looking_after.py",
         "                if not came:\n                    raise\n",
         "                raise\n",
         "A late SIGTERM gives a successful command a traceback and status 1.",

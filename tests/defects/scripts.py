@@ -35,7 +35,7 @@ DEFECTS = (
     ),
     Defect(
         "last-of-several-addresses-taken",
-        "tui/cli/shared/devices.py",
+        "tui/cli/shared/options.py",
         "    if len(given) > 1:",
         "    if not given:",
         "A write for one of two drives goes to the first one named.",
@@ -67,7 +67,7 @@ DEFECTS = (
     ),
     Defect(
         "one-missing-line-ends-all",
-        "tui/cli/shared/found_drives.py",
+        "tui/cli/commands/watch.py",
         "            if self._alone:",
         "            if not self._alone:",
         "A gateway that is off keeps a recorder from all other lines.",
@@ -166,7 +166,7 @@ DEFECTS = (
     ),
     Defect(
         "bash-breaks-a-line-at-its-colon",
-        "tui/cli/shared/shells.py",
+        "tui/cli/shared/completion.py",
         'return f"{item.type},{item.value[kept:]}"',
         'return f"{item.type},{item.value}"',
         "Completing sim:atv results in sim:sim:atv.",

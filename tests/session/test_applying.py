@@ -10,7 +10,7 @@ import pytest
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import OUTCOME_UNKNOWN, DeviceException, LineLost, NoAnswer, RequestRefused
 from tui.cli.shared.errors import LINE_TROUBLE, REFUSED_HERE
-from tui.cli.shared.messages import Messages
+from tui.cli.shared.say import Messages
 from tui.cli.shared.sets import ResultTelling, status_of_results
 from tui.drive.settings.memory_orders import MemoryRefused
 from tui.session.read import retrying_reader

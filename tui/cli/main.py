@@ -56,7 +56,7 @@ class Commands(click.Group):
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run the command line, or answer a shell that completes."""
         if os.environ.get(COMPLETE):
-            from .shared.shells import prepare_completion
+            from .shared.completion import prepare_completion
 
             prepare_completion()
         return super().main(*args, **extra)

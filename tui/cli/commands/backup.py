@@ -7,10 +7,9 @@ from pathlib import Path
 import click
 
 from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure
-from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.registration import ON_LINE, command
-from ..shared.say import say
+from ..shared.say import Messages, say
 from ..shared.sets import (
     complain_absent,
     file_argument,

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.devices import devices_option
 from ..shared.errors import USAGE, Failure
-from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
+    devices_option,
     json_option,
     line_argument,
     on_line,
     profile_of,
 )
 from ..shared.registration import ON_LINE, command
+from ..shared.say import Messages
 from ..shared.sets import refuse_existing, write_down
 
 if TYPE_CHECKING:

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.completion import complete_side
-from ..shared.devices import devices_option
 from ..shared.errors import DIFFERENT, USAGE, Failure
 from ..shared.line_argument import LINE_VARIABLE, named_line_of
-from ..shared.options import Target, json_option, never_forced, profile_of
+from ..shared.options import Target, devices_option, json_option, never_forced, profile_of
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive

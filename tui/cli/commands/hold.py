@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Protocol
 import click
 
 from ..running.holding import Holding, keep_polling
-from ..shared.devices import several_devices_option
 from ..shared.errors import LINE_TROUBLE, Failure, status_of
 from ..shared.options import (
     Target,
@@ -21,6 +20,7 @@ from ..shared.options import (
     on_line,
     profile_option,
     read_only_option,
+    several_devices_option,
 )
 from ..shared.pending_timeouts import timeout_field
 from ..shared.registration import ON_LINE, command

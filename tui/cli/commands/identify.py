@@ -10,7 +10,6 @@ import click
 
 from tui.drive.plain import plain
 
-from ..shared.devices import several_devices_option
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, REFUSED_HERE, Failure
 from ..shared.line_argument import mind_the_drive
@@ -21,6 +20,7 @@ from ..shared.options import (
     line_argument,
     on_line,
     read_only_option,
+    several_devices_option,
 )
 from ..shared.pending_timeouts import look_after
 from ..shared.registration import ON_LINE, command

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..shared.errors import INTERRUPTED, Failure
-from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.registration import ON_LINE, command
+from ..shared.say import Messages
 from ..shared.sets import (
     file_argument,
     force_option,

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, TypedDict
 
 import click
 
-from ..shared.devices import devices_option
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE
-from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
+    devices_option,
     json_option,
     line_argument,
     never_forced,
@@ -23,6 +22,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.registration import WRITING, command
+from ..shared.say import Messages
 from ..shared.sets import (
     ResultTelling,
     codes_of,

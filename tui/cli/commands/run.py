@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import click
 
-from ..running.motor import RunOptions, run_motor
+from ..running.telling import BufferedOutput, RunTelling
+from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
+from ..shared.errors import REFUSED_HERE, Failure
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
@@ -16,7 +23,12 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.registration import WRITING, command
-from .orders import arm_option, need_arming
+from .orders import arm_drive, arm_option, carried_out, need_arming, watched
+
+if TYPE_CHECKING:
+    from tui.drive.profile.schema import OrderId
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.console import DriveConsole
 
 
 @command("Run a motor until this command ends.", statuses=WRITING, acts=True)
@@ -75,3 +87,98 @@ def run(
         take_control,
     )
     on_line(target, lambda opened: run_motor(opened, target, wish), read_only=read_only)
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """Options of `run`; `seconds` is the duration."""
+
+    order: OrderId
+    reference: str | None
+    seconds: float | None
+    leave_running: bool
+    unrecorded: bool
+    as_json: bool
+    take_control: bool = False
+    """True if the control is taken from the terminals first."""
+
+
+@dataclass(slots=True)
+class RunCommand:
+    """The run command with its options."""
+
+    console: DriveConsole
+    options: RunOptions
+    telling: RunTelling
+
+    async def prepare(self) -> None:
+        """Arm the drive and take its control, if that is wanted; raises Failure."""
+        arm_drive(self.console)
+        if self.options.take_control:
+            await self._take_control()
+
+    async def give(self) -> None:
+        """Give reference and run command; raises Failure if they are refused."""
+        commander, options = self.console.commander, self.options
+        try:
+            outcome = await carried_out(
+                commander, lambda: commander.run(options.order, options.reference)
+            )
+        except Failure as failure:
+            way = way_to_take(self.console.session)
+            raise Failure(failure.message + way, failure.status) from failure
+        if options.reference is not None:
+            self.telling.report("reference", commander.given.reference_text)
+        self.telling.report("order", outcome.text)
+
+    async def _take_control(self) -> None:
+        """Take the control from the terminals, unless the line has it; raises Failure."""
+        session, options = self.console.session, self.options
+        found = taking_of(session)
+        if found is None or not found.can_take:
+            name = session.profile.name
+            raise Failure(f"{name} has no control to take: run without that option.", REFUSED_HERE)
+        if found.taken:
+            return
+        commander = self.console.commander
+        await carried_out(commander, lambda: commander.check_run(options.order, options.reference))
+        outcome = await carried_out(commander, lambda: commander.order("take-control"))
+        text = (
+            f"{outcome.text}. It stays with the line after this: {GIVE_BACK_OPTION} gives it back."
+        )
+        self.telling.report("control", text)
+
+
+async def run_motor(opened: OpenLine, target: Target, wish: RunOptions) -> None:
+    """Run a motor as wished, to its end."""
+    from tui.session.running.ending import Ending
+    from tui.session.running.motor_run import MotorRun
+    from tui.session.starts.keeper import StartKeeper
+
+    loop, ending = asyncio.get_running_loop(), Ending()
+
+    def gone() -> None:
+        with suppress(RuntimeError):  # the loop has ended: nothing runs any more
+            loop.call_soon_threadsafe(ending.end, "its output is no longer read")
+
+    voice = BufferedOutput(gone)
+    starts = StartKeeper("run")
+    starts.unrecorded, starts.left_running = wish.unrecorded, wish.leave_running
+    with ending.by_signals():
+        try:
+            async with watched(opened, target, starts) as (fleet, console):
+                telling = RunTelling(console.session, voice.say, as_json=wish.as_json)
+                command = RunCommand(console, wish, telling)
+                await MotorRun(
+                    fleet,
+                    console,
+                    ending,
+                    telling,
+                    by="drivepanel run",
+                    prepare=command.prepare,
+                    command=command.give,
+                    seconds=wish.seconds,
+                    leave_running=wish.leave_running,
+                ).carry_out()
+        finally:
+            voice.finish()

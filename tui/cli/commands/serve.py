@@ -25,12 +25,11 @@ from ..plant.publish_options import (
 from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
 from ..shared.completion import complete_line
-from ..shared.devices import devices_option
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors, say_shared
 from ..shared.numbers import SHORTEST_CYCLE, seconds
-from ..shared.options import CONNECT_WITHIN, json_option, profile_of, usual_settings
+from ..shared.options import CONNECT_WITHIN, devices_option, json_option, profile_of, usual_settings
 from ..shared.output import print_json
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -19,7 +21,6 @@ from ..shared.output import json_text, print_json
 from ..shared.registration import command
 from ..shared.say import say, say_beside
 from ..shared.signals import never_suspended
-from ..shared.standard_input import typed_lines
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, Simulation
@@ -282,3 +283,33 @@ def _typed_troubles(faults: tuple[str, ...]) -> dict[str, float]:
         except click.BadParameter:
             raise click.UsageError(f"{text!r}: write KIND=VALUE, for example late=0.15.") from None
     return values
+
+
+BYTES_AT_ONCE = 4096
+BACKGROUND_PAUSE = 1.0
+"""Seconds between two tries while the terminal belongs to another program."""
+
+
+def typed_lines(handle: int = 0) -> Iterator[str]:
+    """Lines without their ends, until the input ends; for a thread of its own.
+
+    Reads the handle itself: a buffered stream that waits would hold up the end of the program. In
+    the background of a shell it waits until the program is in the foreground.
+    """
+    rest = b""
+    while (data := _read(handle)) != b"":
+        *lines, rest = (rest + data).split(b"\n")
+        for line in lines:
+            yield line.decode("utf-8", "replace").rstrip("\r")
+    if rest:
+        yield rest.decode("utf-8", "replace")
+
+
+def _read(handle: int) -> bytes:
+    while True:
+        try:
+            return os.read(handle, BYTES_AT_ONCE)
+        except OSError:
+            if not os.isatty(handle):
+                return b""
+            time.sleep(BACKGROUND_PAUSE)

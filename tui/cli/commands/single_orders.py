@@ -16,7 +16,6 @@ from tui.session.patience import patience
 from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
-from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     drive_options,
@@ -27,6 +26,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.registration import WRITING, command
+from ..shared.say import Messages
 from .orders import (
     arm_drive,
     arm_option,

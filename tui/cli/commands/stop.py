@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from ..running.stop_targets import (
     remembered,
 )
 from ..running.stop_telling import StopTelling
+from ..shared.control import GIVE_BACK_OPTION, taking_of
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure
 from ..shared.left_behind import forget_start
 from ..shared.options import (
@@ -29,7 +31,7 @@ from ..shared.options import (
 from ..shared.output import print_json
 from ..shared.pending_timeouts import PolledDrive, look_after
 from ..shared.registration import WRITING, command
-from .orders import close_journal, complain, journal_document
+from .orders import carried_out, close_journal, complain, journal_document
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -104,8 +106,6 @@ def stop(
         finally:
             close_journal(journal)
         if give_back and not status:
-            from ..running.giving_back import give_control_back
-
             telling.gave_back(await give_control_back(session, arm=arm))
         return status
 
@@ -271,3 +271,32 @@ async def _stop_all(wish: StopWish, named: Sequence[int]) -> int:
     if empty := sorted(set(left) - expected):
         telling.silent(empty, 0)
     return worst or (0 if stops else LINE_TROUBLE)
+
+
+WAITS = "a run command that waits at the terminals starts the motor"
+
+
+async def give_control_back(session: DriveSession, *, arm: bool) -> str:
+    """Give it back; the motor was stopped before. Its result; raises Failure."""
+    from tui.drive.orders import deciding_codes
+    from tui.session.command.commander import Commander
+    from tui.session.read.reader import Reader
+
+    if not arm:
+        raise Failure(
+            f"Not given back: {WAITS}. Look at the machine first, then {GIVE_BACK_OPTION}.",
+            REFUSED_HERE,
+        )
+    await Reader(session).read(deciding_codes(session.profile))
+    found = taking_of(session)
+    if found is None or not found.can_give_back:
+        raise Failure(f"{session.profile.name} has no control to give back.", REFUSED_HERE)
+    journal = journal_document()
+    try:
+        session.arming.arm(seconds=math.inf)
+        commander = Commander(session, journal)
+        outcome = await carried_out(commander, lambda: commander.order("hand-back"))
+        return f"Device {session.device}, {outcome.text}."
+    finally:
+        session.arming.disarm()
+        close_journal(journal)

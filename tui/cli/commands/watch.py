@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
 from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
-from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure
-from ..shared.found_drives import find_drives
+from ..shared.drives import failed
+from ..shared.errors import DONE, INTERRUPTED, LINE_TROUBLE, Failure, failure_of
 from ..shared.numbers import check_rate
 from ..shared.options import (
     Target,
+    connect_drive,
     drives_options,
     every_option,
     force_profile_option,
@@ -26,8 +28,17 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.output import print_json
 from ..shared.registration import ON_LINE, command
-from ..shared.several_lines import LineWish, further_lines, lines_argument, lines_wished, on_lines
+from ..shared.several_lines import (
+    LineWish,
+    connected,
+    further_lines,
+    lines_argument,
+    lines_wished,
+    on_lines,
+)
+from ..shared.silence import silence_hint
 from ..shared.watch_outputs import (
     CsvOutput,
     JsonOutput,
@@ -221,3 +232,69 @@ async def _follow(
         monitor.stop()
     if error:
         seen.silent = since
+
+
+T = TypeVar("T")
+FoundOnLines = list[tuple[LineWish, "DriveSession"]]
+
+
+async def find_drives(
+    lines: Sequence[tuple[OpenLine, LineWish]], *, as_json: bool
+) -> tuple[FoundOnLines, int]:
+    """The wanted drives that are there, in order, and the highest status of the others.
+
+    Errors of one of several are reported; raises it where there is one drive only.
+    """
+    wanted = sum(len(wish.on(opened)) for opened, wish in lines)
+    found = _Finding(alone=wanted == 1, several=len(lines) > 1, as_json=as_json)
+    each = await asyncio.gather(*(found.on_line(opened, wish) for opened, wish in lines))
+    return [pair for some in each for pair in some], found.worst
+
+
+class _Finding:
+    """Finds drives, and reports those that it does not find."""
+
+    def __init__(self, *, alone: bool, several: bool, as_json: bool) -> None:
+        self.worst = DONE
+        self._alone = alone
+        self._several = several
+        self._as_json = as_json
+
+    async def on_line(self, opened: OpenLine, wish: LineWish) -> FoundOnLines:
+        """The drives of one line."""
+        drives = wish.on(opened)
+        there = partial(_there, opened, wish)
+        if self._several and not await self._done(there, opened, wish, drives):
+            return []
+        found: FoundOnLines = []
+        for drive in drives:
+            connect = partial(connect_drive, opened, drive)
+            made = await self._done(connect, opened, wish, [drive])
+            found += [(wish, made)] if made is not None else []
+        return found
+
+    async def _done(
+        self,
+        work: Callable[[], Awaitable[T]],
+        opened: OpenLine,
+        wish: LineWish,
+        drives: Sequence[Target],
+    ) -> T | None:
+        try:
+            return await work()
+        except Exception as error:
+            if self._alone:
+                raise
+            failure = failure_of(error)
+            self.worst = max(self.worst, failure.status)
+            text = failure.message + silence_hint(error, opened, wish.drives[0])
+            for drive in drives:
+                reported = failed(drive, text, failure.status, wish.name if self._several else "")
+                if self._as_json:
+                    print_json(reported, compact=True)
+            return None
+
+
+async def _there(opened: OpenLine, wish: LineWish) -> bool:
+    await connected(opened, wish.name)
+    return True

@@ -8,7 +8,6 @@ import click
 
 from ..shared.completion import complete_setting
 from ..shared.errors import DONE, REFUSED_HERE
-from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
@@ -20,6 +19,7 @@ from ..shared.options import (
     settings_options,
 )
 from ..shared.registration import WRITING, command
+from ..shared.say import Messages
 from ..shared.sets import (
     ResultTelling,
     codes_of,

@@ -1,6 +1,6 @@
-"""Messages to systemd by the protocol of sd_notify: ready, alive, ending.
+"""Messages to systemd by the protocol of sd_notify, and the pulse of a line that they report.
 
-A datagram to the socket that NOTIFY_SOCKET names; without it nothing is sent.
+Each is a datagram to the socket that NOTIFY_SOCKET names; without it nothing is sent.
 """
 
 from __future__ import annotations
@@ -9,7 +9,12 @@ import asyncio
 import logging
 import os
 import socket
+import time
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tui.bus.api import ModbusLine
 
 log = logging.getLogger(__name__)
 
@@ -71,3 +76,26 @@ def _watchdog_seconds(environment: Mapping[str, str]) -> float | None:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
+
+
+PULSE_INTERVAL = 0.5
+STILL_AFTER = 5.0
+"""Seconds without a beat after which a line counts as standing still."""
+
+
+class LinePulse:
+    """Beats in the loop of a line; `alive` may be asked in any thread."""
+
+    def __init__(self, line: ModbusLine) -> None:
+        self._last = time.monotonic()
+        self._worker = line.spawn(self._beat, "pulse")
+
+    @property
+    def alive(self) -> bool:
+        """True if it beat a moment ago."""
+        return not self._worker.done() and time.monotonic() - self._last < STILL_AFTER
+
+    async def _beat(self) -> None:
+        while True:
+            self._last = time.monotonic()
+            await asyncio.sleep(PULSE_INTERVAL)

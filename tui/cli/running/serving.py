@@ -19,8 +19,7 @@ from ..shared.numbers import check_rate
 from ..shared.options import Target
 from ..shared.pending_timeouts import say_farewells
 from ..shared.say import say
-from .line_pulse import LinePulse
-from .service import Service
+from .service import LinePulse, Service
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity

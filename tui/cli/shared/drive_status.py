@@ -15,20 +15,19 @@ from .control import control_field, control_row
 from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
-from .read_until import read_until
-from .watch_rows import watch_field, watch_text
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
     from tui.drive.profile.schema import Quantity
     from tui.session.connect.open_line import OpenLine
+    from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.reading import Reading
     from tui.session.timeout_report import Timeout, TimeoutWatch
 
     from ..documents.drive_documents import StatusDocument
-    from ..documents.parts import ValueField
+    from ..documents.parts import OldTimeoutField, ValueField
 
 log = logging.getLogger(__name__)
 
@@ -301,3 +300,54 @@ def drive_in_a_line(status: Status) -> str:
     return (
         f"{session.device:>3}  {name:<18.18}  {state.headline:<18.18}  {figures}  {fault}".rstrip()
     )
+
+
+def watch_field(watch: TimeoutWatch | None) -> OldTimeoutField | None:
+    """A drive's watch over the line; null where it has none."""
+    from ..documents.parts import OldTimeoutField
+
+    if watch is None:
+        return None
+    return OldTimeoutField(
+        timeout_s=watch.timeout,
+        reaction=watch.reaction.name if watch.reaction else None,
+        does=watch.reaction.does if watch.reaction else None,
+        begun=watch.active,
+    )
+
+
+def watch_text(watch: TimeoutWatch | None) -> str:
+    """Return a drive's reaction to loss of communication, for a person."""
+    if watch is None:
+        return "none: it goes on without communication"
+    if watch.reaction is not None and not watch.acts:
+        return f"off ({watch.reaction.name}): it goes on without communication"
+    reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
+    begins = "" if watch.active else " It begins with the first command or reference."
+    return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"
+
+
+async def read_until(
+    console: DriveConsole, codes: Sequence[str], end: float
+) -> tuple[dict[str, Reading], list[str]]:
+    """Readings by code, the state first, and the codes that did not arrive in time.
+
+    `end` is a time of the loop. Raises the line's errors if nothing comes.
+    """
+    from tui.bus.errors import ExchangeError
+    from tui.session.read.reader import Reader
+    from tui.session.reading import with_text
+
+    readings: dict[str, Reading] = {}
+    failure: Exception | None = None
+    for group in sorted(Reader(console.session).groups(codes), key=lambda g: codes.index(g[0])):
+        try:
+            async with asyncio.timeout_at(end):
+                readings |= with_text(await console.read(group))
+        except (ExchangeError, TimeoutError) as error:
+            if failure is not None and not readings:
+                raise failure from error
+            failure = error
+    if failure is not None and not readings:
+        raise failure
+    return readings, [code for code in codes if code not in readings]

@@ -1,16 +1,19 @@
-"""One command at several drives of a line, in turn."""
+"""One command at several drives of a line, in turn, or at every drive that answers."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
-from .errors import DONE, failure_of
+from .errors import DONE, LINE_TROUBLE, Failure, failure_of
 from .options import Target
 from .output import command_name, print_json
 from .say import say
 
 if TYPE_CHECKING:
+    from tui.session.connect.identify import ScanResult
+    from tui.session.connect.open_line import OpenLine
+
     from ..documents.document import Document, ErrorDocument
 
 Work = Callable[[Target], Awaitable[tuple["Document", int]]]
@@ -70,3 +73,29 @@ def failed_line(line_text: str, line_name: str, text: str, status: int) -> Error
 
     say(f"drivepanel: {line_name}: {text}", err=True)
     return ErrorDocument(command=command_name(), line=line_text, error=text, status=status)
+
+
+USUAL_SEARCH = "1-10"
+"""Addresses that are searched unless others are named."""
+
+
+async def every_drive(opened: OpenLine, target: Target, addresses: str | None) -> Target:
+    """The target with every drive that answers at the addresses, or on a simulated line.
+
+    Raises LinkSyntaxError for invalid addresses, Failure if no drive answers.
+    """
+    from tui.session.connect.addresses import parse_addresses
+    from tui.session.connect.search import Search
+
+    wanted = opened.devices if addresses is None and opened.devices else None
+    devices = wanted or parse_addresses(addresses or USUAL_SEARCH)
+    found: list[int] = []
+
+    async def take(result: ScanResult) -> None:
+        found.append(result.device)
+
+    await Search(devices, patient=opened.simulation is not None).run(opened.line, take)
+    if not found:
+        raise Failure(f"No answer at {addresses or USUAL_SEARCH}.", LINE_TROUBLE)
+    first, *others = sorted(found)
+    return target._replace(device=first, others=tuple(others))

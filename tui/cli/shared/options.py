@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import click
 
 from .completion import complete_profile
-from .devices import CommandFunction, Option, device_option, several_devices_option
-from .ending import to_its_end
 from .line_argument import mind_the_drive, mind_the_line, takes_line
-from .looking_after import guard_motors, say_shared
+from .looking_after import guard_motors, say_shared, to_its_end
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
 from .say import say
 from .signals import never_suspended
@@ -27,6 +25,56 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 T = TypeVar("T")
+
+CommandFunction = Callable[..., Any]
+Option = Callable[[CommandFunction], CommandFunction]
+
+SLAVE_ADDRESS = click.IntRange(1, 247)
+
+
+def one_device(_: click.Context, option: click.Parameter, given: tuple[int, ...]) -> int | None:
+    """The one address of an option -d that may be given once; the last would win otherwise."""
+    if len(given) > 1:
+        raise click.BadParameter("once only: this command is for one drive.", param=option)
+    return given[0] if given else None
+
+
+device_option = click.option(
+    "-d",
+    "--device",
+    type=SLAVE_ADDRESS,
+    multiple=True,
+    callback=one_device,
+    default=(1,),
+    show_default=True,
+    metavar="ADDRESS",
+    help="Use the drive at this slave address.",
+)
+several_devices_option = click.option(
+    "-d",
+    "--device",
+    type=SLAVE_ADDRESS,
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    metavar="ADDRESS",
+    help="Use the drive at this slave address; repeatable.",
+)
+
+
+def devices_option(help_text: str, **more: Any) -> Option:
+    """The option -d of a command that takes several drives; `more` goes to click."""
+    return click.option(
+        "-d",
+        "--device",
+        "devices",
+        type=SLAVE_ADDRESS,
+        multiple=True,
+        metavar="ADDRESS",
+        help=help_text,
+        **more,
+    )
+
 
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""

@@ -82,3 +82,22 @@ def printable(text: str, encoding: str | None) -> str:
     """The text with its control characters as signs, or `?` where the encoding has none."""
     encoding = encoding or "utf-8"
     return plain(text, lines=True).encode(encoding, "replace").decode(encoding)
+
+
+class Messages:
+    """Sentences of one command; with `as_json` standard output is kept free of them."""
+
+    def __init__(self, *, as_json: bool) -> None:
+        self.as_json = as_json
+        self.texts: list[str] = []
+
+    def tell(self, text: str, *, indent: int = 0) -> None:
+        """Report a notice; continuation lines are indented by so many columns."""
+        self.texts.append(text)
+        if not self.as_json:
+            say(text, indent=indent)
+
+    def complain(self, text: str) -> None:
+        """Report a problem; on standard error in any case."""
+        self.texts.append(text)
+        say(f"drivepanel: {text}", err=True)

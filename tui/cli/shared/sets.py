@@ -22,9 +22,8 @@ from .errors import (
     USAGE,
     Failure,
 )
-from .messages import Messages
 from .options import Target, connect_drive, on_line
-from .say import say_over
+from .say import Messages, say_over
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edit

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from .ending import to_its_end
 from .line_argument import LineArgument, mind_the_line, named_line_of, takes_line_as
 from .lines import is_known_name, is_written_out
-from .looking_after import guard_motors, say_shared
+from .looking_after import guard_motors, say_shared, to_its_end
 from .options import CONNECT_WITHIN, Target, usual_settings
 from .signals import never_suspended
 

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from tui.session.reading import Reading, with_text
-
 from .csv_files import CsvFile
 from .output import (
     console,
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.monitor.snapshot import Snapshot
+    from tui.session.reading import Reading
 
     from ..documents.drive_documents import CycleDocument
     from ..documents.parts import WatchedValueField
@@ -96,6 +95,8 @@ class JsonOutput:
 
 def cycle_document(line_text: str, session: DriveSession, snapshot: Snapshot) -> CycleDocument:
     """One cycle: values with their own times, state, direction and error."""
+    from tui.session.reading import with_text
+
     from ..documents.drive_documents import CycleDocument, CycleTime
 
     return CycleDocument(
@@ -147,6 +148,8 @@ class LineOutput:
 
     def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as a line; a value that is not good is in brackets."""
+        from tui.session.reading import with_text
+
         values = "  ".join(
             _shown(code, read) for code, read in with_text(snapshot.readings).items()
         )
@@ -167,6 +170,8 @@ class TableOutput:
     def take(self, watched_drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Show one cycle in place of the one before."""
         from rich.console import Group
+
+        from tui.session.reading import with_text
 
         self._latest[watched_drive] = snapshot
         tables = []
@@ -193,6 +198,8 @@ class CsvOutput:
 
     def take(self, drive: WatchedDrive, snapshot: Snapshot) -> None:
         """Write one cycle as a row."""
+        from tui.session.reading import with_text
+
         readings = with_text(snapshot.readings)
         cells = [self._cell(code, readings.get(code)) for code in self._units]
         state = snapshot.state
