@@ -288,7 +288,7 @@ async def test_refusals(family: str, sets: dict[str, int], order: str, text: str
     ("typed", "text"),
     [
         ("fast", "is not a reference"),
-        ("-5", "not negative"),
+        ("-5", "cannot be negative"),
         ("90Hz", "above HSP"),
         ("3Hz", "below LSP = 5"),
         ("9000rpm", "above HSP"),

@@ -26,7 +26,7 @@ async def test_only_what_differs_is_written() -> None:
         made.commander.configure(source)
         assert "FR2, RFC" in await made.done()
         made.commander.configure(source)
-        assert "nothing was to be changed" in await made.done()
+        assert "no change was necessary" in await made.done()
 
 
 async def test_never_while_the_motor_turns() -> None:

@@ -50,7 +50,7 @@ async def test_stop_of_a_guessed_drive_sends_its_word_and_reports_not_stopped(
     assert report.phase is Phase.FAILED
     assert report.text == (
         "NOT STOPPED: it is not known if the motor stopped. The drive does not identify itself."
-        " Read as Powerdrive, it is at standstill. Look at the machine, or name its profile."
+        " Read as Powerdrive, it is at standstill. Check the machine, or name its profile."
     )
     # nor does what is read by that guess afterwards take it off the screen
     session.rest_seen = time.monotonic()

@@ -414,7 +414,7 @@ def test_a_stop_overtakes_a_start_that_is_being_recorded(
             lambda: bool(starts._waiting if ahead else starts._current), "the start on its way"
         )
         starts.note_stop(LINE, 2)
-        with pytest.raises(StartOvertaken, match="A stop of drive 2 came before its start"):
+        with pytest.raises(StartOvertaken, match="a stop of drive 2 came before its start"):
             begun.result(PATIENCE)
         hung.set()
         if ahead:

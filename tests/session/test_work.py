@@ -333,7 +333,7 @@ async def test_tasks_after_a_failed_one_are_dropped(reported: Notified) -> None:
     reported.put("b")
     reported.put("c")
     assert await reported.idle() == ["a begun", "b given up", "c given up", "a given up"]
-    text = "The drive is in fault. The commands behind it were dropped."
+    text = "The drive is in fault. The commands after it were canceled."
     assert reported.outcome() == (OutcomeKind.REFUSED, text)
     assert reported.queue.outcome is not None
     assert reported.queue.outcome.error is refused

@@ -1,4 +1,4 @@
-"""True if a drive may be written to from here: until when, and why no longer."""
+"""Arming of one drive: until when this program may write to it, and why no longer."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .clock import REAL_CLOCK, Clock
 
 
 class NotArmed(OrderRefused):
-    """A write or command to a drive that is not armed."""
+    """The drive is not armed, so nothing is written to it."""
 
     def __init__(self, why: str = "") -> None:
         super().__init__(why or "Not armed. Press a to arm this drive.")
 
 
 class CommandedElsewhere(OrderRefused):
-    """Another program on the line commands the drive."""
+    """Another program on the line commands the drive, so it cannot be armed."""
 
 
 class Arming:
-    """Lets writes to one drive through for a while; whatever writes asks here."""
+    """Allows writes to one drive for a limited time; every write checks it first."""
 
     def __init__(
         self,
@@ -33,8 +33,7 @@ class Arming:
         device: int | None = None,
         care: Callable[[], bytes] = bytes,
     ) -> None:
-        """`care` is passed to the holder of the line: how the drive is stopped without this
-        program."""
+        """`care` returns the data by which the owner of the line can stop the drive."""
         self._line = line
         self._device = device
         self._care = care
@@ -44,18 +43,18 @@ class Arming:
         self.why_disarmed = ""
         """Why arming ended without a command; empty if it did not."""
         self.times = 0
-        """Number of times it was armed."""
+        """Number of times that the drive was armed."""
         self.trouble: Callable[[], str] = str
-        """Returns what is wrong with the drive's replies so that nothing may be written now."""
+        """Returns the defect of the drive's replies that forbids writing; empty if none."""
         self.barred = ""
-        """Why the drive is not to be armed at all, for a person; empty where it may be."""
+        """Why the drive must never be armed, for a person; empty if it may be."""
 
     def arm(self, *, seconds: float = ARMED_FOR) -> None:
-        """Let writes through from now on.
+        """Allow writes from now on.
 
-        `seconds` is how long without a key; math.inf for a command that ends on its own. Raises
-        OrderRefused on a line that is read-only, or held until a person says otherwise, and where
-        it is barred; CommandedElsewhere where another program commands the drive.
+        `seconds` is the time without a key until it ends; math.inf for a command that disarms on
+        its own. Raises OrderRefused if the line is read-only, or held until a person accepts it,
+        or the drive is barred. Raises CommandedElsewhere if another program commands the drive.
         """
         if why := self.hindrance:
             raise OrderRefused(why)
@@ -69,13 +68,13 @@ class Arming:
 
     @property
     def hindrance(self) -> str:
-        """Why the drive cannot be armed now, whatever a person does here; empty if it can."""
+        """Why the drive cannot be armed now; empty if it can."""
         if self._line.read_only:
             return "The line is read-only: nothing is written."
         return self._line.held or self.barred or self.trouble()
 
     def disarm(self, why: str = "") -> None:
-        """Let no write through any more."""
+        """Refuse all writes from now on; `why` is shown to a person."""
         self._until = None
         self.why_disarmed = why
         if self._device is not None:
@@ -83,7 +82,7 @@ class Arming:
             self._line.facts.leases.disarm(self._device)
 
     def touch(self) -> None:
-        """A key was pressed, or work goes on: an armed drive stays armed."""
+        """Restart the time of an armed drive, after a key or during work."""
         if self.armed_for is not None:
             self._until = self._clock.monotonic() + self._span
             if self._device is not None:
@@ -91,7 +90,7 @@ class Arming:
 
     @property
     def armed_for(self) -> float | None:
-        """Seconds for which the drive is armed yet, maybe infinite; None when it is not."""
+        """Seconds until the drive is disarmed, maybe infinite; None if it is not armed."""
         until = self._until
         if until is None:
             return None
@@ -111,11 +110,11 @@ class Arming:
 
     @property
     def armed(self) -> bool:
-        """True if writes are let through now."""
+        """True if writes are allowed now."""
         return self.armed_for is not None
 
     def refusal(self) -> str:
-        """Why nothing may be written now; empty where it may."""
+        """Return why nothing may be written now; empty if it may."""
         return "" if self.armed else self.why_disarmed or "Not armed. Press a to arm this drive."
 
 

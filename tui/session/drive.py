@@ -1,4 +1,4 @@
-"""One drive on a line: what it is, what is known of it, what is being done to it, who may."""
+"""One drive on a line: its identity, its known values, the work on it, its arming."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from .starts.keeper import StartKeeper
 from .timeout_report import Timeout
 from .work import WorkQueue
 
-OWN_PROFILE = "Nothing is written by a profile that is not the drive's own."
+OWN_PROFILE = "Drive Panel does not write with the profile of another drive."
 
 
 class DriveSession:
     """A drive with its profile; the one owner of its registers, its work and its arming.
 
-    It knows none of those who read, watch, command or edit the drive. For any thread.
+    It knows no reader, monitor, commander or editor of the drive. For any thread.
     """
 
     def __init__(
@@ -54,22 +54,23 @@ class DriveSession:
         self.family = profile
         """Facts about every drive of its family."""
         self.profile = profile
-        """The same, with what a person has taught of this drive."""
+        """The same, with the scales that were learned for this drive."""
         self.identity = identity
         self.clock = clock
         """Clock of all work with the drive."""
         self.image = RegisterImage(profile, clock)
         """Known values of its registers."""
         self.arming = Arming(line, clock, device, self.care)
-        """True if it may be written to from here."""
+        """Until when this program may write to it."""
         self.guessed = False
-        """True if its family was neither named nor told by the drive: never told as stopped."""
+        """True if its family was neither named nor reported by the drive; it is then never
+        reported as stopped."""
         self.contradiction = contradiction(identity, profile)
         """Contradiction between the drive's reported identity and its profile; empty if none."""
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.byte_order = ByteOrder(device)
-        """True if the bytes of its words arrive as they should."""
+        """Evidence that the bytes of its words arrive swapped."""
         self.arming.trouble = lambda: self.byte_order.text
         self.work = WorkQueue(line, device, self.arming, clock)
         """Work in progress on it; a stop ends it."""
@@ -77,31 +78,31 @@ class DriveSession:
         self.ratings: dict[str, Rating] = {}
         """Value of 100 %, by code, that a person entered from the nameplate."""
         self.commanded_at: float | None = None
-        """When a command or reference was last sent to the drive from here (monotonic)."""
+        """When this program last sent it a command or reference (monotonic); None if never."""
         self.timeout: Timeout | None = None
         """Its communication timeout; None before it was read."""
         self.reported_by_line = False
-        """True if a command or reference word was written to it from here, a stop among them."""
+        """True if this program has written a command, reference or stop word to it."""
         self.unsaved_settings = UnsavedSettings()
         """Settings written by this program that are lost at power-off until the drive saves
         them."""
         self.followed: tuple[str, ...] = ()
-        """Codes of words that were written from here and are polled on."""
+        """Codes of command words that this program has written; they are polled."""
         self.prepared = prepared_stop(line, device, [profile])
-        """The frames that stop it in any chart, for when its usual stop fails by an error here."""
+        """Frames that stop it in any chart, sent if an internal error prevents its usual stop."""
         self.starts: StartKeeper | None = None
         """Records of its motor's starts; None if they are not kept."""
         self.rest_seen = -math.inf
         """When the motor was last seen at rest, or in an unknown state (monotonic)."""
         self.stirs = 0
-        """Counts the moments after which every value is worth a new look."""
+        """Number of requests to re-read every value."""
         line.describe(device, limits_of(profile))
         self._hear_others()
 
     def _hear_others(self) -> None:
-        """Obey the stops of other programs on the line, and lose the drive to another commander.
+        """Obey the stops of other programs, and disarm if another program commands the drive.
 
-        A session that nobody holds any more hears nothing.
+        The subscription ends with the session.
         """
         held = weakref.ref(self)
 
@@ -120,12 +121,12 @@ class DriveSession:
         weakref.finalize(self, self.line.facts.events.subscribe(hear))
 
     def care(self) -> bytes:
-        """The care for the drive: how another process can stop it, should this one end."""
+        """Return the data by which another process can stop the drive if this one ends."""
         return packed_care(self.family, self.identity, guessed=self.guessed)
 
     @property
     def known_identity(self) -> DriveIdentity:
-        """Identity that the drive reports; empty if it reports none."""
+        """Identity that the drive reports; with empty fields if it reports none."""
         return self.identity or DriveIdentity(self.device, "", "", "", "", None, ())
 
     @property
@@ -135,25 +136,25 @@ class DriveSession:
 
     @property
     def commanded(self) -> bool:
-        """True if a command or reference was sent to the drive from here."""
+        """True if this program has sent the drive a command or reference."""
         return self.commanded_at is not None
 
     def learn(self, profile: Profile) -> None:
-        """Go by the family's profile with what was taught of this drive."""
+        """Use a profile with the scales that were learned for this drive."""
         self.profile = profile
         self.request_full_read()
 
     def note_command(self) -> None:
-        """A command or reference was sent."""
+        """Remember that this program has sent a command or reference now."""
         self.reported_by_line = True
         self.commanded_at = self.clock.monotonic()
 
     def note_given(self) -> None:
-        """Another program commands the drive: what its motor does is no longer from here."""
+        """Remember that another program commands the drive now."""
         self.commanded_at = None
 
     def take(self, found: Mapping[str, Reading]) -> None:
-        """Keep what was read. Raises BytesSwapped, and forgets all, while words arrive swapped."""
+        """Store readings. While bytes arrive swapped, forget all values and raise BytesSwapped."""
         self.byte_order.note(self.profile, found, self.clock.monotonic())
         if (error := self.byte_order.error) is not None:
             self.image.forget()
@@ -165,7 +166,10 @@ class DriveSession:
         self.stirs += 1
 
     def note_state(self, kind: str, time: float) -> None:
-        """The drive was seen in a state: what needs a motor at rest may be changed in it."""
+        """Note the kind of state in which the drive was seen at a time (monotonic).
+
+        Settings that need standstill may have been changed in any state but a running one.
+        """
         if kind in ("running", "stopping"):
             return
         self.rest_seen = max(self.rest_seen, time)
@@ -174,13 +178,13 @@ class DriveSession:
 
     @property
     def line_text(self) -> str:
-        """The line as it is written."""
+        """The line as a person types it."""
         return label(self.line.link)
 
     def state(self, longest: float) -> ChartState:
-        """The drive's state by its words; unknown where its status is older than so many s.
+        """Return the drive's state; unknown if its status is older than `longest` seconds.
 
-        An old fault word shows nothing: the fault may have been reset since.
+        An old fault word is ignored: the fault may have been reset since.
         """
         raws = self.image.trusted
         chart = self.profile.chart(raws)
@@ -195,8 +199,8 @@ class DriveSession:
 class UnsavedSettings:
     """Raw values of settings that the drive keeps until power-off only, unless it saves them.
 
-    What is saved is the value read before the first write from here, as long as nothing else has
-    changed it since. If that value is not known, the setting counts as unsaved. For any thread.
+    The saved value is the one read before the first write of this program, unless another source
+    has changed it since. If that value is not known, the setting counts as unsaved. For any thread.
     """
 
     def __init__(self) -> None:
@@ -207,13 +211,13 @@ class UnsavedSettings:
 
     @property
     def codes(self) -> frozenset[str]:
-        """The settings whose value is not known to be the saved one."""
+        """Settings whose value is not known to be the saved one."""
         with self._lock:
             held = self._held.items()
             return frozenset(c for c, raw in held if raw is None or raw != self._saved[c])
 
     def note_write(self, code: str, before: int | None, now: int | None) -> None:
-        """Note a write: what the drive held before it, and holds now; None if not known."""
+        """Note a write, with the raw values before and after it; None if not known."""
         with self._lock:
             if code not in self._saved:
                 self._saved[code] = before if self._known else None
@@ -222,25 +226,28 @@ class UnsavedSettings:
             self._held[code] = now
 
     def note_value(self, code: str, raw: int) -> None:
-        """Note what a setting holds that was written without a sure reply."""
+        """Note the value of a setting whose write had no clear reply."""
         with self._lock:
             if code in self._held:
                 self._held[code] = raw
 
     def forget_values(self) -> None:
-        """Many settings may have changed: from now on no value read is known to be saved."""
+        """Count no value as saved from now on, because many settings may have changed."""
         with self._lock:
             self._known = False
             self._saved = dict.fromkeys(self._saved)
 
     def clear(self) -> None:
-        """The drive has saved all settings, or lost what was not saved."""
+        """Forget all, because the drive has saved its settings, or lost the unsaved ones."""
         with self._lock:
             self._saved, self._held, self._known = {}, {}, True
 
 
 class CareData(msgspec.Struct, frozen=True):
-    """The care for one drive, as it goes to the holder of its line."""
+    """Data by which the owner of the line can stop a drive without its program.
+
+    It contains the profile: the owner may have other profile files, or the file may have changed.
+    """
 
     profile: Annotated[bytes, Meta(max_length=MOST_CARE)]
     """As Profile.packed."""
@@ -249,5 +256,5 @@ class CareData(msgspec.Struct, frozen=True):
 
 
 def packed_care(profile: Profile, identity: DriveIdentity | None, *, guessed: bool) -> bytes:
-    """The bytes of the care for a drive."""
+    """Encode the data by which another process can stop a drive."""
     return msgspec.msgpack.encode(CareData(profile.packed, identity, guessed))

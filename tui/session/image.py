@@ -1,6 +1,6 @@
 """Known values of a drive's registers: raw values that the drive itself reported, with their time.
 
-Only replies of the drive come in here, as readings without a value: what scales them may change.
+Only replies of the drive are stored, and only raw: the scale of a value may change later.
 A write makes its word unknown until it is read back.
 """
 
@@ -21,14 +21,14 @@ from .reading import Origin, Reading
 
 @dataclass(frozen=True)
 class _State:
-    """Everything at one moment; replaced as a whole, so that any thread may look."""
+    """All values at one moment; replaced as a whole, so that any thread may read it."""
 
     held: Mapping[str, Reading]
     refused: Mapping[str, Reading]
     since: float
     """Time before which values may be outdated."""
 
-    # worked out where somebody asks: replies come far more often
+    # calculated on demand: replies arrive far more often than anything reads these
     @cached_property
     def raws(self) -> Mapping[str, int]:
         return MappingProxyType(
@@ -42,9 +42,9 @@ class _State:
 
 
 class RegisterImage:
-    """The registers of one drive by code, as its replies told them; for any thread.
+    """Registers of one drive by code, from its replies; for any thread.
 
-    A newer reply counts, however late an older one is handed in.
+    The newer of two replies counts, in whichever order they are passed in.
     """
 
     def __init__(self, profile: Profile, clock: Clock = REAL_CLOCK) -> None:
@@ -53,52 +53,52 @@ class RegisterImage:
         self._lock = threading.Lock()
         self._now = _State({}, {}, -math.inf)
         self._doubted: dict[str, float] = {}
-        """When a word was last written, or may have been."""
+        """When a word was last written, or may have been (monotonic)."""
         self._trusted_from = -math.inf
         self._waiting_for: dict[str, Callable[[int], None]] = {}
         """Callers that wait for the value of a word written without a sure answer."""
 
     @property
     def raws(self) -> Mapping[str, int]:
-        """The last raw value of every register that was read."""
+        """Last raw value by code, however old."""
         return self._now.raws
 
     @property
     def trusted(self) -> Mapping[str, int]:
-        """The raw values that decisions may rest on: read since the drive may have changed."""
+        """Raw values that decisions may use: read since the drive may last have been reset."""
         return self._now.trusted
 
     @property
     def refused(self) -> Mapping[str, Reading]:
-        """The registers that the drive refused, or met with silence, when they were last read."""
+        """Registers that the drive refused, or did not answer, when they were last read."""
         return self._now.refused
 
     @property
     def lacking(self) -> frozenset[str]:
-        """Codes that the drive itself said it does not have."""
+        """Codes that the drive itself reported as missing."""
         return frozenset(code for code, reading in self._now.refused.items() if reading.absent)
 
     def get(self, code: str) -> Reading | None:
-        """Return the value of a register; None if it was never read, or is unknown by now."""
+        """Return the last reading of a register; None if never read, or written since."""
         return self._now.held.get(code)
 
     def changed(self, code: str) -> float:
-        """When a register was last read or written; minus infinity if it never was."""
+        """Return when a register was last read or written (monotonic); -inf if it never was."""
         held = self._now.held.get(code)
         return max(self._doubted.get(code, -math.inf), -math.inf if held is None else held.time)
 
     def age(self, code: str) -> float:
-        """Seconds since a register's value was on the wire; infinite where it is not known."""
+        """Return the seconds since a register's value was on the wire; infinite if not known."""
         held = self._now.held.get(code)
         return math.inf if held is None else held.age(self._clock.monotonic())
 
     def fresh(self, longest: float) -> dict[str, int]:
-        """Trusted raw values no older than so many seconds."""
+        """Return the trusted raw values that are at most `longest` seconds old."""
         state, oldest = self._now, self._clock.monotonic() - longest
         return {c: raw for c, raw in state.trusted.items() if state.held[c].time >= oldest}
 
     def take(self, found: Mapping[str, Reading]) -> None:
-        """Keep replies of the drive: values, and refusals."""
+        """Store values and refusals of the drive; call those that wait for one."""
         reported: list[tuple[Callable[[int], None], int]] = []
         with self._lock:
             held, refused = dict(self._now.held), dict(self._now.refused)
@@ -121,16 +121,16 @@ class RegisterImage:
             requested(raw)
 
     def tell_once(self, code: str, reported: Callable[[int], None]) -> None:
-        """Call back with what a word holds as soon as it is read again, before its next write."""
+        """Call back with the value of a word at its next read, unless it is written before."""
         with self._lock:
             self._waiting_for[code] = reported
 
     def confirm(self, code: str, raw: int, time: float, origin: Origin = Origin.READ_BACK) -> None:
-        """Keep one raw value that was read at a time on the monotonic clock."""
+        """Store one raw value that was read at a time (monotonic)."""
         self.take({code: Reading.undecoded(self._profile[code], raw, time, origin)})
 
     def doubt(self, code: str) -> None:
-        """A word is being written: what it holds is unknown until it is read again."""
+        """Make a word unknown until it is read again, because it is being written."""
         with self._lock:
             self._waiting_for.pop(code, None)
             self._doubted = {**self._doubted, code: self._clock.monotonic()}
@@ -138,21 +138,21 @@ class RegisterImage:
             self._set(held, self._now.refused)
 
     def believe(self, code: str, before: Reading | None) -> None:
-        """The write of a word was never sent: what was known of it before still holds."""
+        """Restore the reading of a word whose write was never sent."""
         with self._lock:
             self._doubted = {c: at for c, at in self._doubted.items() if c != code}
             if before is not None and code not in self._now.held:
                 self._set({**self._now.held, code: before}, self._now.refused)
 
     def distrust(self) -> None:
-        """The drive may have been reset: no decision rests on what was read before now."""
+        """Trust no value that was read before now, because the drive may have been reset."""
         with self._lock:
             self._trusted_from = self._clock.monotonic()
             silent = {c: reading for c, reading in self._now.refused.items() if reading.silent}
             self._set(self._now.held, silent)
 
     def forget(self, codes: Iterable[str] | None = None) -> None:
-        """Another drive may answer now, or these words may hold anything: nothing is known."""
+        """Forget these codes, or all: another drive may answer, or a command has changed them."""
         with self._lock:
             gone = None if codes is None else set(codes)
             held = self._now.held.items()

@@ -1,7 +1,7 @@
 """Work on one drive: one task after another, and a stop that ends them all.
 
-Every task carries the count of stops under which it was typed. Once the count has risen the task
-is refused: when it is handed in, when its turn comes, and before each frame that it sends.
+Every task carries the stop count of the moment when it was typed. Once the count has risen, the
+task is refused: when it is queued, when its turn comes, and before each frame that it sends.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from .clock import REAL_CLOCK, Clock
 log = logging.getLogger(__name__)
 
 MOST_WAITING = 4
-"""Tasks that may wait behind the one that is being carried out."""
+"""Tasks that may wait while another one is in progress."""
 BY_STOP = "ended by a stop"
 STOPPED_DISARMS = "Stopped: no longer armed."
 
 
 class Stopped(OrderRefused):
-    """Work that a stop has ended; nothing more of it goes out."""
+    """A stop has ended this work; no more of its frames are sent."""
 
     def __init__(self, by: str = "") -> None:
         super().__init__(f"Not sent: a stop came after it{f' ({by})' if by else ''}.")
 
 
 class OutcomeKind(StrEnum):
-    """Kind of an outcome."""
+    """Progress or result of work."""
 
     WORKING = "working"
     DONE = "done"
@@ -53,24 +53,24 @@ class Outcome:
     text: str
     time: float
     error: Exception | None = None
-    """Refusal, and its source."""
+    """The error of a refusal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Permit:
-    """The right of one task to write to its drive; asked before each frame."""
+    """Permission of one task to write to its drive; checked before each frame."""
 
     queue: WorkQueue
     stamp: int
 
     def refusal(self) -> str:
-        """Why no frame of this task may go out any more; empty where it may."""
+        """Return why no further frame of this task may be sent; empty if it may. Any thread."""
         if self.stamp != self.queue.stops:
             return str(Stopped(self.queue.stopped_by))
         return self.queue.arming.refusal()
 
     def check(self) -> None:
-        """Raise Stopped or NotArmed where nothing more may be written; work keeps it armed."""
+        """Raise Stopped or NotArmed if nothing may be written; else restart the arming time."""
         if self.stamp != self.queue.stops:
             raise Stopped(self.queue.stopped_by)
         if why := self.queue.arming.refusal():
@@ -80,33 +80,33 @@ class Permit:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Something to be done to a drive, by whichever screen or command."""
+    """Work on a drive, for a screen or a command."""
 
     carry_out: Callable[[Permit], Awaitable[str]]
-    """Does it, and returns what was done, for a person."""
+    """Does the work; returns its result as shown to a person."""
     owner: object = None
-    """Whose work it is."""
+    """The object that queued it; see `WorkQueue.busy_for`."""
     working: str = ""
     """Text while the work is in progress."""
     given_up: Callable[[], str | None] | None = None
-    """Called, in any thread, where it ends without having been done; says what was done of it."""
+    """Called in any thread if it ends undone; may return a text about the part that was done."""
     armed: bool = True
     """True if the drive must be armed for it."""
 
 
 class WorkQueue:
-    """Takes the work on one drive from any thread; knows its stops and its last outcome."""
+    """Queue of the work on one drive, with its stop count and last outcome; for any thread."""
 
     def __init__(
         self, line: ModbusLine, device: int, arming: Arming, clock: Clock = REAL_CLOCK
     ) -> None:
         self.arming = arming
         self.outcome: Outcome | None = None
-        """Result of the last work: the one truth about this drive."""
+        """Result of the last work, by whichever screen or command; None before the first."""
         self.stops = 0
-        """Number of stops given to this drive by this program."""
+        """Number of stops of this drive, by this program or another one."""
         self.stopped_by = ""
-        """Program of the last stop."""
+        """Source of the last stop, for a person."""
         self.on_tell: Callable[[Outcome], None] = lambda _: None
         """Called, in any thread, with each outcome that is reported."""
         self.on_change: Callable[[], None] = lambda: None
@@ -119,9 +119,9 @@ class WorkQueue:
         self._doing: Task | None = None
         self._worker: LineWorker | None = None
         self._turn = object()
-        """Whose turn it is to take tasks: a worker that a stop has ended takes none."""
+        """Identity of the current worker: one that a stop has ended must take no task."""
 
-    # Telling
+    # Results
 
     def tell(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
         """Report the result of work on the drive."""
@@ -142,24 +142,24 @@ class WorkQueue:
         return any(task is not None and task.owner is owner for task in tasks)
 
     def permit(self, stamp: int | None = None) -> Permit:
-        """The right to write under a stamp, the present one by default.
+        """Return a permit for a stop count (default: the current one).
 
-        Raises Stopped where a stop came since, NotArmed where the drive is not armed.
+        Raises Stopped if there was a stop since, NotArmed if the drive is not armed.
         """
         made = Permit(self, self.stops if stamp is None else stamp)
         made.check()
         return made
 
     def arm(self, stamp: int, seconds: float) -> None:
-        """Arm the drive, unless it was given a stop since that count; raises as `Arming.arm`."""
-        with self._lock:  # a stop comes before it, or after it and ends it
+        """Arm the drive, unless it was stopped since that count; raises as `Arming.arm`."""
+        with self._lock:  # a stop is either before it and counted, or after it and disarms
             if stamp == self.stops:
                 self.arming.arm(seconds=seconds)
 
     def put(self, task: Task, stamp: int | None = None) -> None:
-        """Do a task behind those before it; `stamp` is the count of stops when it was typed.
+        """Queue a task; `stamp` is the stop count when it was typed (default: the current one).
 
-        Raises Stopped, NotArmed, and OrderRefused where the line is lost or too many wait.
+        Raises Stopped, NotArmed, and OrderRefused if the line is lost or too many tasks wait.
         """
         with self._lock:
             permit = Permit(self, self.stops if stamp is None else stamp)
@@ -179,24 +179,24 @@ class WorkQueue:
                 self._worker = self._line.spawn(lambda: self._serve(turn), f"work {self._device}")
 
     def stop(self, by: str = "") -> None:
-        """A stop was given: end what is being done, forget what waits, disarm."""
+        """Raise the stop count, end the work in progress, drop what waits, and disarm."""
         with self._lock:
             self.stops += 1
             self.stopped_by = by
             worker, self._worker, self._doing = self._worker, None, None
             self._turn = object()
-            # one that is told of twice leaves the reason of the first
+            # the second report of one stop must not erase the reason that the first has left
             reported = self.arming.why_disarmed == STOPPED_DISARMS
             why = STOPPED_DISARMS if self.arming.armed or reported else ""
             self.arming.disarm(why)
         if worker is not None:
             worker.cancel()
-        # a worker that had no time to begin would leave them to the next task
+        # a worker that has not begun yet drops nothing
         if self.drop(BY_STOP):
             self.tell(OutcomeKind.REFUSED, f"Not done: {BY_STOP}.", Stopped(by))
 
     def drop(self, why: str) -> bool:
-        """Forget the tasks that wait; True if there were any."""
+        """Drop the tasks that wait; return True if there were any."""
         with self._lock:
             waiting, self._waiting = self._waiting, deque()
         for task, _ in waiting:
@@ -221,7 +221,7 @@ class WorkQueue:
             return None
 
     async def _one(self, task: Task, permit: Permit, turn: object) -> None:
-        """One task; where it fails, those behind it are not carried out."""
+        """Carry out one task; if it fails, drop those that wait."""
         try:
             if permit.stamp != self.stops:
                 raise Stopped(self.stopped_by)
@@ -244,13 +244,13 @@ class WorkQueue:
             self.on_change()
 
     def _fail(self, task: Task, turn: object, error: Exception, text: str) -> None:
-        # behind a stop wait tasks of another turn
+        # tasks that wait after a stop belong to another worker
         dropped = turn is self._turn and self.drop("a command before it was refused")
-        rest = " The commands behind it were dropped." if dropped else ""
+        rest = " The commands after it were canceled." if dropped else ""
         self.tell(OutcomeKind.REFUSED, f"{text}{rest}{_given_up(task)}", error)
 
 
 def _given_up(task: Task) -> str:
-    """Let a task end undone; what it says of that, with a space before it."""
+    """End a task undone; return its text about that with a leading space, or an empty string."""
     message = task.given_up() if task.given_up is not None else None
     return f" {message}" if message else ""

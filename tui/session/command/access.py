@@ -1,4 +1,4 @@
-"""Common steps of every command: read its conditions, write as long as permitted."""
+"""Steps that all commands share: read the conditions, write, wait for a state of the chart."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ STATE_POLL_INTERVAL = 0.05
 
 
 class NotFollowed(OrderRefused):
-    """A command that was sent, and whose state the drive did not reach."""
+    """A command was sent, but the drive did not reach its state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,21 +45,21 @@ class CommandAccess(Writer):
 
     @property
     def raws(self) -> Mapping[str, int]:
-        """Raw values as last read."""
+        """Last raw values by code, however old."""
         return self.session.image.raws
 
     async def read(self, codes: list[str]) -> Mapping[str, Reading]:
-        """Readings by code, as a person's request."""
+        """Read codes with the priority of an operator. Raises the line's errors."""
         reader = Reader(self.session)
         if self.session.byte_order.is_suspect:
             await check_byte_order(reader, Priority.OPERATOR_READ)
         return await reader.read(codes, priority=Priority.OPERATOR_READ)
 
     async def chart(self, wanted: OrderId | None = None) -> Chart:
-        """The chart in force, with every word read again that a command depends on.
+        """Read every word that a command depends on, and return the active chart.
 
-        Raises OrderRefused where the drive is not commanded from here, or an interlock speaks
-        against the wanted command.
+        Raises OrderRefused if Drive Panel does not command this drive, or if an interlock
+        blocks the wanted command.
         """
         session = self.session
         codes = deciding_codes(session.profile)
@@ -68,20 +68,20 @@ class CommandAccess(Writer):
         await self.read([code for code in dict.fromkeys(codes) if code])
         found = chart_in_force(session.profile, self.raws)
         if found is None or not found.orders:
-            name = found.name if found else "what decides about its commands was not read"
-            raise OrderRefused(f"Drive Panel does not command this drive: {name}.")
+            why = found.name if found else "the words that select its commands were not read"
+            raise OrderRefused(f"Drive Panel does not command this drive: {why}.")
         held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
         if held is not None:
             raise OrderRefused(block_reason_text(held))
         return found
 
     async def state(self, chart: Chart) -> State:
-        """The drive's state, read now with the word of its present fault."""
+        """Read the drive's state, and its fault word if it has one."""
         await self.read(state_codes(self.session.profile, chart))
         return state_now(self.session.profile, chart, self.raws)
 
     async def wait_for(self, chart: Chart, goals: Collection[str]) -> State:
-        """The state, as soon as it is one of those, or when its time is up."""
+        """Read the state until it is one of the goals, for STEP_TIME at most; return the last."""
         end = self.session.clock.monotonic() + STEP_TIME
         state = await self.state(chart)
         while state.id not in goals and self.session.clock.monotonic() < end:
@@ -90,7 +90,7 @@ class CommandAccess(Writer):
         return state
 
     async def send(self, chart: Chart, order: Order) -> None:
-        """Write the words of a command, one after another."""
+        """Write the words of a command in their order."""
         parameter = order_target(self.session.profile, chart, order)
         for word in with_options(chart, order, self.raws):
             if parameter.code == chart.command:
@@ -99,53 +99,53 @@ class CommandAccess(Writer):
                 await self.write_parameter(parameter, from_words(parameter, [word]), why=order.name)
 
     async def write_command(self, chart: Chart, word: int, why: str) -> None:
-        """Write a command word; it is watched from then on."""
+        """Write a command word, and poll it from then on."""
         parameter = self.session.profile[chart.command]
-        # the state of the drive tells whether it was taken; the word itself is kept on record
+        # not compared: drives change their command word, and the state shows its effect
         await self.write_parameter(parameter, from_words(parameter, [word]), why=why, check=0)
         self.session.note_command()
         self.given.note_command(parameter.code, word)
 
 
 class CommandHistory:
-    """State kept from one command to the next."""
+    """Commands that this program has given to one drive: its reference and its command words."""
 
     def __init__(self, session: DriveSession) -> None:
         self._session = session
         self.wanted: Reference | None = None
         """The reference that was given last; None after the drive has reset it."""
         self.reference_text = ""
-        """The result of the last reference that was given, for a person."""
+        """Result of the last reference, as shown to a person."""
         self._written: dict[str, int] = {}
         self._written_under = 0
-        """The count of stops under which they were written."""
+        """Stop count of the drive when they were written."""
 
     def note_reference(self, reference: Reference, text: str) -> None:
-        """A reference was given; `text` is the result, for a person."""
+        """Remember a reference; `text` is its result as shown to a person."""
         self.wanted, self.reference_text = reference, text
 
     def forget_reference(self) -> None:
-        """The drive has put it back: nothing may send it again."""
+        """Forget the reference after a reset by the drive, so that no start sends it again."""
         self.wanted = None
 
     def note_command(self, code: str, word: int) -> None:
-        """A command word was written: it is watched from now on."""
+        """Remember a command word that was written, and poll it from now on."""
         self._written, self._written_under = {code: word}, self._session.work.stops
         self._session.followed = (code,)
 
     def note_option(self, code: str, word: int) -> None:
-        """Option bits of a command word were written."""
+        """Remember a command word whose option bits were written."""
         if code in self._written:
             self._written[code] = word
 
     def forget_words(self) -> None:
-        """Others command the drive now: words of another channel say nothing any more."""
+        """Forget the words after a change of the control source: the drive ignores them now."""
         self._written = {}
 
     def lost_orders(self) -> str:
-        """Return the values written by this program that the drive no longer holds, or nothing.
+        """Describe command words that the drive no longer holds; empty if it holds them.
 
-        Nothing behind a stop from here, which wrote another word itself.
+        Also empty after a stop by this program, which has written another word.
         """
         if self._written_under != self._session.work.stops:
             return ""
@@ -153,7 +153,7 @@ class CommandHistory:
         return f"Reset, switched off or commanded by others: {lost}." if lost else ""
 
     def changed_words(self) -> str:
-        """The command words that the drive holds otherwise than they were written from here."""
+        """List command words that differ from the word that this program has written."""
         known = self._session.image.raws
         return ", ".join(
             f"{code} 16#{raw:04X} is now 16#{known[code] & 0xFFFF:04X}"

@@ -1,7 +1,7 @@
-"""Commanding one drive: armed first, interlocked, walked through its chart, seen to obey.
+"""Commands of a person to one drive: arming, interlocks, the words of its chart, its reaction.
 
-Methods may be called from any thread and return at once; the work is done in the line's loop, and
-`outcome` holds its result. A stop needs none of this: see stop.py.
+The methods of `Commander` may be called from any thread and return immediately. The work is done
+in the line's loop, and `outcome` is its result. A stop needs none of this: see stop.py.
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ CommandWork = Callable[[CommandAccess], Coroutine[Any, Any, str]]
 
 
 class Commander:
-    """Gives commands to one drive, once it is armed."""
+    """Gives commands to one drive while it is armed."""
 
     def __init__(self, session: DriveSession, journal: Journal) -> None:
         self.session = session
         self.journal = journal
         self.last_run: tuple[OrderId, str | None] | None = None
-        """The run command that was given last, with its reference."""
+        """The last run command, with the reference that was typed for it."""
         self.given = CommandHistory(session)
-        """Commands given by this program, and whether the drive still holds them."""
+        """Commands given by this program that the drive may no longer hold."""
         self._lock = threading.Lock()
         self._steps = Decimal(0)
         self._stepping = False
@@ -72,10 +72,10 @@ class Commander:
     # Arming
 
     def arm(self, *, seconds: float = ARMED_FOR, stamp: int | None = None) -> None:
-        """Let commands through from now on; a state that is not fresh is read first.
+        """Arm the drive for a time without a key; read its state first if that is not fresh.
 
-        `stamp` is the count of stops when that was asked for: a stop since is the last word.
-        Raises OrderRefused where the line is read-only or lost, or the drive is not to be armed.
+        `stamp` is the drive's stop count when the key was typed: a later stop prevents the
+        arming. Raises OrderRefused if the line is read-only or lost, or the drive is barred.
         """
         session = self.session
         requested = session.work.stops if stamp is None else stamp
@@ -89,48 +89,53 @@ class Commander:
             codes = [*deciding_codes(session.profile), *(chart.status for chart in charts)]
             await Reader(session).read(dict.fromkeys(codes))
             if session.state(STATE_FRESH).kind == "unknown":
-                raise OrderRefused("The state of the drive is not known; nothing is commanded.")
+                raise OrderRefused(
+                    "Not armed: the state of the drive is not known. Check the line, and try again."
+                )
             session.work.arm(requested, seconds)
             return ""
 
         session.work.put(Task(work, owner=self, armed=False))
 
     def disarm(self, why: str = "") -> None:
-        """Let no command through any more."""
+        """End the arming of the drive; `why` is shown to a person."""
         self.session.arming.disarm(why)
 
     @property
     def armed_for(self) -> float | None:
-        """Seconds for which the drive is armed yet; None when it is not."""
+        """Seconds until the drive is disarmed; None if it is not armed."""
         return self.session.arming.armed_for
 
-    # Commands; `stamp` is the count of stops when they were typed
+    # Commands; `stamp` is the drive's stop count when they were typed
 
     def order(self, id: OrderId, stamp: int | None = None) -> None:
-        """Give a command. Raises OrderRefused when the drive is not armed."""
+        """Give a command of the drive's chart. Raises OrderRefused if the drive is not armed."""
         self._begin(lambda access: give_order(access, id), stamp)
 
     def run(self, id: OrderId, reference: str | None = None, stamp: int | None = None) -> None:
-        """Run forward or reverse at a typed reference, or at the present one.
+        """Run forward or reverse at a typed reference, or at the current one.
 
-        Raises OrderRefused when the drive is not armed.
+        Raises OrderRefused if the drive is not armed.
         """
         self.last_run = (id, reference)
         self._begin(lambda access: run_at_reference(access, id, reference), stamp)
 
     def check_run(self, id: OrderId, reference: str | None = None) -> None:
-        """Check all that a run depends on, as if the line had the control; write nothing.
+        """Check everything that a run depends on, as if the line had control; write nothing.
 
-        Raises OrderRefused when the drive is not armed.
+        Raises OrderRefused if the drive is not armed.
         """
         self._begin(lambda access: check_run(access, id, reference), None)
 
     def refer(self, text: str, stamp: int | None = None) -> None:
-        """Give a reference as typed: 30, 30Hz, 900rpm, 40%. Raises OrderRefused when not armed."""
+        """Give a reference as typed: 30, 30Hz, 900rpm, 40%. Raises OrderRefused if not armed."""
         self._begin(lambda access: give_reference(access, text), stamp)
 
     def step(self, hertz: Decimal, stamp: int | None = None) -> None:
-        """Raise or lower the reference. Raises OrderRefused when not armed."""
+        """Change the reference by so many Hz, together with steps that still wait.
+
+        Raises OrderRefused if the drive is not armed.
+        """
         with self._lock:
             self._steps += hertz
             if self._stepping:
@@ -143,27 +148,27 @@ class Commander:
             raise
 
     def choose_option(self, option: CommandOption, bits: int, stamp: int | None = None) -> None:
-        """Set an option. Raises OrderRefused when not armed."""
+        """Set the bits of an option. Raises OrderRefused if the drive is not armed."""
         self._begin(lambda access: set_option(access, option, bits), stamp)
 
     def take_over(self, stamp: int | None = None) -> None:
-        """Look after a motor that an earlier program has started; no frame is sent.
+        """Take over a motor that an earlier program has started; send no frame.
 
-        Raises OrderRefused when not armed.
+        Raises OrderRefused if the drive is not armed.
         """
         session = self.session
 
         async def work(_access: CommandAccess) -> str:
             if session.starts is None:
-                raise NothingToTakeOver("Starts of motors are not put on record here.")
+                raise NothingToTakeOver("This program keeps no records of motor starts.")
             await asyncio.to_thread(session.starts.take_over, session)
             session.note_command()
-            return "Taken over. On leaving you are asked what happens to the motor."
+            return "Taken over. When you leave, you are asked whether to stop the motor."
 
         self._begin(work, stamp)
 
     def configure(self, source: ControlSource, stamp: int | None = None) -> None:
-        """Set up who commands the drive. Raises OrderRefused when not armed."""
+        """Write the settings of a control source. Raises OrderRefused if the drive is not armed."""
 
         async def work(access: CommandAccess) -> str:
             done = await configure(self.session, access, source)
@@ -177,13 +182,13 @@ class Commander:
         self.session.work.tell(OutcomeKind.REFUSED, text)
 
     def _take_steps(self) -> Decimal:
-        """The steps that were ordered and not yet given."""
+        """Return the sum of the steps that wait, and forget them."""
         with self._lock:
             steps, self._steps, self._stepping = self._steps, Decimal(0), False
         return steps
 
     def _begin(self, work: CommandWork, stamp: int | None) -> None:
-        """Carry out a command behind those before it."""
+        """Queue a command behind those before it."""
 
         async def carry_out(permit: Permit) -> str:
             return await work(CommandAccess(self.session, self.journal, permit, self.given))
@@ -193,22 +198,22 @@ class Commander:
         self.session.arming.touch()
 
     def _give_up(self) -> None:
-        """Steps that were not given are forgotten."""
+        """Forget steps that were not given."""
         self._take_steps()
 
 
-STILL_IN_FAULT = "sent, but the drive is still in fault, as long as its cause is there"
+STILL_IN_FAULT = "sent, but the drive is still in fault: its cause is still present"
 
 
 async def give_order(access: CommandAccess, id: OrderId) -> str:
-    """Carry out a command that nothing speaks against."""
+    """Give a command after its interlocks were checked; return its result as text."""
     chart = await access.chart(id)
     if id in ("forward", "reverse"):
         return await MotorStart(access).carry_out(chart, id)
     state = await access.state(chart)
     if id == "reset" and (nothing := no_fault(chart, state.id, state.kind, state.name)):
         raise OrderRefused(nothing)
-    # a fault holds no stop back: its word follows the status word alone
+    # a fault must not block a stop: its word depends on the status word alone
     order = choose(chart, id, access.raws, None if id in STOP_ORDERS else state)
     await access.send(chart, order)
     now = await access.state(chart)
@@ -219,7 +224,7 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
 
 
 async def _cleared(access: CommandAccess, order: Order) -> str:
-    """Return the present reference, if a command resets words to their initial values."""
+    """Describe the current reference if a command resets words; empty for other commands."""
     if not order.clears:
         return ""
     access.session.image.forget(order.clears)
@@ -236,7 +241,7 @@ async def _cleared(access: CommandAccess, order: Order) -> str:
 
 
 async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -> str:
-    """Check all that a run depends on, as if the line had taken the control; write nothing."""
+    """Check everything that a run depends on, as if the line had control; write nothing."""
     profile, chart = access.session.profile, await access.chart()
     await access.state(chart)
     taken = {
@@ -254,11 +259,11 @@ async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -
     await check_scale(access)
     if reference is not None:
         await _typed_reference(access, reference)
-    return "Nothing speaks against the run."
+    return "Nothing prevents the run."
 
 
 async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | None) -> str:
-    """Reference and run command in one, once nothing speaks against either."""
+    """Give a reference and a run command after both were checked."""
     chart = await access.chart(id)
     wanted = None if reference is None else await _typed_reference(access, reference)
     done = await MotorStart(access).carry_out(chart, id, wanted)
@@ -266,20 +271,20 @@ async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | 
 
 
 async def give_reference(access: CommandAccess, text: str) -> str:
-    """Write a reference as typed."""
+    """Write a typed reference; return its result as text."""
     wanted = await _typed_reference(access, text)
     return await write_reference(access, wanted, replaceable=True)
 
 
 async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
-    """The reference so many Hz higher or lower; % and V in steps of one, rpm of ten."""
+    """Change the reference by so many Hz; 1 Hz is 1 % or 1 V, and 10 rpm, in other units."""
     profile = access.session.profile
     readings = await access.read(reference_codes(profile))
     parameter = next(iter(reference_parameters(profile)), None)
     reading = readings.get(parameter.code) if parameter else None
     value = reading.value if reading is not None else None
     if parameter is None or value is None or value.number is None or value.unit == "raw":
-        raise OrderRefused(f"Where {profile.name} takes its reference is not known.")
+        raise OrderRefused(f"It is not known where {profile.name} takes its reference.")
     number = value.number + hertz * step_in(value.unit)
     number = within_limits(profile, number, readings, parameter)
     wanted = parse_reference(profile, f"{number:f}{value.unit}", readings)
@@ -287,14 +292,14 @@ async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
 
 
 async def _typed_reference(access: CommandAccess, text: str) -> Reference:
-    """A reference as typed, checked against what the drive holds now."""
+    """Read what a typed reference depends on, and convert it. Raises as `parse_reference`."""
     profile = access.session.profile
     readings = await access.read([*reference_codes(profile), *channel_codes(profile)])
     return parse_reference(profile, text, readings)
 
 
 async def set_option(access: CommandAccess, option: CommandOption, bits: int) -> str:
-    """Set the bits of an option in its word; the others stay."""
+    """Set the bits of an option in its word, and keep the others; return the result as text."""
     parameter = access.session.profile[option.parameter]
     chart = await access.chart()
     reading = (await access.read([parameter.code]))[parameter.code]
@@ -302,7 +307,7 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
         raise OrderRefused(f"{parameter.code} cannot be read: {reading.error}")
     await access.read([chart.status])
     if option.stopped_only and state_of(chart, access.raws[chart.status]).kind in ENABLED_KINDS:
-        raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
+        raise OrderRefused(f"Not set: {option.name} is changed with the motor stopped only.")
     word = reading.raw & 0xFFFF & ~option.mask | bits
     await access.write_parameter(
         parameter, from_words(parameter, [word]), why=option.name, check=option.mask

@@ -1,4 +1,4 @@
-"""Setting up who commands a drive and who gives its reference, word by word, read back."""
+"""Settings of a drive's control source: each is written and read back."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..settings.write import Writer
 
 
 async def configure(session: DriveSession, writer: Writer, source: ControlSource) -> str:
-    """Write what differs from a configuration; returns what was done, for a person.
+    """Write the settings that differ from a control source; return the result as text.
 
-    Everything is read again before. A word may change others behind it (the access level does), so
-    each is looked at when its turn comes. Raises OrderRefused while the motor is not surely at
-    rest, the line's errors, ValueRefused and NotTaken.
+    All are read again before each write, because one setting may change later ones, as the
+    access level does. Raises OrderRefused unless the motor is known to be at rest, the line's
+    errors, ValueRefused and NotTaken.
     """
     profile = session.profile
     written: list[str] = []
@@ -38,8 +38,8 @@ async def configure(session: DriveSession, writer: Writer, source: ControlSource
     left = source_changes(profile, source, await _raws(session))
     if left:
         codes = ", ".join(change.parameter.code for change in left)
-        raise OrderRefused(f"{source.name}: {codes} went back to another value.")
-    done = f"written: {', '.join(written)}" if written else "nothing was to be changed"
+        raise OrderRefused(f"{source.name}: the drive has changed {codes} again.")
+    done = f"wrote {', '.join(written)}" if written else "no change was necessary"
     return f"Control source {source.name}: {done}"
 
 
@@ -48,7 +48,7 @@ async def _raws(session: DriveSession) -> dict[str, int]:
     readings = await Reader(session).read(codes, priority=Priority.OPERATOR_READ)
     unread = [code for code, reading in readings.items() if reading.raw is None]
     if unread:
-        raise OrderRefused(f"{', '.join(unread)} cannot be read: nothing is changed.")
+        raise OrderRefused(f"{', '.join(unread)} cannot be read, so nothing was changed.")
     return {code: reading.raw for code, reading in readings.items() if reading.raw is not None}
 
 
@@ -59,5 +59,6 @@ async def _at_rest(session: DriveSession) -> None:
     state = drive_state(session.profile, readings)
     if state.motion in ("running", "stopping", "starting", "unknown"):
         raise OrderRefused(
-            f"The control source is changed with the motor stopped only; now: {state.headline}."
+            "Not written: the control source is changed with the motor stopped only."
+            f" Now: {state.headline}."
         )

@@ -1,7 +1,7 @@
-"""The first word of a stop: sent before the drive has said what it is.
+"""First word of a stop, sent to a drive that is not identified.
 
-Its family is found by reads, which move nothing: the status word of each kind of family, and the
-word that decides how that is stopped. Then the one word goes out that stops all that is left
+Reads, which move nothing, exclude families: the status word of each kind of family, and the word
+that selects its stop. Then one word is sent that stops all remaining families
 (`tui.drive.first_stop`).
 """
 
@@ -26,25 +26,25 @@ ONE_WORD = Limits(
     functions=frozenset({3, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
 )
 """Requests allowed to an unidentified drive."""
-FIRST_WHY = "stopped, before it said what it is"
+FIRST_WHY = "stopped before it was identified"
 
 
 @dataclass(frozen=True, slots=True)
 class SentFirst:
-    """A word that was sent, and what the drive or the line said to it."""
+    """A word that was sent, with its result."""
 
     what: FirstWord
     answer: str
-    """`ok`, or its other result, in few words."""
+    """`ok`, or another result in a few words."""
 
     @property
     def taken(self) -> bool:
-        """True if the drive has answered it well."""
+        """True if the drive has acknowledged it."""
         return self.answer == "ok"
 
     @property
     def text(self) -> str:
-        """For a person: which word went where, whom it stops, what was said to it."""
+        """The word, its register, the families that it stops, and its result, for a person."""
         names = [family.name for family in self.what.families]
         target = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
         message = "" if self.taken else f" ({self.answer})"
@@ -53,37 +53,37 @@ class SentFirst:
 
 @dataclass(frozen=True, slots=True)
 class FirstStop:
-    """First stop word, and the families excluded by it."""
+    """Result of the first stop words: what was sent, and the families that remain."""
 
     sent: tuple[SentFirst, ...]
     ruled_out: frozenset[str]
-    """Families whose status word the drive refused to have."""
+    """Families whose status word the drive reported as missing."""
     followers: tuple[str, ...] = ()
-    """Families by which it may be stopped on without having said what it is."""
+    """Families by whose profile an unidentified drive may be followed to standstill."""
     answered: bool = False
-    """True if the drive has answered anything."""
+    """True if the drive has sent any reply."""
 
     def may_be(self, family: str) -> bool:
-        """Return True if a drive that does not say what it is may be stopped as one of a family."""
+        """Return True if an unidentified drive may be of this family."""
         if family in self.ruled_out:
             return False
         return family in self.followers or not self.sent
 
     @property
     def taken(self) -> FirstWord | None:
-        """The word that the drive took; None where it took none."""
+        """The word that the drive acknowledged; None if it acknowledged none."""
         return next((sent_word.what for sent_word in self.sent if sent_word.taken), None)
 
 
 @dataclass(frozen=True, slots=True)
 class _Look:
     there: bool | None
-    """True if the drive has such a status word; None where it did not answer."""
+    """True if the drive has such a status word; None if it did not answer."""
     raws: dict[int, int]
 
 
 def unlike_families(session: DriveSession) -> tuple[StopProfile, ...]:
-    """Families of which a guessed drive may be, if the word that stops one may start another."""
+    """Return the candidate families of a guessed drive if no one stop word stops them all."""
     ids = session.known_identity.candidates if session.guessed else ()
     profiles = [library.load(id_) for id_ in ids]
     if not profiles or stop_alike(profiles):
@@ -99,10 +99,10 @@ async def stop_first(
     named: Sequence[str],
     wanted: OrderId,
 ) -> FirstStop:
-    """Send a drive the word that stops whatever it may be, those first that were `named`.
+    """Send a drive words that stop every family that it may be of, `named` ones first.
 
-    Nothing goes to a place whose status word the drive refuses. Where it does not answer at all,
-    the word of those named goes out blind, no other. Raises LineClosed, LineLost, RequestRefused.
+    Nothing is written if the drive refuses the status word of a family. If it does not answer at
+    all, only the word of the named families is sent. Raises LineClosed, LineLost, RequestRefused.
     """
     line.describe(device, ONE_WORD)
     sent: list[SentFirst] = []
@@ -130,7 +130,7 @@ async def stop_first(
 
 
 async def _look(line: ModbusLine, device: int, place: StopPlace, *, again: bool) -> _Look:
-    """Read what shows whether a drive is of these families, and by which word it is stopped."""
+    """Read the words that show if a drive is of these families, and that select its stop word."""
     raws: dict[int, int] = {}
     there: bool | None = False
     for address in place.status:
@@ -146,12 +146,12 @@ async def _look(line: ModbusLine, device: int, place: StopPlace, *, again: bool)
             try:
                 raws[address] = await _read(line, device, address, again=True)
             except ExchangeError:
-                continue  # by the word that stops whatever it holds
+                continue  # the word is then one that stops the drive whatever this holds
     return _Look(there, raws)
 
 
 async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> int:
-    """A word, asked for again once where no good answer comes and `again` says so."""
+    """Read a word; with `again`, once more if there was no valid reply."""
     try:
         reply = await line.read(device, address, 1, priority=Priority.STOP)
     except DeviceException:
@@ -164,7 +164,7 @@ async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> 
 
 
 async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord) -> SentFirst:
-    """Write the word, once. It is recorded in the journal with any result."""
+    """Write the word once, and record it in the journal whatever the result."""
     answer = reported = "a signal came: not known whether it was taken"
     try:
         await line.write(device, what.address, [what.word], priority=Priority.STOP)

@@ -1,4 +1,4 @@
-"""The last known state of a drive, by which it is stopped before anything is read."""
+"""Stop words by the last known state of a drive, before anything is read."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ ENABLED = frozenset({"running", "stopping"})
 
 
 def last_known_stop(session: DriveSession, order: OrderId) -> tuple[Chart, Order]:
-    """The words that stop a drive by what was seen of it last. Raises OrderRefused.
+    """Return the words that stop a drive by its last known state. Raises OrderRefused.
 
-    Those of its chart if its motor was just seen to run: a word that ramps a motor down in one
-    chart may start one at rest in another. Otherwise those that stop it in any chart.
+    If its motor was just seen running, they are those of its chart. Otherwise they stop it in any
+    chart: a word that ramps a motor down in one chart may start one at rest in another.
     """
     profile = session.profile
     if session.state(SEEN_RUNNING).motion in ENABLED:
@@ -27,7 +27,7 @@ def last_known_stop(session: DriveSession, order: OrderId) -> tuple[Chart, Order
             except OrderRefused:
                 pass
     if len(profile.data.charts) == 1:
-        # no other chart can be in force: nothing has to be known for a word without conditions
+        # no other chart can be active, so a word without conditions needs no reading
         chart = profile.data.charts[0]
         try:
             return chart, choose(chart, nearest_stop(chart, order), {})
@@ -37,14 +37,14 @@ def last_known_stop(session: DriveSession, order: OrderId) -> tuple[Chart, Order
 
 
 def is_likely_to_run(session: DriveSession) -> bool:
-    """True if the motor was seen to run just now, or was commanded from here."""
+    """Return True if the motor was just seen running, or this program has commanded it."""
     return session.commanded or session.state(SEEN_RUNNING).motion in ENABLED
 
 
 def run_by_others(session: DriveSession) -> str:
-    """The source that runs the motor if the line does not, and where to stop it; else empty.
+    """Describe the source that runs the motor, and where to stop it; empty if it is the line.
 
-    By what was seen last. A drive that obeys its terminals may still obey a stop over the line.
+    It is the last known one. A drive that obeys its terminals may still obey a stop of the line.
     """
     state = session.state(SEEN_RUNNING)
     if state.motion not in ENABLED:
@@ -61,5 +61,5 @@ def run_by_others(session: DriveSession) -> str:
 
 
 def _small(name: str) -> str:
-    """A name within a sentence: acronyms keep their capitals."""
+    """Return a name for use within a sentence; acronyms keep their capitals."""
     return f"its {name[0].lower()}{name[1:]}" if name[1:2].islower() else name

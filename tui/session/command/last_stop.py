@@ -1,7 +1,7 @@
-"""The last stop of a drive: its prepared frames, after an internal error on its usual way.
+"""Stop of a drive by its prepared frames, after an internal error in its usual stop.
 
-Whatever is called here is called with as little between it and the line as possible, and an error
-in anything beside the frame is logged and passed over.
+As little code as possible is between this module and the line. An error in anything but the
+sending of the frame is logged and ignored.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ NOT_SENT = f"{NOT_STOPPED}an internal error (see the log), and its prepared fram
 
 
 def end_work(session: DriveSession, by: str) -> None:
-    """End the work on a drive and its arming; its count of stops rises in any case."""
+    """End the work on a drive and its arming; raise its stop count whatever fails."""
     before = session.work.stops
     carried_on(lambda: session.work.stop(by))
     if session.work.stops == before:
@@ -46,7 +46,7 @@ def end_work(session: DriveSession, by: str) -> None:
 class LastStop:
     """Sends prepared frames and follows the motor; `send` may be called from any thread.
 
-    Also when the line is lost: perhaps it lets one frame through that is sent on its own.
+    It also tries on a lost line: a connection of its own may still let one frame through.
     """
 
     def __init__(self, line: ModbusLine, journal: Journal, say: TellStop) -> None:
@@ -57,9 +57,9 @@ class LastStop:
     def send(
         self, session: DriveSession, ordered: float, error: Exception, *, taken: bool = False
     ) -> None:
-        """Stop a drive after an internal error; `taken` if it has answered its stop word before.
+        """Stop a drive after an internal error; `taken` if it has acknowledged its stop word.
 
-        Then it is not sent another: a motor on its ramp would coast by a word for every chart.
+        Then no other word is sent: the word for every chart would let a motor on its ramp coast.
         """
         lost = isinstance(error, LineLost) and not isinstance(error, LineFailed)
         if taken:
@@ -76,11 +76,11 @@ class LastStop:
                 ended(str(failure) or type(failure).__name__)
         if lost:
             return
-        # last: it may be what has failed
+        # last, because the log may be what has failed
         carried_on(partial(log.error, "stop of device %s", session.device, exc_info=error))
 
     def _ended(self, session: DriveSession, ordered: float, lost: str, why: str) -> None:
-        """The frames were sent, or `why` not, on a line that was perhaps `lost` before."""
+        """Report that the frames were sent, or `why` not; `lost` is the error of a lost line."""
         if why:
             text = not_stopped(lost) if lost else f"{NOT_SENT}{why.rstrip('.')}. {AT_THE_MACHINE}"
             self._say(session, Phase.FAILED, text, ordered)
@@ -111,7 +111,7 @@ class LastStop:
             )  # fmt: skip
 
     async def _follow(self, session: DriveSession, ordered: float) -> None:
-        """See the motor stop; whatever goes wrong, it counts as not stopped."""
+        """Follow the motor to standstill; after any error it counts as not stopped."""
         try:
             writer = Writer(session, self._journal, None)
             why = await MotorStop(session, writer, "stop", ordered, self._say).follow()

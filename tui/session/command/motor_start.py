@@ -1,4 +1,4 @@
-"""Starting a motor: its reference, the way through its chart, and that it turns as commanded."""
+"""Start of a motor: its reference, the words that lead to running, its direction."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .access import STATE_POLL_INTERVAL, CommandAccess, NotFollowed
 from .reference import Reference, other_scale, read_back_differs, reference_codes, scale_codes
 
 LOOKS = 10
-"""Looks within which the direction of a start must be the ordered one."""
+"""Reads within which the motor must turn in the commanded direction."""
 
 
 class WrongReference(OrderRefused):
-    """The drive holds another reference than was requested; nothing was started."""
+    """The drive holds another reference than the requested one; the motor was not started."""
 
 
 async def write_reference(
     access: CommandAccess, reference: Reference, *, replaceable: bool = False
 ) -> str:
-    """Write a reference; the result, for a person."""
+    """Write a reference; return its result as text."""
     await access.write_parameter(
         reference.parameter, reference.raw, why="reference", replaceable=replaceable
     )
@@ -40,7 +40,7 @@ async def write_reference(
 
 
 async def check_scale(access: CommandAccess) -> None:
-    """Raise OrderRefused if references surely count in another scale than the profile's."""
+    """Raise OrderRefused if another master has changed the scale of references."""
     profile = access.session.profile
     if not (codes := scale_codes(profile)):
         return
@@ -51,7 +51,7 @@ async def check_scale(access: CommandAccess) -> None:
 
 
 def without_effect(access: CommandAccess) -> str:
-    """A clause that a reference given here changes nothing, if another source surely gives it."""
+    """Return a clause that a reference has no effect; empty unless another source gives it."""
     found = reference_channel(access.session.profile, access.raws)
     if found is None or found.by_line is not False:
         return ""
@@ -64,7 +64,7 @@ class MotorStart:
 
     access: CommandAccess
     sent: bool = False
-    """True if a run frame went out, or may have."""
+    """True if a run frame was sent, or may have been."""
 
     @property
     def session(self) -> DriveSession:
@@ -72,9 +72,9 @@ class MotorStart:
         return self.access.session
 
     async def carry_out(self, chart: Chart, id: OrderId, reference: Reference | None = None) -> str:
-        """Reference first, then the way through the chart to the running state.
+        """Write the reference, then the words that lead to running; return the result as text.
 
-        All that can be checked is checked before the first frame that writes.
+        Everything that can be checked is checked before the first frame that writes.
         """
         same = [order for order in chart.orders if order.id == id]
         if not same:
@@ -103,7 +103,10 @@ class MotorStart:
         return f"{name}: {reached}"
 
     async def _check_direction(self, chart: Chart, id: OrderId) -> None:
-        """Stop a motor that starts the other way: bit 11 may be assigned to something else."""
+        """Stop a motor that turns in the wrong direction.
+
+        The bit of the reverse command may be assigned to another function.
+        """
         access = self.access
         turns = read_chart(self.session.profile, access.raws).direction
         if turns is None or turns == id:
@@ -123,7 +126,7 @@ class MotorStart:
     async def _give_reference(self, reference: Reference | None) -> None:
         """Write the reference, read it back as a value, and compare it with the request.
 
-        Without one the present reference is written: some drives run only once theirs was.
+        Without one, the current reference is written: some drives run only after a write of it.
         """
         access, wanted = self.access, reference or self.access.given.wanted
         if reference is not None:
@@ -146,16 +149,16 @@ class MotorStart:
         self.session.note_command()
 
     def _is_over(self) -> None:
-        """From here on a standstill says that the motor was stopped.
+        """Let the next standstill end the record of the start, or remove it if nothing was sent.
 
-        Not from the run frame on: a drive that takes its time shows the rest before it for a while.
+        Not earlier: a slow drive reports standstill for a while after its run frame.
         """
         starts = self.session.starts
         if starts is not None:
             (starts.sent if self.sent else starts.never_sent)(self.session)
 
     async def _walk(self, chart: Chart, run: Order, enabled: str) -> None:
-        """From the state now to the running one, each state seen before the next command."""
+        """Write the words that lead to running; wait for each state before the next word."""
         access = self.access
         state = await access.state(chart)
         way = walk(chart, state.id, enabled)
@@ -168,8 +171,8 @@ class MotorStart:
             if reached.id not in (goal, enabled):
                 names = {s.id: s.name for s in chart.states}
                 raise NotFollowed(
-                    f"The drive stays in {reached.name} and does not go to {names[goal]}"
-                    f" on 16#{word:04X}."
+                    f"The drive stays in {reached.name}: it does not go to {names[goal]}"
+                    f" after 16#{word:04X}."
                 )
         if not way:
             self.sent = True
@@ -179,5 +182,5 @@ class MotorStart:
         running = {s.id for s in chart.states if s.kind == "running"}
         state = await self.access.wait_for(chart, running)
         if state.kind != "running":
-            raise NotFollowed(f"The drive does not run; it is in the state {state.name}.")
+            raise NotFollowed(f"The drive does not run: its state is {state.name}.")
         return state.name

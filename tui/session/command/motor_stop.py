@@ -1,4 +1,4 @@
-"""One stop of one drive: its word chosen by the drive's state, sent, followed to its end."""
+"""One stop of one drive: its word is selected by the state, sent, and followed to standstill."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ from .stop_report import Phase, not_proved, not_stopped
 log = logging.getLogger(__name__)
 
 STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
-"""Kinds of state in which a motor at 0 Hz is stopped: nothing enables it."""
+"""Kinds of state in which a motor at 0 Hz is not enabled, and so is stopped."""
 
 STANDSTILL_POLL_INTERVAL = 0.15
 
 SILENT_WAIT = 0.1
-"""Seconds in which a drive that was silent before has to answer the first of several stops."""
+"""Seconds that a drive which was silent before has to answer the first of several stops."""
 
 TellStop = Callable[[DriveSession, Phase, str, float], None]
 
 
 @dataclass(slots=True)
 class MotorStop:
-    """One stop of one drive: its word chosen by the drive's state, sent, followed."""
+    """One stop of one drive, in the line's loop."""
 
     session: DriveSession
     writer: Writer
@@ -60,21 +60,21 @@ class MotorStop:
     ordered: float
     say: TellStop
     wanted: OrderId = field(init=False)
-    """The way to stop that was asked for."""
+    """The way to stop that was requested; `order` may become the nearest one that exists."""
     wave: FirstWave | None = None
-    """Several drives are stopped: each is sent a word before anything is read of any."""
+    """Set if several drives are stopped: each is sent a word before any of them is read."""
     begun: bool = False
     sent: bool = False
-    """True if its words have gone out."""
+    """True if its words were sent."""
     taken: bool = False
-    """True if the drive has answered them well."""
+    """True if the drive has acknowledged them."""
     over: bool = False
-    """True if nothing more is done about it."""
+    """True if it has ended, or another stop has replaced it."""
     answered: tuple[str, list[int]] | None = None
-    """Register and words that the drive has answered well."""
+    """Register and words that the drive has acknowledged."""
     reader: Reader = field(init=False)
     held: dict[str, Reading] = field(default_factory=dict)
-    """Command words before this program wrote them: their option bits are kept."""
+    """Command words before the stop, because their option bits are kept."""
     _unheeded: bool = False
 
     def __post_init__(self) -> None:
@@ -82,7 +82,7 @@ class MotorStop:
         self.wanted = self.order
 
     async def carry_out(self) -> str | None:
-        """Choose, send and follow; returns why the motor does not stop, or nothing."""
+        """Select the words, send them, and follow the motor; return why it does not stop."""
         self.begun = True
         if families := unlike_families(self.session):
             return await self._stop_any(families)
@@ -95,11 +95,11 @@ class MotorStop:
         chart, chosen = await self._chosen()
         if self.answered != self._target(chart, chosen):
             await self._send(chart, chosen)
-        self.answered = None  # should it be tried again
+        self.answered = None  # another attempt sends the words again
         return await self._follow(chart, chosen)
 
     async def _stop_any(self, families: Sequence[StopProfile]) -> str | None:
-        """Send the word that stops every family; none of them can follow the motor."""
+        """Send the word that stops every candidate family; no profile can follow the motor then."""
         session, ids = self.session, [family.id for family in families]
         try:
             first = await stop_first(
@@ -119,7 +119,7 @@ class MotorStop:
         return None
 
     async def follow(self) -> str | None:
-        """See a motor stop whose stop was sent another way; returns why it does not, or nothing."""
+        """Follow a motor whose stop was sent in another way; return why it does not stop."""
         self.begun = self.sent = True
         if unlike_families(self.session):
             self.say(self.session, Phase.FAILED, not_proved(), self.ordered)
@@ -127,15 +127,15 @@ class MotorStop:
         return await self._follow(*await self._chosen())
 
     async def _send_at_once(self) -> None:
-        """Send the word by what was seen last; a drive that is silent now is not waited for.
+        """Send the word for the last known state; do not wait for a drive that is silent.
 
-        What is read afterwards decides whether another one follows.
+        The values that are read afterwards decide if another word follows.
         """
         session = self.session
         try:
             chart, order = last_known_stop(session, self.order)
         except OrderRefused:
-            return  # by what is read next
+            return  # the next read selects the word
         silent = session.line.device_state(session.device).answers is False
         try:
             await self._send(chart, order, within=SILENT_WAIT if silent else None)
@@ -146,7 +146,7 @@ class MotorStop:
         return order_target(self.session.profile, chart, order).code, list(order.words)
 
     async def _chosen(self) -> tuple[Chart, Order]:
-        """The words that stop this drive now; deciding words are read again if they may differ."""
+        """Return the words that stop this drive; read what selects them if it may have changed."""
         profile = self.session.profile
         deciding = [chart.when.parameter for chart in profile.data.charts if chart.when]
         try:
@@ -156,8 +156,8 @@ class MotorStop:
                 self.order = nearest_stop(chart, self.order)
                 await self._read_anew(stop_conditions(chart, self.order))
         except ExchangeError as failure:
-            # blind: by the word that stops whatever the drive is in
-            log.warning("stop of device %s without a look: %s", self.session.device, failure)
+            # not read: a word that stops the drive in every state
+            log.warning("stop of device %s without a read: %s", self.session.device, failure)
             known = self._sure(deciding)
             chart = chart_in_force(profile, known)
             if chart is None:
@@ -173,7 +173,7 @@ class MotorStop:
             await self.reader.read(unsure, priority=Priority.STOP)
 
     def _sure(self, codes: Iterable[str]) -> dict[str, int]:
-        """Return values known for sure: just read, or constant since the motor has run."""
+        """Return the values that are certain: just read, or unchangeable while the motor runs."""
         session, image = self.session, self.session.image
         fresh, trusted = image.fresh(STATE_FRESH), image.trusted
         turns = session.state(STATE_FRESH).motion in ("running", "stopping")
@@ -213,7 +213,7 @@ class MotorStop:
         self.session.reported_by_line = True
 
     def _tell_sent(self, order: Order) -> None:
-        """The words have gone out: it stops, unless something else is known to run the motor."""
+        """Report that the words were sent, unless another source is known to run the motor."""
         self.sent = True
         if not self._unheeded:
             self.say(self.session, Phase.STOPPING, order.name, self.ordered)
@@ -223,8 +223,8 @@ class MotorStop:
         self.say(self.session, Phase.UNHEEDED, not_stopped(why), self.ordered)
 
     async def _follow(self, chart: Chart, order: Order) -> str | None:
-        """See the motor stop; returns why it does not, or nothing."""
-        with suppress(NoAnswer, ChecksumFault, WrongReply):  # BytesSwapped ends it: nothing is seen
+        """Follow the motor to standstill; return why it does not stop, or None."""
+        with suppress(NoAnswer, ChecksumFault, WrongReply):  # BytesSwapped ends it: values are void
             await check_byte_order(self.reader, Priority.OPERATOR_READ)
         progress, before = self.session.clock.monotonic(), None
         ending = last_word(chart, order)
@@ -235,7 +235,7 @@ class MotorStop:
                 self.session.request_full_read()
                 return None
             if hertz == 0 and kind == "running" and ending is not None:
-                # at 0 Hz and enabled by the very word that has stopped it
+                # at 0 Hz, and still enabled by the word that has stopped it
                 await self._send(chart, ending)
                 progress, ending = self.session.clock.monotonic(), None
                 continue
@@ -244,7 +244,7 @@ class MotorStop:
                 progress = now
             if now - progress > TAKES_EFFECT:
                 return self._why_not(hertz)
-            # slower by another's reference is not stopped: only a state that says so ends it
+            # another source may only have slowed it down: the state decides if it is stopped
             why = run_by_others(self.session) if kind == "running" else ""
             before = hertz
             if why:
@@ -259,7 +259,7 @@ class MotorStop:
         return "it still turns after a minute."
 
     def _tell_standing(self) -> None:
-        """It is at standstill, as its profile reads it; by a guessed one that proves nothing."""
+        """Report standstill; with a guessed profile, the values prove nothing."""
         session = self.session
         if session.guessed:
             self.say(session, Phase.FAILED, not_proved(session.profile.name), self.ordered)
@@ -267,14 +267,14 @@ class MotorStop:
             self.say(session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
 
     def _instead(self) -> str:
-        """Which way to stop the drive lacks, where another took its place."""
+        """Return a clause about the way to stop that the drive lacks; empty if it has it."""
         if self.order == self.wanted:
             return ""
         wanted, way = self.wanted.replace("-", " "), self.order.replace("-", " ")
         return f" (it has no {wanted}: {'ramp stop' if way == 'stop' else way})"
 
     def _why_not(self, hertz: float | None) -> str:
-        """Return the reason why a drive that does not obey is still enabled."""
+        """Return why a drive that does not obey is still enabled."""
         state = self.session.state(STATE_FRESH)
         who = "from its terminals or keypad" if state.local else state.channel
         if hertz == 0:
@@ -285,10 +285,10 @@ class MotorStop:
         return f"it answers and runs on; it is commanded {who or 'by another source'}."
 
     async def _motion(self, chart: Chart) -> tuple[str, float | None]:
-        """The kind of state and the output frequency in Hz, read now."""
+        """Read the kind of state, and the output frequency in Hz; None if it is not known."""
         session = self.session
         frequency = session.profile.quantity("output_frequency")
-        # the word that was sent, too: the next one keeps its option bits
+        # also the command word: the next one keeps its option bits
         codes = [
             chart.status,
             *(code for code in self.held if self.session.image.get(code) is None),
@@ -303,24 +303,24 @@ class MotorStop:
 
 
 WAVE_TAKES = 10.0
-"""Seconds after which a first wave is over, though not every drive was sent its frame."""
+"""Seconds after which a first wave ends, even if a drive was not sent its frame."""
 
 
 class FirstWave:
-    """The first frames of several stops; lives in the line's loop."""
+    """First frames of several stops; used in the line's loop only."""
 
     def __init__(self, devices: Iterable[int]) -> None:
         self._left = set(devices)
         self._over = asyncio.Event()
 
     def passed(self, device: int) -> None:
-        """The frame of a drive was sent, or cannot be."""
+        """Note that the frame of a drive was sent, or cannot be."""
         self._left.discard(device)
         if not self._left:
             self._over.set()
 
     async def over(self) -> None:
-        """Wait until all were sent: reading and planning would hold up the next frame."""
+        """Wait until all were sent, because reads would delay the next frame."""
         with suppress(TimeoutError):
             async with asyncio.timeout(WAVE_TAKES):
                 await self._over.wait()

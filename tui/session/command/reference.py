@@ -1,7 +1,7 @@
-"""References as a person types them: a number, in a unit that leads to the drive's own.
+"""References as a person types them: a number with a unit that can be converted to the drive's.
 
-It is converted as every other value is, and compared with the limits in their units. What a drive
-reads back is compared with the request, by the way back.
+A reference is converted like every other value, and compared with the limits in their units. The
+value read back is converted in the other direction, and compared with the request.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..shown import Shown
 _TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(1/min|[^\s\d.,+\-/][^\d.,+\-]*)?")
 LIMITS: tuple[Quantity, ...] = ("low_speed", "high_speed", "max_frequency")
 REFERENCES: tuple[Quantity, ...] = ("command_frequency", "command_speed")
-"""The words that take a reference; the first that a drive has takes a number without a unit."""
+"""Quantities of reference words; a number without a unit goes to the first that a drive has."""
 EXAMPLES: Mapping[str, str] = {"Hz": "30Hz", "rpm": "900rpm", "%": "40%"}
 """By unit, a reference as it is typed."""
 DECIMALS_CONVERTED = 3
@@ -33,40 +33,41 @@ DECIMALS_CONVERTED = 3
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A reference that the drive can hold: where it goes, as what, and how it reads."""
+    """A reference that the drive can hold."""
 
     parameter: Parameter
     raw: int
     text: str
-    """The value that the drive is to hold, in its own unit."""
+    """The value of `raw` in the drive's unit."""
     rounded: bool
     requested: str
-    """The number and the unit that were requested."""
+    """The typed number and unit."""
     number: Decimal
-    """The same in the unit of the drive, not rounded."""
+    """The typed number in the drive's unit, not rounded."""
     unit: str
+    """The drive's unit."""
     step: Decimal
-    """The worth of one count in that unit."""
+    """One count in the drive's unit."""
 
     @property
     def is_converted(self) -> bool:
-        """True if it was requested in another unit than that of the drive."""
+        """True if it was typed in another unit than the drive's."""
         return factor_between(self.requested.rpartition(" ")[2], self.unit) is None
 
 
 def reference_parameters(profile: Profile) -> list[Parameter]:
-    """The words that take a drive's reference, that of a number without a unit first."""
+    """Return the reference words of a drive; a number without a unit goes to the first."""
     found = (profile.quantity(quantity) for quantity in REFERENCES)
     return [parameter for parameter in found if parameter is not None]
 
 
 def step_in(unit: str) -> int:
-    """The size of a step in a unit, for one of 1 Hz."""
+    """Return the size of a step in a unit that corresponds to 1 Hz."""
     return 10 if factor_between(unit, "rpm") is not None else 1
 
 
 def reference_codes(profile: Profile) -> list[str]:
-    """Codes of the words that a reference is converted by and checked against, and of itself."""
+    """Return the codes of the references and of all words that their conversion and limits use."""
     wanted: tuple[Quantity, ...] = (*LIMITS, *MOTOR_DATA, *REFERENCES)
     found = (profile.quantity(quantity) for quantity in wanted)
     codes = [parameter.code for parameter in found if parameter is not None]
@@ -83,12 +84,12 @@ def _scale_conditions(profile: Profile) -> list[ScaleWhen]:
 
 
 def scale_codes(profile: Profile) -> list[str]:
-    """Codes of the words on which it depends in which scale references count."""
+    """Return the codes of the words that select the scale of references."""
     return list(dict.fromkeys(when.parameter for when in _scale_conditions(profile)))
 
 
 def other_scale(profile: Profile, raws: Mapping[str, int]) -> str:
-    """Why references surely count in another scale now, with what to do; empty if they do not."""
+    """Return why references have another scale now, and what to do; empty if not known to."""
     for when in _scale_conditions(profile):
         if when.holds(raws) is False:
             return when.otherwise
@@ -96,9 +97,9 @@ def other_scale(profile: Profile, raws: Mapping[str, int]) -> str:
 
 
 def taught_limit(profile: Profile, code: str) -> Parameter | None:
-    """The word with the highest reference that a taught one takes; None where it is in no unit.
+    """Return the word with the highest value of a learned reference; None if there is none.
 
-    It counts once it was taught too, in the unit of the reference.
+    Its own scale must be learned too, in the unit of the reference.
     """
     way = reference_of(profile, code) if code in profile.taught else None
     if way is None or way.most not in profile.taught:
@@ -108,8 +109,8 @@ def taught_limit(profile: Profile, code: str) -> Parameter | None:
 
 
 def no_place(profile: Profile, unit: str) -> str:
-    """Why a drive takes no reference in a unit from here, with the way out of that."""
-    text = f"Where {profile.name} takes a reference in {unit} is in no manual at hand"
+    """Return why a drive takes no reference in a unit, and what to do."""
+    text = f"No available manual says where {profile.name} takes a reference in {unit}"
     ways = [reference.parameter for reference in profile.data.teachable_references]
     if not ways:
         return f"{text}; give it at the drive."
@@ -125,9 +126,9 @@ def no_place(profile: Profile, unit: str) -> str:
 
 
 def parse_reference(profile: Profile, text: str, readings: Mapping[str, Shown]) -> Reference:
-    """The reference that a person typed, within the drive's limits as far as these are known.
+    """Convert a typed reference and check it against the limits that are known.
 
-    Raises what `convert_reference` raises, and ValueRefused for one outside the limits.
+    Raises as `convert_reference`, and ValueRefused if it is outside the limits.
     """
     found = convert_reference(profile, text, readings)
     _check_limits(ReferenceUnits(profile, readings), found)
@@ -137,11 +138,11 @@ def parse_reference(profile: Profile, text: str, readings: Mapping[str, Shown]) 
 
 
 def convert_reference(profile: Profile, text: str, readings: Mapping[str, Shown]) -> Reference:
-    """The reference that a person typed, as a raw value; the drive's own unit without one.
+    """Convert a typed reference to a raw value; a number without a unit is in the drive's unit.
 
-    Another unit is converted by what the drive holds: pairs of poles, what 100 % is. Raises
-    UnitRefused if no conversion exists from one to the other, ValueRefused for a text that is not a
-    reference, has no place on this drive, or follows a scale that was not read or has changed.
+    The motor data of the drive (pole pairs, the value of 100 %) convert between units. Raises
+    UnitRefused if the unit cannot be converted. Raises ValueRefused if the text is not a
+    reference, the drive has no word for it, or its scale was not read or has changed.
     """
     match = _TYPED.fullmatch(text.strip())
     if match is None:
@@ -151,7 +152,7 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Shown]
     if not reference_parameters(profile):
         raise ValueRefused(no_place(profile, unit or "Hz"))
     if typed < 0:
-        raise ValueRefused("A reference is not negative; run reverse instead.")
+        raise ValueRefused("A reference cannot be negative. Run reverse instead.")
     parameter, number = _placed(known, text, typed, unit)
     raws, absent = known.raws, known.absent
     if refusal := other_scale(profile, raws):
@@ -175,10 +176,10 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Shown]
 
 
 def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str, Shown]) -> str:
-    """The difference between the value read back and the one requested; empty if there is none.
+    """Describe the difference between the value read back and the requested one; empty if none.
 
-    The request is converted once more, what the drive holds is read as a value of its own:
-    a scale, a unit or a rating that changed since shows. Raises what `convert_reference` raises.
+    The request is converted once more, with what was just read. So a scale, a unit or a rating
+    that has changed since shows as a difference. Raises as `convert_reference`.
     """
     code = wanted.parameter.code
     now, reading = convert_reference(profile, wanted.requested, readings), readings.get(code)
@@ -199,7 +200,10 @@ def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str
 def reference_limits(
     profile: Profile, readings: Mapping[str, Shown], parameter: Parameter
 ) -> tuple[Decimal | None, Decimal | None, str]:
-    """Lowest and highest reference in its own unit, as far as known; the code of the highest."""
+    """Return the lowest and highest reference in the drive's unit, and the code of the highest.
+
+    A limit that is not known is None.
+    """
     known = ReferenceUnits(profile, readings)
     low, high, code = None, None, ""
     for quantity in LIMITS:
@@ -217,7 +221,7 @@ def reference_limits(
 def within_limits(
     profile: Profile, number: Decimal, readings: Mapping[str, Shown], parameter: Parameter
 ) -> Decimal:
-    """A stepped reference in its own unit, at most to the limits that are known."""
+    """Return a number in the drive's unit, limited to the known limits; 0 at least."""
     low, high, _ = reference_limits(profile, readings, parameter)
     if high is not None:
         number = min(number, high)
@@ -227,7 +231,10 @@ def within_limits(
 def _placed(
     known: ReferenceUnits, text: str, typed: Decimal, unit: str
 ) -> tuple[Parameter, Decimal]:
-    """The word that takes a reference in this unit, and the number there; raises UnitRefused."""
+    """Return the word that takes a reference in this unit, and the number in the word's unit.
+
+    Raises UnitRefused.
+    """
     places = reference_parameters(known.profile)
     if not unit:
         return places[0], typed
@@ -246,7 +253,7 @@ def _placed(
 
 
 def _accepted(known: ReferenceUnits) -> list[str]:
-    """The units in which a reference can be given now, the drive's own first."""
+    """Return the units in which a reference can be given now, the drive's own first."""
     places = reference_parameters(known.profile)
     own = [known.unit(place) or "counts" for place in places]
     more = [
@@ -273,12 +280,12 @@ def _check_limits(known: ReferenceUnits, wanted: Reference) -> None:
             raise ValueRefused(f"{given} is above {code} = {most:f} {unit}.")
         if quantity == "low_speed" and number < most:
             raise ValueRefused(
-                f"{given} is below {code} = {most:f} {unit}: the drive would run at that."
+                f"{given} is below {code} = {most:f} {unit}: the drive would run at {code}."
             )
 
 
 def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str, Shown]) -> None:
-    """A highest reference that cannot be read holds nothing back: the drive has it anyway."""
+    """Raise ValueRefused above the limit; one that cannot be read is left to the drive."""
     reading = readings.get(limit.code)
     value = reading_of(reading).value if reading is not None else None
     if value is None or value.number is None or not value.taught:
@@ -290,12 +297,12 @@ def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str
 
 
 def _tidy(number: Decimal) -> str:
-    """A number for a sentence: no more decimals than it needs, and at most a few."""
+    """Format a number for a sentence, with DECIMALS_CONVERTED decimals at most."""
     return f"{_shortened(number, ROUND_HALF_UP):f}"
 
 
 def _shortened(number: Decimal, rounding: str) -> Decimal:
-    """A converted number with at most a few decimals; one with few anyway stays."""
+    """Round a number to DECIMALS_CONVERTED decimals; keep one that has no more."""
     if -int(number.as_tuple().exponent) <= DECIMALS_CONVERTED:
         return number
     short = number.quantize(Decimal(1).scaleb(-DECIMALS_CONVERTED), rounding).normalize()
@@ -308,14 +315,14 @@ def _code(profile: Profile, quantity: Quantity) -> str:
 
 
 MOTOR_DATA: tuple[Quantity, ...] = ("rated_frequency", "rated_speed")
-"""The plate that gives the pole pairs of the motor."""
+"""Ratings from which the pole pairs of the motor follow."""
 NEARLY_ONE_MORE = Decimal("0.05")
-"""By how much a plate may round a speed up: 1501 rpm at 50 Hz means two pole pairs."""
+"""Tolerance for rounded rated speeds: 1501 rpm at 50 Hz means two pole pairs, not one."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceUnits:
-    """Conversions by what was read of one drive."""
+    """Conversions between units, with the readings of one drive."""
 
     profile: Profile
     readings: Mapping[str, Shown]
@@ -329,27 +336,27 @@ class ReferenceUnits:
 
     @property
     def absent(self) -> set[str]:
-        """Codes of words that the drive lacks."""
+        """Codes of words that the drive does not have."""
         return {code for code, reading in self.readings.items() if reading.absent}
 
     def unit(self, parameter: Parameter) -> str:
-        """The unit of a word; `raw` if it follows another word that was not read."""
+        """Return the unit of a word; `raw` if it depends on a word that was not read."""
         return self.profile.unit(parameter, self.raws)
 
     def quantity(self, quantity: Quantity) -> tuple[Decimal, str] | None:
-        """Number and unit of a quantity; None if it was not read, or its scale is not known."""
+        """Return the number and unit of a quantity; None if not read, or without a scale."""
         return self._number(self.profile.quantity(quantity))
 
     def whole(self, parameter: Parameter) -> Parameter | None:
-        """The parameter that holds 100 % of this one in a physical unit."""
+        """Return the parameter whose value is 100 % of this one, in a physical unit."""
         return self.profile.get(parameter.rating) if parameter.rating else None
 
     def converted(
         self, number: Decimal, unit: str, other: str, whole: Parameter | None = None
     ) -> Decimal | None:
-        """A number in another unit; None if nothing known leads from one to the other.
+        """Convert a number to another unit; None if no conversion is known.
 
-        `whole` is the parameter that holds 100 %.
+        `whole` is the parameter whose value is 100 %.
         """
         if (factor := factor_between(unit, other)) is not None:
             return number * factor
@@ -362,7 +369,7 @@ class ReferenceUnits:
         return self._between_speeds(number, unit, other)
 
     def _between_speeds(self, number: Decimal, unit: str, other: str) -> Decimal | None:
-        """Hz to rpm and back, at synchronous speed."""
+        """Convert between Hz and rpm at synchronous speed."""
         pairs = self._pole_pairs()
         if pairs is None:
             return None

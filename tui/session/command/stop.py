@@ -1,10 +1,10 @@
-"""Stopping motors: from any thread, before everything else on the line, seen to its end.
+"""Stops of motors: from any thread, before everything else on the line, followed to standstill.
 
-The first frame goes out behind at most the one exchange in flight. Its result is then read from the
-drive: an answer alone stops no motor. Several drives are stopped in two waves: the word by what was
-seen last of each, to all of them; then what has to be read, repeated, verified.
+The first frame waits for one exchange in progress at most. The result is then read from the drive,
+because an acknowledgment does not prove standstill. Several drives are stopped in two waves: first
+each is sent the word for its last known state; then the drives are read, and stops are repeated.
 
-An internal error anywhere on that way costs no stop: see `LastStop`.
+After an internal error `LastStop` sends the stop.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ from .under_way import UnderWay, watch_first_frames
 log = logging.getLogger(__name__)
 
 NO_ANSWER_NOW = 2
-"""The urgency of a drive that answers nothing."""
+"""Urgency of a drive that does not answer: after all others."""
 
 
 def _now(session: DriveSession) -> float:
-    """The time of a stop by the clock of its drive; by the machine's should that have failed."""
+    """Return the time by the drive's clock; by the system's if that raises an error."""
     try:
         return session.clock.monotonic()
     except Exception:
@@ -69,7 +69,7 @@ def _now(session: DriveSession) -> float:
 
 
 def _urgency(session: DriveSession) -> int:
-    """Motors that run or were commanded first; drives that answer nothing last."""
+    """Return the place in the order: running or commanded motors first, silent drives last."""
     try:
         if session.line.device_state(session.device).answers is False:
             return NO_ANSWER_NOW
@@ -90,12 +90,12 @@ class Stopper:
         self._under_way: dict[int, UnderWay] = {}
         self._last = LastStop(line, journal, self._say)
         self._own: dict[int, tuple[DriveSession, DriveSession]] = {}
-        """By device, a session that its drive contradicts, and one by the drive's own family."""
+        """By device, a session with a contradicted profile, and one of the drive's own family."""
         self._lock = threading.Lock()
 
     @property
     def reports(self) -> Mapping[int, StopReport]:
-        """The last report of each drive, by device."""
+        """Last report of each drive, by device."""
         return dict(self._reports)
 
     def stop(
@@ -106,15 +106,14 @@ class Stopper:
         *,
         given: bool = False,
     ) -> None:
-        """Order drives to stop; ends their work and their arming. Raises LineClosed.
+        """Stop drives; end their work and their arming. Raises LineClosed.
 
-        True `given` for a stop that all programs have heard of already. A stop whose word was not
-        yet sent does not restart: a key that is held down would keep every one of them from being
-        sent.
+        `given` is True if all programs on the line already know of the stop. A stop whose word
+        still waits is not restarted; otherwise a key that is held down would send none.
         """
         wanted = list(sessions)
         ordered = _now(wanted[0]) if wanted else 0.0
-        # first: what other programs meant for them before is void from here on
+        # first, because it cancels earlier commands of other programs
         if not given:
             carried_on(lambda: self._line.facts.give_stop([item.device for item in wanted], by))
         for session in wanted:
@@ -144,7 +143,7 @@ class Stopper:
             carried_on(lambda: self._line.spawn(behind, "stop all"))
 
     def send_prepared(self, session: DriveSession, error: Exception) -> None:
-        """Stop a drive by its prepared frames, after an internal error before `stop`."""
+        """Stop a drive by its prepared frames, after an internal error on the way to `stop`."""
         try:
             end_work(session, "the stop key")
         except Exception:
@@ -153,9 +152,9 @@ class Stopper:
         self._last.send(session, time.monotonic(), error)
 
     def _by_its_own(self, session: DriveSession) -> DriveSession:
-        """The session by which a drive is stopped: that of the family which it says it is of.
+        """Return a session with the profile of the family that the drive reports.
 
-        A word that stops the family it was taken for may start its own.
+        A word that stops the family of a wrong profile may start the drive's own.
         """
         own = session.known_identity.profile
         if not session.contradiction or own is None:
@@ -173,7 +172,7 @@ class Stopper:
     def _begin(
         self, session: DriveSession, order: OrderId, ordered: float, wave: FirstWave | None
     ) -> list[UnderWay]:
-        """Begin a stop of one drive, unless the same one goes out yet."""
+        """Begin a stop of one drive, unless the same one still waits to be sent."""
         device = session.device
         before = self._under_way.get(device)
         if before is not None:
@@ -189,15 +188,15 @@ class Stopper:
         return [begun]
 
     def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
-        """Wait from another thread until these stops have ended, or the time is up."""
-        # the thread that waits does so by the real clock, whichever the drives have
+        """Wait in another thread until these stops have ended, at most so many seconds."""
+        # a thread waits by the real clock, even if the drives have another one
         wanted, end = {session.device for session in sessions}, time.monotonic() + seconds
         while (summary := self._over(wanted)) is None and time.monotonic() < end:
             time.sleep(STANDSTILL_POLL_INTERVAL)
         return summary or self._summary(wanted)
 
     async def ended(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
-        """Wait in any loop until these stops have ended, or the time is up."""
+        """Wait in any loop until these stops have ended, at most so many seconds."""
         wanted, end = {session.device for session in sessions}, time.monotonic() + seconds
         while True:
             if (summary := self._over(wanted)) is not None or time.monotonic() > end:
@@ -205,7 +204,7 @@ class Stopper:
             await asyncio.sleep(STANDSTILL_POLL_INTERVAL)
 
     def _over(self, devices: set[int]) -> StopSummary | None:
-        """The stops of these drives, once nothing more is awaited of any."""
+        """Return the summary of these drives once all their stops have ended, else None."""
         summary = self._summary(devices)
         return summary if len(summary.reports) == len(devices) and summary.ended else None
 
@@ -213,7 +212,7 @@ class Stopper:
         return StopSummary([report for device, report in self.reports.items() if device in devices])
 
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
-        """Report how far a stop has come; an error in doing so costs no stop."""
+        """Report the progress of a stop; an error in the report does not affect the stop."""
         carried_on(lambda: self._report(session, phase, text, ordered))
 
     def _report(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
@@ -233,14 +232,14 @@ class Stopper:
     async def _behind_wave(
         self, wave: FirstWave, rest: set[int], sessions: list[DriveSession], order: OrderId
     ) -> None:
-        """Reach all by a broadcast once the wave is over; no frame of the `rest` belongs to it."""
+        """Send a broadcast after the first wave; drives of the `rest` are not part of the wave."""
         for device in rest:
             wave.passed(device)
         await wave.over()
         await self._broadcast(sessions, order)
 
     async def _broadcast(self, sessions: list[DriveSession], order: OrderId) -> None:
-        """Reach at once all drives of families whose word can start none that hears it."""
+        """Broadcast the stop words that cannot start a drive of any family on the line."""
         sent: set[tuple[int, int]] = set()
         for session in sessions:
             raws = session.image.trusted

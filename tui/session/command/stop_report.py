@@ -1,4 +1,4 @@
-"""Result of a stop of drives, for a person."""
+"""Progress and result of stops, as shown to a person."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from enum import StrEnum
 from typing import NamedTuple
 
 NOT_STOPPED = "NOT STOPPED: "
-"""The beginning of every text of a stop that does not stop its motor."""
+"""Beginning of each text about a motor that does not stop."""
 AT_THE_MACHINE = "Stop it at the machine."
 NOT_PROVED = (
     f"{NOT_STOPPED}it is not known if the motor stopped. The drive does not identify itself.{{}}"
-    " Look at the machine, or name its profile."
+    " Check the machine, or name its profile."
 )
-"""The text for a drive whose family is neither named nor proved, with what was read."""
+"""Text for a drive whose family is neither named nor identified; `{}` is what was read."""
 
 
 def not_stopped(why: str) -> str:
-    """The text of a stop that does not stop its motor: why, and what to do."""
+    """Return the text for a motor that does not stop: why, and what to do."""
     where = "" if why.endswith("at the machine.") else f" {AT_THE_MACHINE}"
     return f"{NOT_STOPPED}{why}{where}"
 
 
 def not_proved(read_as: str = "") -> str:
-    """The text for a drive of a guessed family, that is at standstill if `read_as` this one."""
+    """Return the text for a drive of a guessed family; `read_as` names the one that shows 0 Hz."""
     return NOT_PROVED.format(f" Read as {read_as}, it is at standstill." if read_as else "")
 
 
@@ -34,7 +34,7 @@ class Phase(StrEnum):
     STOPPING = "stopping"
     """Its frame was sent."""
     UNHEEDED = "unheeded"
-    """Its frame was sent, or waits, and something else than the line runs the motor."""
+    """Its frame was sent, or waits, but another source runs the motor."""
     STOPPED = "stopped"
     FAILED = "failed"
 
@@ -42,7 +42,7 @@ class Phase(StrEnum):
 NOT_STOPPING = frozenset({Phase.UNHEEDED, Phase.FAILED})
 """Phases in which a person must stop the motor at the machine."""
 OVER = frozenset({Phase.STOPPED, Phase.FAILED})
-"""Phases after which nothing more is awaited."""
+"""Phases in which a stop has ended."""
 
 
 class StopReport(NamedTuple):
@@ -56,23 +56,23 @@ class StopReport(NamedTuple):
 
 
 class StopSummary(NamedTuple):
-    """One stop of one or more drives, for a person."""
+    """Reports of one stop of one or more drives."""
 
     reports: list[StopReport]
 
     @property
     def ended(self) -> bool:
-        """True if nothing more is awaited."""
+        """True if all have ended."""
         return all(report.phase in OVER for report in self.reports)
 
     @property
     def failed(self) -> bool:
-        """True if some drive could not be stopped from here."""
+        """True if a drive could not be stopped."""
         return any(report.phase in NOT_STOPPING for report in self.reports)
 
     @property
     def head(self) -> str:
-        """Result."""
+        """The result in one sentence."""
         if self.failed:
             which = ", ".join(str(r.device) for r in self.reports if r.phase in NOT_STOPPING)
             return f"NOT STOPPED by Drive Panel: device {which}. Stop it at the machine."
@@ -80,7 +80,7 @@ class StopSummary(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Each drive's part."""
+        """The text of each drive, those that do not stop first."""
         ordered = sorted(
             self.reports, key=lambda report: (report.phase not in NOT_STOPPING, report.device)
         )

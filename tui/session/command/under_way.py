@@ -1,4 +1,4 @@
-"""Stops that were begun, and a look from outside whether the first frame of each is sent."""
+"""Stops in progress, and a check from another thread that the first frame of each is sent."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from .motor_stop import STANDSTILL_POLL_INTERVAL, MotorStop
 FIRST_FRAME_EACH = 0.3
 """Seconds that the first frame of each of several stops may take, on the slowest line."""
 SLOWEST_READS = 6
-"""Timeouts that may pass until a drive that answers nothing is sent its word blind."""
+"""Timeouts after which a drive that does not answer must have been sent its stop word."""
 
 SendLast = Callable[[DriveSession, float, Exception], None]
 
 
 @dataclass(frozen=True, slots=True)
 class UnderWay:
-    """A stop that was begun."""
+    """A stop in progress."""
 
     stop: MotorStop
     worker: LineWorker
     times: int
-    """Number of times the drive had been armed then."""
+    """Number of times that the drive had been armed at its start."""
 
     def is_lost(self, begins_late: bool, is_late: bool) -> bool:
-        """True if it ended, or did not begin or get on in time, without having been sent."""
+        """Return True if it was not sent, and has ended or is too late."""
         stop = self.stop
         if stop.sent or stop.over:
             return False
@@ -43,9 +43,9 @@ class UnderWay:
         return self.worker.done() or is_late or (begins_late and connected and not stop.begun)
 
     def goes_out(self, session: DriveSession, order: OrderId) -> bool:
-        """Return True if it does all that another stop of the drive would do now.
+        """Return True if another stop of the drive would add nothing.
 
-        Its words are on their way still, and nothing was written since: that needs arming.
+        Its words still wait to be sent, and the drive was not armed since, so nothing was written.
         """
         same = self.stop.session is session and self.stop.wanted == order
         waits = not self.worker.done() and not self.stop.sent
@@ -53,9 +53,9 @@ class UnderWay:
 
 
 def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: SendLast) -> None:
-    """See in a thread of its own that the first frame of each stop is sent.
+    """Check in a separate thread that the first frame of each stop is sent.
 
-    An error outside of the stop itself, in the line's loop, ends it without a word.
+    An error in the line's loop ends a stop silently; then its prepared frames are sent.
     """
     if not begun:
         return
@@ -85,7 +85,7 @@ def watch_first_frames(begun: Sequence[UnderWay], timing: Timing, send_last: Sen
 
 
 def _stop_directly(hanging: Sequence[UnderWay], given: list[UnderWay]) -> None:
-    """Have the keeper of the line stop drives whose stops get on no further here."""
+    """Have the keeper of the line stop drives whose stops hang in this program."""
     if hanging:
         line = hanging[0].stop.session.line
         if (voice := line.facts.voice) is not None:

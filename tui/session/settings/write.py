@@ -1,4 +1,4 @@
-"""Writing one parameter: sent once, read back, compared, and put into the journal."""
+"""Write of one parameter: sent once, read back, compared, and recorded in the journal."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ log = logging.getLogger(__name__)
 
 
 class NotTaken(DriveError):
-    """A write that the drive answered well and did not take: it holds something else."""
+    """The drive acknowledged a write, but holds another value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """Writes the parameters of one drive, with the permit of a task; a stop needs none."""
+    """Writes parameters of one drive under the permit of a task; None for a stop."""
 
     session: DriveSession
     journal: Journal
@@ -47,13 +47,14 @@ class Writer:
         priority: Priority = Priority.OPERATOR_WRITE,
         within: float | None = None,
     ) -> None:
-        """Write a raw value and see that the drive holds it, in the bits of `check`.
+        """Write a raw value, read it back, and compare the bits of `check`.
 
-        A `replaceable` one gives way to a newer value of the same parameter while it waits.
-        What the drive holds is unknown from here on until it was read back.
+        While a `replaceable` write waits, a newer one of the same parameter replaces it. The value
+        is unknown from the write until it is read back. `within` is the longest wait for the reply
+        in seconds.
 
-        Raises Stopped and NotArmed, the line's errors, and NotTaken where the drive holds
-        something else.
+        Raises Stopped and NotArmed, the line's errors, and NotTaken if the drive holds another
+        value.
         """
         session, code = self.session, parameter.code
         if self.permit is not None:
@@ -83,7 +84,7 @@ class Writer:
                 )
         except (RequestRefused, Superseded) as error:
             answer, sent = str(error), False
-            # never sent: what was known before still holds
+            # never sent: the value before the write is still known
             session.image.believe(code, before)
             raise
         except DeviceException as error:
@@ -109,7 +110,7 @@ class Writer:
             except Exception:
                 if self.permit is not None:
                     raise
-                # a stop that was sent is not undone by its record
+                # an error of the journal must not make a stop that was sent fail
                 log.exception("a stop of device %s is not in the journal", session.device)
 
     def _note_unsaved(self, parameter: Parameter, before: int | None, now: int | None) -> None:
@@ -120,10 +121,9 @@ class Writer:
         unsaved.note_write(parameter.code, before, now)
 
     def complete_later(self, entry: Entry, parameter: Parameter, check: int = 0xFFFFFFFF) -> None:
-        """Record in the journal the result of a write whose answer was lost, once that is read.
+        """Complete the journal entry of a write without a reply at the next read of the parameter.
 
-        It counts as taken where the bits of `check` are those that were written; with 0 a drive
-        may change the word as it likes.
+        It counts as taken if the bits of `check` are as written; with 0 nothing is compared.
         """
         self.session.image.tell_once(
             parameter.code, partial(self._complete, entry, parameter, check)
@@ -145,21 +145,21 @@ class Writer:
         )
 
     async def _read_scale(self, parameter: Parameter) -> None:
-        """Read what the parameter's scale and unit follow, so that the journal shows units."""
+        """Read the words that the parameter's scale and unit depend on, for the journal."""
         image = self.session.image
         known = {*image.trusted, *image.lacking}
         if unknown := [code for code in depends_on(parameter) if code not in known]:
             await Reader(self.session).read(unknown)
 
     async def _held_word(self, parameter: Parameter) -> int:
-        """The word that contains a field, read now: its other bits must stay."""
+        """Read the word that contains a field, because its other bits must be kept."""
         reply = await self.session.line.read(
             self.session.device, parameter.address, 1, priority=Priority.OPERATOR_WRITE
         )
         return reply.words[0]
 
     async def _read_back(self, parameter: Parameter) -> int | None:
-        """Return the present value; None if the drive does not report it."""
+        """Read the value and store it in the image; None if the drive does not report it."""
         if parameter.access == "w":
             return None
         count = word_count(parameter)
@@ -180,11 +180,11 @@ class Writer:
 
 
 CUT_SHORT = "a stop came: not known whether it was taken"
-"""Entry of a write that was ended before its answer."""
+"""Journal text of a write that was canceled before its reply."""
 
 
 def raw_text(session: DriveSession, parameter: Parameter, raw: int | None) -> str:
-    """A raw value as a person reads it; nothing for None."""
+    """Return a raw value with its unit or name; empty for None."""
     image = session.image
     return shown_text(session.profile, parameter, raw, image.raws, image.lacking)
 
@@ -199,7 +199,7 @@ def parameter_entry(
     why: str,
     read_back: int | None = None,
 ) -> Entry:
-    """A write in progress: raw values before and after, the answer, and the value read back."""
+    """Make the journal entry of a write, with raw values before, after, and read back."""
     return Entry(
         time=now_text(),
         line=session.line_text,
@@ -220,7 +220,7 @@ def parameter_entry(
 def device_refusal(
     profile: Profile, parameter: Parameter, error: DeviceException, headline: str
 ) -> str:
-    """Return the exception's meaning in this family, the drive's state, and the next step."""
+    """Explain an exception reply to a write: its meaning in this family, and the next step."""
     known = next((e for e in profile.data.exceptions if e.code == error.code), None)
     if known is None:
         message = f"exception {error.code}, which no document of this family explains"

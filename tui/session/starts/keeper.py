@@ -1,4 +1,4 @@
-"""The starts of one line on record: put there before the run frame, taken away at standstill."""
+"""Motor starts on one line: recorded before the run frame, removed at standstill."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class Startable(Protocol):
-    """Facts about a drive that the record of its start needs."""
+    """The part of a DriveSession that the record of a start needs."""
 
     device: int
     profile: Profile
@@ -40,28 +40,28 @@ class Startable(Protocol):
 
     @property
     def line_text(self) -> str:
-        """The line as it was named."""
+        """The line as a person types it."""
         ...
 
     @property
     def known_identity(self) -> DriveIdentity:
-        """Identity of the drive, as far as it is known."""
+        """Identity that the drive reports; with empty fields if it reports none."""
         ...
 
     @property
     def commanded(self) -> bool:
-        """True if this program has commanded it."""
+        """True if this program has sent the drive a command."""
         ...
 
     def note_command(self) -> None:
-        """A command was sent from here."""
+        """Remember that this program has sent a command now."""
         ...
 
 
 class StartKeeper:
-    """Knows which motors this program has started, and which an earlier one left running.
+    """Motors on one line that this program has started, or that an earlier one left running.
 
-    None of its methods but `begin`, `found` and `take_over` waits for the disk.
+    Only `begin`, `look`, `started_by`, `take_over` and `leave` wait for the disk.
     """
 
     def __init__(
@@ -69,21 +69,21 @@ class StartKeeper:
     ) -> None:
         self._clock = clock
         self.unrecorded = False
-        """True if a start that cannot be put on record is let through; a person's word."""
+        """True if a person allows starts that cannot be recorded."""
         self.left_running = False
-        """True if what is started or taken over now is to go on when the program is gone."""
+        """True if motors that are started now must keep running when the program has ended."""
         self._program = program
         self._starts = starts or Starts(clock=clock)
         self._begun: dict[int, StartRecord] = {}
         self._sent: dict[int, float] = {}
         self._left: dict[int, StartRecord] = {}
         self._silent: frozenset[int] = frozenset()
-        """Devices of which a program that lives, but is not on the line, has started the motor."""
+        """Devices whose motor was started by a living program that is not on the line."""
         self._runs_on: frozenset[int] = frozenset()
-        """Devices whose motor was started before the start that was begun last."""
+        """Devices whose motor was already started when the last start began."""
 
     def begin(self, session: Startable, order: Literal["forward", "reverse"]) -> None:
-        """Put a start on the disk. Raises StartNotRecorded."""
+        """Write a start to the disk and wait for it. Raises StartNotRecorded."""
         watch = session.timeout.watch if session.timeout is not None else None
         record = self._starts.record(
             session.line_text,
@@ -112,13 +112,13 @@ class StartKeeper:
         self._begun = {**self._begun, session.device: record}
 
     def sent(self, session: Startable) -> None:
-        """The run frame went out: a standstill seen from now on ends the record."""
+        """Let a standstill that is seen from now on end the record: its run frame was sent."""
         self._runs_on -= {session.device}
         self._sent = {**self._sent, session.device: self._clock.monotonic()}
         self._starts.sent(session.line_text, session.device)
 
     def standing(self, session: Startable, seen: float) -> None:
-        """The motor was seen at rest at a time on the monotonic clock."""
+        """Remove the record of a motor that was seen at standstill at a time (monotonic)."""
         device = session.device
         if device in self._begun or device in self._left:
             self._left = {d: record for d, record in self._left.items() if d != device}
@@ -127,16 +127,16 @@ class StartKeeper:
             self._starts.end(session.line_text, device, seen)
 
     def withdraw(self, session: Startable) -> None:
-        """A stop was given: what an earlier program started is no longer offered.
+        """Offer the motor of an earlier program no longer, because it was given a stop.
 
-        The record of a start goes with the standstill, not with the stop: that may be lost.
+        The record is removed at standstill, not at the stop, because a stop may be lost.
         """
         self._left = {d: record for d, record in self._left.items() if d != session.device}
 
     def never_sent(self, session: Startable) -> None:
-        """The start was refused before its run frame went out.
+        """Remove the record of a start whose run frame was never sent.
 
-        A motor that was started before runs on: its standstill ends the record, not this.
+        A motor that was started before keeps its record until standstill.
         """
         if session.device in self._runs_on:
             self.sent(session)
@@ -145,30 +145,30 @@ class StartKeeper:
             self._starts.note_stop(session.line_text, session.device)
 
     def holds(self, device: int) -> bool:
-        """Return True if a motor that was started here is not yet known to be at standstill."""
+        """Return True if a motor that this program has started may still run."""
         return device in self._begun
 
     def stopped_by_others(self, device: int) -> bool:
-        """Return True if a motor started here is not meant to go on where this program is gone."""
+        """Return True if other programs stop the motor when this program has ended."""
         record = self._begun.get(device)
         return record is not None and not record.left_running
 
     def started_by(self, session: Startable, process: ProcessKey) -> bool:
-        """Return True if a program has the motor on record as its own; reads files."""
+        """Return True if a process has recorded the motor as its own. Reads files."""
         return self._starts.is_on_record(session.line_text, session.device, process)
 
     def give_away(self, session: Startable) -> None:
-        """Another program looks after the motor from now on."""
+        """Remove the record of a motor that another program has taken over."""
         if session.device in self._begun:
             self._begun = {d: record for d, record in self._begun.items() if d != session.device}
             self._starts.note_stop(session.line_text, session.device)
 
-    # What an earlier program left
+    # Motors that an earlier program left running
 
     def look(self, session: Startable) -> None:
-        """Find what an earlier program has started of this drive; reads files.
+        """Find the start of this drive by an earlier program. Reads files.
 
-        A motor that this very program has started stays its own: its line was closed since.
+        A motor that this program has started, before it closed the line, stays its own.
         """
         if session.device not in self._begun and (
             own := self._starts.own(session.line_text, session.device)
@@ -184,9 +184,9 @@ class StartKeeper:
             self._left = {**self._left, session.device: found}
 
     def offered(self, session: Startable, *, runs: bool | None) -> str:
-        """Describe a motor that an earlier program has started; empty if any commands it now.
+        """Describe the motor of an earlier program; empty if a program commands it now.
 
-        Not known if it `runs`: None.
+        `runs` is None if its state is not known.
         """
         record, facts = self._left_of(session), session.line.facts
         if record is None or session.commanded or facts.commander(session.device) is not None:
@@ -194,7 +194,7 @@ class StartKeeper:
         return offer(record, session.identity, runs, lives=session.device in self._silent)
 
     def _left_of(self, session: Startable) -> StartRecord | None:
-        """The start that is offered; None once its program is back on the line."""
+        """Return the start that can be taken over; None once its program is back on the line."""
         record = self._left.get(session.device)
         if record is None or session.device not in self._silent:
             return record
@@ -202,10 +202,10 @@ class StartKeeper:
         return None if back else record
 
     def take_over(self, session: Startable) -> None:
-        """Put an earlier program's start on record as this program's. Raises StartNotRecorded."""
+        """Record the start of an earlier program as this program's. Raises StartNotRecorded."""
         record = self._left_of(session)
         if record is None:
-            raise NothingToTakeOver("No start of an earlier program is known of this drive.")
+            raise NothingToTakeOver("No earlier program has recorded a start of this drive.")
         mine = self._starts.taken_over(
             record, session.line_text, program=self._program, left_running=self.left_running
         )
@@ -221,26 +221,26 @@ class StartKeeper:
             self.sent(session)
 
     def close(self) -> None:
-        """Wait a moment for what is still to be written."""
+        """Wait a moment for the disk work."""
         self._starts.close()
 
 
 def pids_absent(facts: SharedState) -> frozenset[ProcessKey]:
-    """The processes of programs that have left the line, frozen ones among them."""
+    """Return the processes of programs that have left the line, including frozen ones."""
     here = {program.process for program in facts.programs}
     return frozenset({program.process for program in facts.departed} - here)
 
 
 class NothingToTakeOver(DriveError):
-    """There is no motor that an earlier program has started."""
+    """There is no motor of an earlier program to take over."""
 
 
 async def record_start(
     session: Startable, order: Literal["forward", "reverse"], permit: Permit
 ) -> None:
-    """Put a start on record before its frame goes out, where starts are recorded.
+    """Record a start before its frame is sent, if this program records starts.
 
-    Raises StartNotRecorded, and Stopped where a stop came meanwhile.
+    Raises StartNotRecorded, and Stopped if a stop came in the meantime.
     """
     if session.starts is not None:
         await asyncio.to_thread(session.starts.begin, session, order)

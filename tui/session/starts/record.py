@@ -1,4 +1,4 @@
-"""A motor's start as it is kept, and what a later program can report about the motor."""
+"""Record of a motor start, and what a later program can report about the motor."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from tui.drive.errors import DriveError
 
 @dataclass(frozen=True, slots=True)
 class StartRecord:
-    """A motor's start: where, which drive, by which program, when."""
+    """A motor start: line, drive, program, time."""
 
     line: str
-    """As it was typed; `line_key` compares."""
+    """As it was typed; compare it by `line_key`."""
     device: int
     profile: str
-    """The id of the profile under which it was started."""
+    """Id of the profile with which it was started."""
     vendor: str
     reference: str
     version: str
     name: str
-    """Identity reported by the drive; empty if none."""
+    """Name that the drive reports, as the three fields above; empty if none."""
     order: Literal["forward", "reverse"]
     boot_id: str
     pid: int
     started: str
-    """When the program itself was started, from `Processes.started`."""
+    """Start time of the process, from `Processes.started`."""
     program: str
-    """`panel`, `run` and the like."""
+    """Such as `panel` or `run`."""
     left_running: bool
-    """True if the motor is meant to go on when the program ends."""
+    """True if the motor must keep running when the program ends."""
     wall: str
-    """When the start was ordered: ISO with zone, to the millisecond."""
+    """Time of the start: ISO with zone, to the millisecond."""
     guessed: bool = False
-    """True if the profile was a guess; it names the drive's family to nobody."""
+    """True if the profile was a guess, so that it does not identify the drive's family."""
     acts_after: float | None = None
     """Seconds of the drive's communication timeout, if it was known."""
 
@@ -52,17 +52,17 @@ class StartRecord:
 
     @property
     def process(self) -> ProcessKey:
-        """The process of its program, among those of all containers."""
+        """PID namespace and PID of its program."""
         return self.space or pid_namespace(), self.pid
 
     @property
     def is_foreign(self) -> bool:
-        """True if its program ran in another PID namespace, where nothing is known of it."""
+        """True if its program ran in another PID namespace, where this one cannot see it."""
         return self.process[0] != pid_namespace()
 
     @property
     def begun(self) -> datetime | None:
-        """When the start was ordered, in the zone of here; None if the text is not a time."""
+        """Time of the start in the local zone; None if the text is not a time."""
         try:
             return datetime.fromisoformat(self.wall).astimezone()
         except (ValueError, OverflowError):
@@ -77,11 +77,11 @@ def offer(
     *,
     lives: bool = False,
 ) -> str:
-    """Describe a motor whose program has exited, and that no program commands; empty if none.
+    """Describe a motor whose program has exited, and that no program commands.
 
-    Not known if it `runs`: None. A program that `lives` is frozen, or has left the line. Empty if
-    the drive does not run, or is not the one that was started; what either of them left unsaid
-    counts as the same.
+    `runs` is None if its state is not known. A program that `lives` is frozen, or has left the
+    line. Empty if the motor does not run, or if another drive has its address now. A part of the
+    identity that is missing on either side counts as equal.
     """
     if runs is False or (identity is not None and not _same(record, identity)):
         return ""
@@ -135,4 +135,4 @@ class StartOvertaken(StartNotRecorded):
 
     def __init__(self, device: int, folder: Path) -> None:
         super().__init__(device, folder, OVERTAKEN)
-        self.args = (f"A stop of drive {device} came before its start, which is not sent.",)
+        self.args = (f"Not started: a stop of drive {device} came before its start.",)

@@ -1,7 +1,7 @@
-"""Starts of motors on record, so that the next program knows what this one left running.
+"""Records of motor starts, by which the next program knows the motors that this one left running.
 
-begin() before the run frame, sent() once it went out, end() at standstill, note_stop() at a stop.
-Only begin() and the found ones wait for the disk.
+Call begin() before the run frame, sent() after it, end() at standstill, note_stop() at a stop.
+Only begin() and the methods that read files wait for the disk.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ log = logging.getLogger(__name__)
 
 
 class Starts:
-    """The starts on record; one object for each program, used from any thread.
+    """Records of motor starts; one object per program, for any thread.
 
-    The disk work is done in order in a thread that lives while there is some. At most one removal
-    waits for each drive, so a disk that hangs piles nothing up.
+    A thread does the disk work in order, and ends when there is none. At most one removal per
+    drive waits, so a disk that hangs accumulates no work.
     """
 
     def __init__(
@@ -53,12 +53,13 @@ class Starts:
         self._files = start_records(folder)
         self.processes = processes or Processes()
         self._changed = threading.Condition()
-        """Guards all below; never held over disk work."""
+        """Guards the fields below; never held during disk work."""
         self._waiting: deque[StartTask] = deque()
         self._current: StartTask | None = None
         self._thread: threading.Thread | None = None
         self._sent: dict[DriveKey, float] = {}
-        """Since when a standstill says that the motor stopped; never while a start is under way."""
+        """By drive, the time after which a standstill ends the start (monotonic); infinite until
+        the run frame was sent."""
 
     @property
     def folder(self) -> Path:
@@ -77,7 +78,7 @@ class Starts:
         guessed: bool = False,
         acts_after: float | None = None,
     ) -> StartRecord:
-        """A start by this program, now; begin() puts it on the disk."""
+        """Make the record of a start by this program now; begin() writes it to the disk."""
         return StartRecord(
             line=line,
             device=identity.device,
@@ -101,7 +102,7 @@ class Starts:
     def taken_over(
         self, found: StartRecord, line: str, *, program: str, left_running: bool = False
     ) -> StartRecord:
-        """The start of a program that ended, as this program's; begin() puts it on the disk."""
+        """Make the record of a motor that this program takes over; begin() writes it."""
         boot_id, pid = self.processes.boot_id(), os.getpid()
         started = self.processes.started(pid) or ""
         return replace(
@@ -111,10 +112,10 @@ class Starts:
         )  # fmt: skip
 
     def begin(self, record: StartRecord, patience: float = START_PATIENCE) -> None:
-        """Put a start on the disk, flushed, before its run frame goes out.
+        """Write a start to the disk, flushed, before its run frame is sent.
 
-        Waits for the disk, at most `patience` seconds. Raises StartNotRecorded where the run is
-        to be refused, StartOvertaken where a stop came meanwhile.
+        Waits at most `patience` seconds for the disk. Raises StartNotRecorded if the run must be
+        refused, StartOvertaken if a stop came in that time.
         """
         task = StartTask((record.line, record.device), record)
         with self._changed:
@@ -136,16 +137,16 @@ class Starts:
         raise StartNotRecorded(record.device, self.folder, task.trouble)
 
     def sent(self, line: str, device: int) -> None:
-        """The run frame went out, answered or not: a standstill seen from now on counts."""
+        """Let a standstill that is seen from now on end the start: its run frame was sent."""
         with self._changed:
             if (line, device) in self._sent:
                 self._sent[line, device] = self._clock.monotonic()
 
     def end(self, line: str, device: int, seen: float | None = None) -> None:
-        """The motor is at standstill: remove its record. Returns at once and never raises.
+        """Remove the record of a motor that is at standstill. Never waits or raises.
 
-        `seen` is the monotonic time at which standstill was read, now unless given. One that was
-        read before the run frame went out is the rest before the start, and changes nothing.
+        `seen` is the time of the standstill (monotonic; default: now). A standstill before the
+        run frame was sent is the one before the start, and changes nothing.
         """
         with self._changed:
             if (self._clock.monotonic() if seen is None else seen) > self._sent.get(
@@ -154,9 +155,9 @@ class Starts:
                 self._take_away((line, device))
 
     def note_stop(self, line: str, device: int) -> None:
-        """A stop went out, or a start never did: its record goes. At once, and never raises.
+        """Remove a record after a stop, or if the start was never sent. Never waits or raises.
 
-        A start that is just being recorded is refused.
+        A start that is being recorded at this moment is refused.
         """
         drive = (line, device)
         with self._changed:
@@ -170,18 +171,18 @@ class Starts:
     def found(
         self, line: str, device: int, absent: Collection[ProcessKey] = ()
     ) -> StartRecord | None:
-        """The last start of a drive if its program ended, however the line was typed.
+        """Return the last start of a drive if its program has ended. Reads files.
 
-        None where a living program, this one too, has a start of this drive on record.
+        None if a living program, or this one, has a record of the drive.
         """
         return next(
             (record for record in self.all_found(line, absent) if record.device == device), None
         )
 
     def all_found(self, line: str, absent: Collection[ProcessKey] = ()) -> list[StartRecord]:
-        """The drives of a line that programs which ended have started, by device. Reads files.
+        """Return the starts on a line by programs that have ended, by device. Reads files.
 
-        `absent` are processes of programs that count as ended: they left the line, or are frozen.
+        `absent` are processes that count as ended: they have left the line, or are frozen.
         """
         key = line_key(line)
         going = self._going(key)
@@ -192,24 +193,24 @@ class Starts:
         ]
         alive = {record.device for record in living if not record.is_foreign}
         newest = {record.device: record for record in here if record.device not in alive}
-        # of another container it is not known whether its program lives: a later start counts
+        # in another container a program may have ended unnoticed, so a later start counts
         return [newest[device] for device in sorted(newest) if newest[device] not in living]
 
     def is_on_record(self, line: str, device: int, process: ProcessKey) -> bool:
-        """Return True if a program has a start of a drive on record. Reads files."""
+        """Return True if a process has recorded a start of a drive. Reads files."""
         return any(
             record.device == device and record.process == process for record in self._of(line)
         )
 
     def own(self, line: str, device: int) -> StartRecord | None:
-        """The start of a drive that this very program has on record. Reads files."""
+        """Return the start of a drive that this program has recorded. Reads files."""
         if device in self._going(line_key(line)):
             return None
         here = (record for record in self._of(line) if record.device == device)
         return next((record for record in here if self._own(record)), None)
 
     def _going(self, key: str) -> set[int]:
-        """The drives of a line whose records are being taken away."""
+        """Return the drives of a line whose records are being removed."""
         with self._changed:
             tasks = [*self._waiting, *([self._current] if self._current else [])]
         return {
@@ -219,17 +220,17 @@ class Starts:
         }
 
     def _of(self, line: str) -> list[StartRecord]:
-        """The starts of a line, the newest last."""
+        """Return the starts of a line, the newest last."""
         key = line_key(line)
         here = [record for record in self._files.records() if line_key(record.line) == key]
         return sorted(here, key=lambda item: item.begun.timestamp() if item.begun else 0.0)
 
     def newest(self, line: str) -> dict[int, StartRecord]:
-        """By device, the last start on record, whose program lives or not; reads files."""
+        """Return the last start by device, even if its program has ended. Reads files."""
         return {record.device: record for record in self._of(line)}
 
     def close(self, timeout: float = 1.0) -> bool:
-        """Wait for what is still to be written or removed, so many seconds; False if it was not."""
+        """Wait at most so many seconds for the disk work; return False if it is not done."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: not self._waiting and self._current is None, timeout
@@ -251,7 +252,7 @@ class Starts:
             thread.start()
             self._thread = thread
         except RuntimeError as error:
-            # no thread to be had: the next call tries again, a start is refused
+            # the system has no thread: a start is refused, and the next call tries again
             log.error("starts cannot be recorded: %s", error)
             if task.record is not None:
                 self._waiting.remove(task)
@@ -273,12 +274,12 @@ class Starts:
                 task.done.set()
 
     def _trouble_with(self, task: StartTask) -> str:
-        """Do a task; what went wrong, or nothing."""
+        """Do a task; return its error as text, or an empty string."""
         try:
             if task.record is None:
                 self._remove(*task.drive)
             elif not task.void:
-                # by its adapter's name: whoever looks for it may find that under another number
+                # by the adapter's name, because its port may get another number
                 record = replace(task.record, line=remembered_text(task.record.line))
                 self._files.write_record(record, lambda: not task.void)
         except OSError as error:
@@ -289,9 +290,9 @@ class Starts:
         return ""
 
     def _remove(self, line: str, device: int) -> None:
-        """Remove a drive's records, but for those of other programs that live.
+        """Remove a drive's records, except those of other living programs.
 
-        Such a program sees the standstill itself; here it may be the rest before its run frame.
+        Such a program sees the standstill itself. This one may have seen the one before its start.
         """
         key = line_key(line)
         self._files.remove(
@@ -306,24 +307,23 @@ class Starts:
         return record.process == (pid_namespace(), os.getpid()) and self.is_alive(record)
 
     def is_alive(self, record: StartRecord) -> bool:
-        """Return True if the program of a start lives; in doubt it does, as in another
-        container."""
+        """Return True if the program of a start may live; one in another container may."""
         if record.is_foreign:
             return self.processes.is_same_boot(record.boot_id)
         return self.processes.lives(record.boot_id, record.pid, record.started)
 
 
 DriveKey = tuple[str, int]
-"""A line's text and a device: one program calls one line by one text."""
+"""A line's text and a device; within a program, a line has one text."""
 
 
 @dataclass(eq=False, slots=True)
 class StartTask:
-    """Work for the disk: a record to write, or with None those of a drive to remove."""
+    """Disk work: a record to write, or None to remove those of a drive."""
 
     drive: DriveKey
     record: StartRecord | None
     done: threading.Event = field(default_factory=threading.Event)
     trouble: str = ""
     void: bool = False
-    """Nobody waits for it any more, or a stop came first: it is not to be put in its place."""
+    """True if it is canceled by a stop or a timeout; then its file does not become valid."""
