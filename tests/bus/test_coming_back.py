@@ -6,8 +6,8 @@ import asyncio
 
 import pytest
 
+from tests.limits import BACK_AT_LATEST, BACK_WITHIN
 from tui.bus.share.heartbeat import BACK_LOOK, programs_back
-from tui.safety import BACK_AT_LATEST, BACK_WITHIN
 
 
 class StarvedLoop:

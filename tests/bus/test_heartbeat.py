@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.limits import BEAT_INTERVAL, LOOP_HANGS, SILENT_CLIENT
 from tests.line_events import on_event
 from tui.bus.line_events import ProgramLost
 from tui.bus.share.heartbeat import Heartbeat
 from tui.bus.share.messages import Alive, Pulse, packed
 from tui.bus.share.place import Peer, owner_of, short_path
-from tui.safety import BEAT_INTERVAL, LOOP_HANGS, SILENT_CLIENT
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.limits import FROZEN_IN_SENDING
 from tui.bus.api import Priority
 from tui.bus.errors import LineError
 from tui.bus.link import Link, RtuTcpLink, TcpLink
@@ -29,7 +30,6 @@ from tui.bus.trace import Trace
 from tui.bus.transport.base import Receiver
 from tui.bus.transport.serial_posix import PosixSerial
 from tui.bus.transport.tcp import TcpTransport
-from tui.safety import FROZEN_IN_SENDING
 
 from .conftest import BRISK, OpenLine
 from .peer import honest_pdu, reply, tcp_reply

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
+from tests.limits import READS_PER_TIMEOUT
 from tui.bus.errors import NoAnswer
 from tui.bus.keep_alive import LONGEST_TIMEOUT, SHORTEST_TIMEOUT, KeepAlive
 from tui.bus.line import Line
@@ -20,7 +21,6 @@ from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.share.messages import NoMessage, packed, unpacked
 from tui.bus.shared_state import SharedState
-from tui.safety import READS_PER_TIMEOUT
 
 from .conftest import OpenLine, Share
 from .peer import PtyPeer, eventually, honest, honest_pdu

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from tests.limits import ALARM_AFTER
 from tui.bus.api import Priority
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
@@ -17,7 +18,6 @@ from tui.bus.program import KEEPER, Program, pid_namespace
 from tui.bus.share.keeper_share import PROCESS_ENDS_WITHIN, KeeperShare, Keeping
 from tui.bus.share.messages import VERSION
 from tui.bus.share.place import STARTING, Owner, OwnerLock, SharePlace, owner_of
-from tui.safety import ALARM_AFTER
 
 from .peer import PtyPeer, honest
 from .sharing import QUICK, SharedLines, place_in

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import pytest
 
+from tests.limits import LEASE_RENEWED_EVERY
 from tests.line_events import on_event
 from tui.bus.api import Priority
 from tui.bus.bounds import MOST_CARE
@@ -17,7 +18,6 @@ from tui.bus.errors import RequestRefused
 from tui.bus.line import Line
 from tui.bus.line_events import StopDue, WriteAbandoned
 from tui.bus.program import Program
-from tui.safety import LEASE_RENEWED_EVERY
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, reply

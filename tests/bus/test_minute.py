@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.limits import MISSES
 from tui.bus.master import ExchangeResult, Piece, ResultKind
 from tui.bus.model import LastMinute, Priority, Timing
 from tui.bus.requests import Read
@@ -12,7 +13,6 @@ from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.shared_state import SharedState
 from tui.bus.tally import BUCKET, BUCKETS, MinuteWindow, Tally
-from tui.safety import MISSES
 from tui.wire.frames import frame
 
 from .conftest import WIDE, Share

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 import pytest
 import serial
 
+from tests.limits import ALARM_AFTER
 from tui.bus.errors import LineLost, PortMissing
 from tui.bus.transport import opening
 from tui.bus.transport.opening import closed_beside, opened_beside
 from tui.bus.transport.serial_posix import PosixSerial
-from tui.safety import ALARM_AFTER
 
 from .peer import eventually
 

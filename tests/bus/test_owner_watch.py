@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from tests.limits import HEARD_WITHIN, SILENT_OWNER, STOP_HEARD_WITHIN, TAKEN_IN_WITHIN
 from tui.bus.model import Priority
 from tui.bus.program import KEEPER, Program
 from tui.bus.share.messages import VERSION, Alive, Asking, Notified, StopGiven
@@ -29,7 +30,6 @@ from tui.bus.share.owner_watch import (
     is_stop,
 )
 from tui.bus.share.place import Owner, Peer
-from tui.safety import HEARD_WITHIN, SILENT_OWNER, STOP_HEARD_WITHIN, TAKEN_IN_WITHIN
 
 LISTENS = """
 import socket, sys

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
+from tests.limits import SILENT_OWNER
 from tests.line_events import on_event
 from tui.bus.api import LineStatus
 from tui.bus.errors import LineError
 from tui.bus.line_events import ControlDenied, ProgramLost, StateChanged
 from tui.bus.share.client import STOOD_STILL
-from tui.safety import SILENT_OWNER
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest

@@ -10,6 +10,7 @@ from functools import partial
 
 import pytest
 
+from tests.limits import HEARD_WITHIN, STOPS_KEPT
 from tests.line_events import on_event
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineError, LineLost, NoAnswer, RequestRefused
@@ -19,7 +20,6 @@ from tui.bus.program import KEEPER
 from tui.bus.share.owner_watch import OTHER_CONTAINER
 from tui.bus.share.place import owner_of
 from tui.bus.stop_counts import StopCounts
-from tui.safety import HEARD_WITHIN, STOPS_KEPT
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.limits import BURST_GAP
 from tests.programs import wait_until
 from tests.terminal.dialect_tables import DIALECTS
-from tui.safety import BURST_GAP
 from tui.terminal.dialects import ESCAPE_DELAY
 
 from .pty_panel import REFERENCE, SPLIT, STOP, PtyPanel, Write, panel_on_a_pty

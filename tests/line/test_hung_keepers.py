@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.limits import ALARM_AFTER, HEARD_WITHIN, STOP_HEARD_WITHIN
 from tests.programs import DRIVEPANEL, PATIENCE, Served, is_running, keepers, served, wait_until
-from tui.safety import ALARM_AFTER, HEARD_WITHIN, STOP_HEARD_WITHIN
 from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.limits import LINGERS
 from tests.programs import (
     DRIVEPANEL,
     PATIENCE,
@@ -27,7 +28,6 @@ from tests.programs import (
 )
 from tui.bus.share.keeping import can_start
 from tui.drive.profile import library
-from tui.safety import LINGERS
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor

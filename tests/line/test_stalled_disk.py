@@ -5,10 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 
+from tests.limits import STOP_DISK_WITHIN
 from tests.programs import PATIENCE, rtu_tcp
 from tui.cli.running.stop_targets import REMEMBERED_WITHIN
 from tui.cli.short_stop import _SENT_WITHIN
-from tui.safety import STOP_DISK_WITHIN
 from tui.session.connect.share_place import share_place
 from tui.simulator import DriveSpec, Simulation
 

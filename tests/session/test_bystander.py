@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import pytest
 
-from tui.safety import GRACE_SHARE
+from tests.limits import GRACE_SHARE
 from tui.session.drive import DriveSession
 from tui.session.sharing.observer_poller import (
     ACTED_AFTER,

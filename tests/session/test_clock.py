@@ -12,12 +12,12 @@ from typing import cast
 import pytest
 
 import tui.session
+from tests.limits import ARMED_FOR
 from tui.bus.api import LineState, LineStatus
 from tui.bus.limits import Limits
 from tui.bus.line import Line
 from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
-from tui.safety import ARMED_FOR
 from tui.session.clock import Clock
 from tui.session.drive import DriveSession
 

@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.limits import ARMED_FOR
 from tests.session.sets_bench import state_known
 from tui.bus.line import Line, Timing
 from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
-from tui.safety import ARMED_FOR
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.limits import WAS_OFF
 from tui.bus.line import Timing
 from tui.drive.errors import ValueRefused
 from tui.drive.settings.parameter_set import dump_set
 from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
-from tui.safety import WAS_OFF
 from tui.session.read.upload import Upload
 from tui.session.settings.editor import Editor
 

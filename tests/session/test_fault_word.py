@@ -6,13 +6,13 @@ import math
 
 import pytest
 
+from tests.limits import STATE_FRESH
 from tui.bus.api import Priority
 from tui.drive.chart import watched_codes
 from tui.drive.command_blocked import IN_FAULT, state_refusal
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.safety import STATE_FRESH
 from tui.session.command.access import CommandAccess, CommandHistory
 from tui.session.command.commander import give_order
 from tui.session.drive import DriveSession

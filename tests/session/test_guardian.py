@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 
 from tests.bus.peer import eventually
+from tests.limits import LINE_BACK_WITHIN, LONGEST_GRACE, SILENT_CLIENT, TAKEN_OVER_WITHIN
 from tests.line_events import on_event
 from tui.bus.line import Line
 from tui.bus.line_events import NoticeReceived, ProgramLost
 from tui.bus.link import RtuTcpLink, label
 from tui.bus.program import Program
 from tui.drive.profile import library
-from tui.safety import LINE_BACK_WITHIN, LONGEST_GRACE, SILENT_CLIENT, TAKEN_OVER_WITHIN
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog

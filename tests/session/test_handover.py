@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from tests.bus.peer import eventually
+from tests.limits import ARMED_FOR, REQUEST_ANSWERED_WITHIN
 from tui.bus.fake import FakeLine
 from tui.bus.line_events import ControlDenied, ControlRequested, DevicesStopped
 from tui.bus.program import Program
 from tui.bus.share.messages import AnyMessage, Armed, Claim, DriveRequested, RequestGranted
 from tui.bus.share.publishers import LinePublisher
 from tui.drive.profile import library
-from tui.safety import ARMED_FOR, REQUEST_ANSWERED_WITHIN
 from tui.session.arming import CommandedElsewhere
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
@@ -386,3 +386,25 @@ async def test_a_fleet_comes_to_a_line_on_which_another_program_commands() -> No
     fleet = Fleet(line, Journal())
     assert any("commands this drive now" in event.text for event in fleet.events.events)
     fleet.handover.close()
+
+
+@pytest.mark.parametrize(("after", "yes"), [(1.5, True), (2.5, False)])
+async def test_standstill_counts_for_two_seconds_if_no_person_answers(
+    bench: Bench, after: float, yes: bool
+) -> None:
+    bench.handover.person = False
+    bench.shows(0x0231)
+    bench.clock.advance(after)
+    bench.handover._requested(1, REMOTE)
+    assert bench.answers == [("reply", 1, REMOTE.id, yes)]
+
+
+async def test_request_stays_open_for_fifteen_seconds(bench: Bench) -> None:
+    bench.shows(0x0231)
+    bench.handover._requested(1, REMOTE)
+    await asyncio.sleep(0.05)
+    bench.clock.advance(13)
+    await asyncio.sleep(0.1)
+    assert bench.answers == []
+    bench.clock.advance(3)
+    await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)

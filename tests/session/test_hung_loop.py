@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from tests.limits import HANGS_AFTER
 from tui.bus.api import LineWorker
 from tui.bus.fake import FakeLine
 from tui.drive.profile import library
-from tui.safety import HANGS_AFTER
 from tui.session.command import under_way
 from tui.session.command.stop import Stopper
 from tui.session.drive import DriveSession

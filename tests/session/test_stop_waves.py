@@ -8,13 +8,13 @@ from contextlib import suppress
 
 import pytest
 
+from tests.limits import SEEN_RUNNING
 from tui.bus.api import Priority
 from tui.bus.errors import LineError
 from tui.bus.fake import FakeLine
 from tui.drive.orders import order_target
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
-from tui.safety import SEEN_RUNNING
 from tui.session.command.last_known import last_known_stop, run_by_others
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import NOT_STOPPED, Phase, StopReport

@@ -14,8 +14,8 @@ from textual.pilot import Pilot
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
+from tests.limits import KEY_TOO_LATE
 from tests.ui.test_flows import until
-from tui.safety import KEY_TOO_LATE
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.stroke import Stroke, attach
 from tui.terminal.type_ahead import TypeAhead
@@ -228,6 +228,13 @@ async def test_a_key_that_waited_long_does_no_more_than_one_of_a_piece() -> None
         app.query_one("#text").focus()
         app.send("r", stroke=before)
         await until(pilot, lambda: app.query_one("#text", Input).value == "r")
+
+
+async def test_a_key_that_waited_for_two_seconds_still_acts() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("r", stroke=Stroke(time.monotonic() - 2.0, 0))
+        await until(pilot, lambda: app.done == ["run"])
 
 
 async def test_keys_typed_ahead_reach_the_dialog() -> None:

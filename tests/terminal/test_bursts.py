@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.safety import BURST_GAP
+from tests.limits import BURST_GAP
 from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts
 from tui.terminal.stroke import Pressed
 from tui.terminal.tokens import KeyToken, Paste

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from textual._ansi_sequences import ANSI_SEQUENCES_KEYS, IGNORE_SEQUENCE
 from textual._xterm_parser import XTermParser
 
-from tui.safety import BURST_GAP
+from tests.limits import BURST_GAP
 from tui.terminal.dialects import ESCAPE_DELAY, SEQUENCE_WITHIN, Tokenizer
 from tui.terminal.tokens import KeyToken, Paste, Report, Token
 

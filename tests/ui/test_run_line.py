@@ -10,9 +10,9 @@ from decimal import Decimal
 
 import pytest
 
+from tests.limits import ENTER_COUNTS_AFTER
 from tests.sweeps import kept
 from tui.drive.profile import library
-from tui.safety import ENTER_COUNTS_AFTER
 from tui.screens.monitor import run_line
 from tui.screens.monitor.run_line import RunLine, proposed
 

@@ -1,0 +1,543 @@
+"""Limits of `tui/safety.py`: each is tested on both sides, by figures that do not follow it."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import itertools
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from tests.session.fake_clock import FakeClock
+from tui import safety
+from tui.bus.errors import LineLost, NoAnswer
+from tui.bus.fake import FakeLine
+from tui.bus.leases import WriteLeases
+from tui.bus.limits import CAUTIOUS
+from tui.bus.line import timing_of
+from tui.bus.line_events import EventHub
+from tui.bus.link import SerialLink
+from tui.bus.model import Priority, Timing
+from tui.bus.poll_plan import PlannedRead
+from tui.bus.program import KEEPER, Program
+from tui.bus.requests import Read, WriteOne
+from tui.bus.schedule.last_way import LastWay
+from tui.bus.schedule.patience import Devices
+from tui.bus.schedule.queue import Job, SentStops
+from tui.bus.schedule.unsent import fail_lost
+from tui.bus.share import heartbeat
+from tui.bus.share.attached import Client
+from tui.bus.share.heartbeat import HeartbeatSender, programs_back
+from tui.bus.share.messages import VERSION
+from tui.bus.share.owner_watch import OwnerWatch
+from tui.bus.share.place import Owner
+from tui.bus.share.polls import PollsServed
+from tui.bus.stop_counts import StopCounts
+from tui.drive.profile import library
+from tui.screens.frame_source import _seen
+from tui.session.command import motor_stop
+from tui.session.command.access import CommandAccess
+from tui.session.command.last_known import is_likely_to_run
+from tui.session.command.stop import Stopper
+from tui.session.drive import DriveSession
+from tui.session.gateway.writes import GatewayWrite
+from tui.session.monitor.line_watch import LineWatch
+from tui.session.monitor.snapshot import Snapshot
+from tui.session.read.reader import Reader
+from tui.session.read.slots import Slots
+from tui.session.starts.starts import Starts
+
+from .sources import PACKAGE, tree_of
+
+READY, RUNNING = 0x0231, 0x0637
+"""Status words of an Altivar 71: at standstill, and running."""
+
+
+class Now:
+    """A clock that stands still until a test moves it; stands for the module `time`, too."""
+
+    def __init__(self) -> None:
+        self.seconds = 1000.0
+
+    def __call__(self) -> float:
+        return self.seconds
+
+    monotonic = __call__
+
+    async def sleep(self, seconds: float) -> None:
+        self.seconds += seconds
+        await asyncio.sleep(0)
+
+
+def names() -> list[str]:
+    return [
+        node.target.id
+        for node in tree_of(PACKAGE / "safety.py").body
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+    ]
+
+
+def test_each_limit_has_its_unit_and_its_reason() -> None:
+    body = tree_of(PACKAGE / "safety.py").body
+    texts = {}
+    for node, after in itertools.pairwise(body):
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            match after:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    texts[node.target.id] = text
+    units = ("Seconds", "Share", "Times", "Cycles", "Replies", "Keep-alive reads")
+    assert [n for n in names() if not texts.get(n, "").startswith(units)] == []
+    assert [n for n in names() if len(texts[n].split()) < 8] == []
+
+
+# Arming and commands
+
+
+def test_drive_is_armed_for_a_minute_without_a_key() -> None:
+    clock = FakeClock()
+    session = DriveSession(FakeLine({1: {}}), 1, library.load("atv71"), clock=clock)
+    session.arming.arm()
+    clock.advance(58)
+    assert session.arming.armed
+    clock.advance(4)
+    assert not session.arming.armed
+
+
+@pytest.mark.parametrize(("after", "renewed"), [(0.9, False), (1.1, True)])
+def test_lease_is_renewed_each_second(
+    after: float, renewed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = Now()
+    sent: list[object] = []
+    monkeypatch.setattr("tui.bus.leases.time", now)
+    leases = WriteLeases("me", StopCounts(), sent.append)
+    leases.arm(1, 10.0, b"care")
+    assert leases.of("me")[1].until == 1011.0
+    now.seconds += after
+    leases.stay_armed(1, 10.0)
+    assert (leases.of("me")[1].until == 1011.0 + after) is renewed
+
+
+@pytest.mark.parametrize(("waits", "refused"), [(1.8, False), (2.2, True)])
+async def test_drive_has_two_seconds_for_a_step(waits: float, refused: bool) -> None:
+    clock = Now()
+
+    async def state(_: object) -> SimpleNamespace:
+        return SimpleNamespace(id="ready" if clock() - 1000.0 >= waits else "off")
+
+    access = SimpleNamespace(session=SimpleNamespace(clock=clock), state=state)
+    found = await CommandAccess.wait_for(cast(Any, access), cast(Any, None), ["ready"])
+    assert (found.id != "ready") is refused
+
+
+def test_start_waits_five_seconds_for_the_disk() -> None:
+    default = Starts.begin.__defaults__
+    assert default is not None
+    assert 4 <= default[-1] <= 6
+
+
+# Programs on a line
+
+
+class Loop:
+    """Time in which programs may come back."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    async def pause(self, seconds: float) -> None:
+        self.now += seconds
+
+    def waited(self, *, greets: bool) -> float:
+        asyncio.run(programs_back(lambda: greets, lambda: self.now, self.pause))
+        return self.now
+
+
+def test_programs_have_two_seconds_to_come_back_and_six_at_most() -> None:
+    assert 1.7 < Loop().waited(greets=False) < 2.3
+    assert 5.7 < Loop().waited(greets=True) < 6.3
+
+
+def client(heard: float = 0.0) -> Client:
+    writer = cast(Any, SimpleNamespace(transport=SimpleNamespace(is_closing=lambda: True)))
+    return Client(Program("remote", "panel", 77, "", ""), writer, EventHub(), heard=heard)
+
+
+@pytest.mark.parametrize(("after", "silent"), [(1.8, False), (2.2, True)])
+def test_client_without_a_heartbeat_is_silent_after_two_seconds(after: float, silent: bool) -> None:
+    remote = client()
+    assert [remote.is_silent(after, 10) for _ in range(12)][-1] is silent
+
+
+@pytest.mark.parametrize(("after", "due"), [(9.0, (3,)), (11.0, ())])
+def test_stop_of_an_ended_program_is_due_for_ten_seconds(
+    after: float, due: tuple[int, ...]
+) -> None:
+    remote = client()
+    remote.stops_due[3] = 0.0
+    assert remote.due_stops(after) == due
+
+
+# Stops
+
+
+def job(priority: Priority = Priority.STOP, when: float = 0.0) -> Job:
+    made = Job(WriteOne(1, 8501, 0), priority, CAUTIOUS)
+    made.requested = when
+    return made
+
+
+@pytest.mark.parametrize(("after", "kept"), [(590.0, True), (610.0, False)])
+def test_stop_is_kept_for_ten_minutes_while_the_line_is_lost(after: float, kept: bool) -> None:
+    found = fail_lost(job(), "lost", LineLost, after, keeps=True)
+    assert (found is not None) is kept
+
+
+@pytest.mark.parametrize(("after", "repeat"), [(2.8, True), (3.2, False)])
+def test_equal_stop_is_a_repeat_for_three_seconds(after: float, repeat: bool) -> None:
+    stops = SentStops()
+    stops.count(job(), 0.0, acknowledged=True)
+    assert stops.yields(job(), after) is repeat
+
+
+@pytest.mark.parametrize(("sent", "repeat"), [(4, False), (5, True)])
+def test_unacknowledged_stop_is_first_until_it_was_sent_five_times(sent: int, repeat: bool) -> None:
+    stops = SentStops()
+    for number in range(sent):
+        stops.count(job(), number / 100, acknowledged=False)
+    assert stops.yields(job(), 0.1) is repeat
+
+
+@pytest.mark.parametrize(("after", "known"), [(590.0, True), (610.0, False)])
+def test_next_owner_learns_of_stops_of_ten_minutes(
+    after: float, known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = Now()
+    monkeypatch.setattr("tui.bus.stop_counts.time", now)
+    counts = StopCounts()
+    counts.learn_times({1: 1000.0})
+    now.seconds += after
+    assert (1 in counts.late_times) is known
+
+
+def session_showing(status: int) -> tuple[DriveSession, FakeClock]:
+    clock = FakeClock()
+    session = DriveSession(FakeLine({1: {}}), 1, library.load("atv71"), clock=clock)
+    session.image.confirm("ETA", status, clock.monotonic())
+    return session, clock
+
+
+@pytest.mark.parametrize(("after", "running"), [(8.0, True), (12.0, False)])
+def test_motor_counts_as_running_for_ten_seconds(after: float, running: bool) -> None:
+    session, clock = session_showing(RUNNING)
+    clock.advance(after)
+    assert is_likely_to_run(session) is running
+
+
+# Age of values
+
+
+@pytest.mark.parametrize(
+    ("period", "after", "stale"),
+    [(1.0, 2.9, False), (1.0, 3.1, True), (0.1, 1.4, False), (0.1, 1.6, True)],
+)
+def test_values_are_stale_after_three_cycles_and_not_before_one_and_a_half_seconds(
+    period: float, after: float, stale: bool
+) -> None:
+    taken = SimpleNamespace(time=0.0, period=period)
+    assert Snapshot.is_stale(cast(Snapshot, taken), after) is stale
+
+
+# Replies
+
+
+def devices() -> Devices:
+    return Devices(Timing(), mistakable=True)
+
+
+def test_reply_has_four_times_the_worst_turnaround() -> None:
+    found = devices()
+    found.answered(1, Read(1, 0, 1).expectation(), 0.1, 0.0)
+    assert 0.35 < found.time_out(1, 3, Priority.POLL) < 0.45
+
+
+def test_known_device_pauses_after_three_missed_replies() -> None:
+    found, expected = devices(), Read(1, 0, 1).expectation()
+    found.answered(1, expected, 0.01, 0.0)
+    for number in range(2):
+        found.silent(1, expected, float(number), number + 0.5)
+        assert found.backed_off(1, Priority.POLL, number + 0.5) is None
+    found.silent(1, expected, 2.0, 2.5)
+    assert found.backed_off(1, Priority.POLL, 2.5) is not None
+
+
+def test_late_reply_is_awaited_for_twice_the_worst_lateness_and_ten_seconds_at_most() -> None:
+    found, expected = devices(), Read(1, 0, 1).expectation()
+    usual = max(Timing().late_reply, Timing().first_timeout)
+    for lateness, waits in ((4.0, 8.0), (20.0, 10.0)):
+        found[1].lateness = lateness
+        found.may_come(1, expected, 0.0, 0.0)
+        assert found[1].outstanding[-1].expires == pytest.approx(max(usual, waits), abs=0.5)
+
+
+def test_line_keeps_quiet_for_a_late_device_for_a_third_of_the_timeout_at_most() -> None:
+    found = devices()
+    found[1].lateness = 100.0
+    found.may_come(1, Read(1, 0, 1).expectation(), 0.0, 0.0)
+    assert 0.2 < found.quiet_until / Timing().first_timeout < 0.4
+
+
+def test_reply_may_be_late_by_twice_a_timeout_that_a_person_has_set() -> None:
+    link = SerialLink("/dev/ttyUSB0", timeout=10.0)
+    assert 15.0 < timing_of(link).late_reply < 25.0
+
+
+# Programs on a line, by the clock of a test
+
+
+def owner_watch(now: Now) -> OwnerWatch:
+    return OwnerWatch(now, Owner(VERSION, Program("k", KEEPER, 1), "socket"))
+
+
+@pytest.mark.parametrize(("gap", "awake"), [(0.25, True), (0.35, False)])
+def test_program_was_awake_if_it_looked_each_third_of_a_second(gap: float, awake: bool) -> None:
+    now = Now()
+    watch = owner_watch(now)
+    for _ in range(3):
+        now.seconds += gap
+        watch.look(attached=True)
+    assert (watch._awake == 1000.0) is awake
+
+
+async def test_owner_that_was_suspended_for_more_than_0_7_seconds_sends_stops_only() -> None:
+    now, dispatcher = Now(), SimpleNamespace(held_back=bool)
+    inside = cast(Any, SimpleNamespace(clock=now, dispatcher=dispatcher))
+    sender = HeartbeatSender(inside, tuple, lambda: None)
+    sender.start()
+    now.seconds += 0.6
+    assert not dispatcher.held_back()
+    now.seconds += 0.2
+    assert dispatcher.held_back()
+    sender.close()
+
+
+def test_client_is_looked_for_ten_times_before_it_counts_as_frozen() -> None:
+    """A computer that is short of time may give no turn to a program that is well."""
+    assert 8 <= heartbeat.LOOKS_IN_VAIN <= 12
+
+
+class Thread:
+    """The thread of a heartbeat, which ends after its first turn."""
+
+    def __init__(self) -> None:
+        self.beats = 0
+        self.turns = 0
+        self.waited = 0.0
+        self._turned = 1000.0
+        self._ended = self
+
+    def is_set(self) -> bool:
+        self.turns += 1
+        return self.turns > 1
+
+    def wait(self, seconds: float) -> None:
+        self.waited = seconds
+
+    def _beat(self, connection: object) -> None:
+        assert connection is None
+        self.beats += 1
+
+
+@pytest.mark.parametrize(("after", "beats"), [(2.8, 1), (3.2, 0)])
+def test_heartbeat_ends_once_the_loop_has_not_turned_for_three_seconds(
+    after: float, beats: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, thread = Now(), Thread()
+    monkeypatch.setattr(heartbeat, "monotonic", now)
+    now.seconds += after
+    heartbeat.Heartbeat._work(cast(Any, thread))
+    assert thread.beats == beats
+    assert 4 <= safety.SILENT_CLIENT / thread.waited <= 8, "beats in the time of a silent client"
+
+
+def test_holder_has_half_a_second_to_accept_a_heartbeat(monkeypatch: pytest.MonkeyPatch) -> None:
+    waited = []
+
+    def reached(_: object, within: float) -> None:
+        waited.append(within)
+        raise OSError
+
+    monkeypatch.setattr(heartbeat, "reached", reached)
+    beat = cast(Any, SimpleNamespace(_holder="socket", _greeting=b""))
+    assert heartbeat.Heartbeat._beat(beat, None) is None
+    assert 0.4 < waited[0] < 0.6
+
+
+# Stops, by the clock of a test
+
+
+async def test_stop_is_sent_five_times_until_the_drive_answers() -> None:
+    tries, reported = [], []
+
+    async def carry_out() -> None:
+        tries.append(1)
+        raise NoAnswer(1, 6, 8501, "no answer")
+
+    stop = SimpleNamespace(carry_out=carry_out, session=None, ordered=0.0)
+    stopper = SimpleNamespace(_say=lambda *what: reported.append(what))
+    await Stopper._carry_out(cast(Any, stopper), cast(Any, stop))
+    assert (len(tries), len(reported)) == (5, 1)
+
+
+@pytest.mark.parametrize(
+    ("motion", "ends"), [("running", 1.5), ("stopping", 60.0)], ids=["not-obeyed", "slow-ramp"]
+)
+async def test_stop_shows_an_effect_in_1_5_seconds_and_is_followed_for_a_minute(
+    motion: str, ends: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = Now()
+
+    async def nothing(*_: object) -> None:
+        pass
+
+    async def moves(_: object) -> tuple[str, float]:
+        return motion, 20.0
+
+    monkeypatch.setattr(motor_stop, "check_byte_order", nothing)
+    monkeypatch.setattr(motor_stop, "last_word", lambda *_: None)
+    monkeypatch.setattr(motor_stop, "run_by_others", lambda _: "")
+    stop = SimpleNamespace(
+        reader=None, session=SimpleNamespace(clock=now), ordered=1000.0, _motion=moves,
+        say=lambda *_: None, _instead=lambda: "", _why_not=lambda _: "it turns",
+    )  # fmt: skip
+    order = cast(Any, SimpleNamespace(name="ramp"))
+    assert await motor_stop.MotorStop._follow(cast(Any, stop), cast(Any, None), order)
+    assert ends <= now.seconds - 1000.0 < ends + 0.5
+
+
+def test_stop_after_an_internal_error_waits_0_3_seconds_for_the_exchange_in_flight(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waited = []
+    loop = SimpleNamespace(call_later=lambda seconds, _: waited.append(seconds))
+    monkeypatch.setattr(asyncio, "get_running_loop", lambda: loop)
+    way = SimpleNamespace(_waiting=[], master="open", _send_now=None, _wake=lambda: None)
+    LastWay.put(cast(Any, way), [], lambda _: None)
+    assert 0.2 < waited[0] < 0.4
+
+
+# Clients of Modbus TCP
+
+
+async def test_write_of_a_client_may_wait_for_ten_seconds() -> None:
+    armed = []
+
+    async def write(*_: object, **__: object) -> None:
+        pass
+
+    leases = SimpleNamespace(arm=lambda device, seconds, care: armed.append(seconds))
+    line = SimpleNamespace(facts=SimpleNamespace(leases=leases), write=write)
+    session = SimpleNamespace(device=1, line=line, care=lambda: b"")
+    requested = SimpleNamespace(function=6, address=1, values=[1])
+    pending = SimpleNamespace(_session=session, _requested=requested, _voided=lambda: "")
+    with suppress(AttributeError):  # the reply is not made up
+        await GatewayWrite._exchange(cast(Any, pending), Priority.OPERATOR_WRITE, [])
+    assert 8 < armed[0] < 12
+
+
+@pytest.mark.parametrize(("after", "known"), [(1.8, True), (2.2, False)])
+async def test_word_counts_as_just_read_for_two_seconds(
+    after: float, known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, clock = session_showing(RUNNING)
+    clock.advance(after)
+
+    async def read(*_: object, **__: object) -> None:
+        pass
+
+    monkeypatch.setattr(Reader, "read", read)
+    for found in (
+        await GatewayWrite._read(cast(Any, SimpleNamespace(_session=session)), ["ETA"]),
+        session.image.fresh(2.0),
+    ):
+        assert ("ETA" in found) is known
+
+
+# What the screens show of a drive without a monitor
+
+
+@pytest.mark.parametrize(("after", "shown"), [(9.0, None), (11.0, 11.0)])
+def test_state_of_a_drive_without_a_monitor_has_an_age_after_ten_seconds(
+    after: float, shown: float | None
+) -> None:
+    look = SimpleNamespace(time=0.0, error="", state="state", readings={})
+    console = cast(Any, SimpleNamespace(latest=None))
+    assert _seen(console, cast(Any, look), after)[1] == shown
+
+
+@pytest.mark.parametrize(("after", "awake"), [(0.7, True), (0.9, False)])
+def test_block_is_compared_again_after_0_8_seconds_without_a_reply(
+    after: float, awake: bool
+) -> None:
+    now = Now()
+    slots = Slots(FakeLine({1: {}}), 1, library.load("atv31"), cast(Any, now))
+    slots.heard()
+    slots._in_force["NM1"] = 3
+    now.seconds += after
+    assert ("NM1" in slots.in_force()) is awake
+
+
+@pytest.mark.parametrize(("after", "warned"), [(4.5, False), (5.5, True)])
+def test_drive_is_reported_after_half_of_its_timeout(after: float, warned: bool) -> None:
+    clock = FakeClock()
+    session = SimpleNamespace(clock=clock, device=1, profile=None)
+    kept = SimpleNamespace(session=session)
+    watch = SimpleNamespace(
+        _kept={1: kept},
+        _watch=lambda _: SimpleNamespace(active=True, timeout=10.0),
+        _heard=lambda _: clock.monotonic() - after,
+    )
+    assert bool(LineWatch.warnings(cast(Any, watch))) is warned
+
+
+@pytest.mark.parametrize(("after", "reads"), [(4.5, False), (5.5, True)])
+async def test_poll_uses_a_word_that_scales_others_for_five_seconds(
+    after: float, reads: bool
+) -> None:
+    taken: list[object] = []
+    now = Now()
+    known = SimpleNamespace(time=now() - after)
+    image = SimpleNamespace(get=lambda _: known, trusted={"S"}, refused={})
+
+    async def take(codes: frozenset[str], _: object) -> None:
+        taken.extend(codes)
+
+    reader = SimpleNamespace(
+        profile={"V": None}, session=SimpleNamespace(clock=now, image=image), _take=take
+    )
+    reader._is_known = lambda *what: Reader._is_known(cast(Any, reader), *what)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("tui.session.read.reader.sources_of", lambda _: ["S"])
+        await Reader._read_sources(cast(Any, reader), ["V"], Priority.POLL)
+    assert bool(taken) is reads
+
+
+async def test_poll_uses_values_of_other_programs_of_half_a_cycle() -> None:
+    sent: list[Any] = []
+    inside = SimpleNamespace(clock=lambda: 100.0, pace=SimpleNamespace(stretch=1.0))
+    inside.submit = sent.append
+    plan = SimpleNamespace(
+        message=SimpleNamespace(plan=SimpleNamespace(device=1, period=2.0)),
+        client=SimpleNamespace(limits={}, program=SimpleNamespace(id="p")),
+        read_at={},
+    )
+    with pytest.MonkeyPatch.context() as patched, suppress(asyncio.TimeoutError):
+        patched.setattr("tui.bus.share.polls._ended", lambda _: asyncio.Future())
+        work = PollsServed._read(
+            cast(Any, SimpleNamespace(_inside=inside)), cast(Any, plan), PlannedRead(1, 1, 3)
+        )
+        await asyncio.wait_for(work, 0.01)
+    assert 0.8 < sent[0].max_age < 1.2
