@@ -31,7 +31,7 @@ from .commands import refused
         (["sim:atv71", "--tcp", "localhost"], "write HOST:PORT"),
         (["sim:atv71", "--tcp", ":1", "-d", "1"], "both, or none"),
         (["sim:atv71", "--tcp", ":1", "-d", "1", "-p", "atv99"], "atv99"),
-        (["sim:atv71", "--tcp", ":1", "--allow-writes", " "], "name codes"),
+        (["sim:atv71", "--tcp", ":1", "--allow-writes", " "], "Name codes"),
         (["sim:atv71", "sim:atv31", "--tcp", ":1"], "Several lines have the same ids"),
         (["sim:atv71", "--tcp", ":1", "--map", "1=2"], "there is no line 2"),
         (["sim:atv71", "sim:atv71"], "named twice"),

@@ -188,7 +188,7 @@ def test_the_motor_stops_when_its_program_dies_with_the_keeper(programs: ExitSta
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
         wait_until(lambda: on_record() == [], "the record of the start goes")
         _, output = recorder.end()
-        assert "is gone: its motor is stopped" in output
+        assert "has exited: its motor is stopped" in output
 
 
 @pytest.mark.parametrize("others_live", [True, False])

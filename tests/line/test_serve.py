@@ -302,4 +302,4 @@ def test_a_motor_that_a_program_left_is_stopped_by_it(programs: ExitStack) -> No
         wait_until(lambda: stands(made.simulation), "the motor stops")
         assert made.simulation.drive(1).fault is None
         _, output = made.program.end()
-        assert "is gone: its motor is stopped" in output
+        assert "has exited: its motor is stopped" in output

@@ -90,7 +90,7 @@ def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
         starts = Path(os.environ["DRIVEPANEL_STATE"], "starts")
         wait_until(lambda: not list(starts.iterdir()), "the record of the start goes")
         _, output = recorder.end()
-        assert "is gone: its motor is stopped" in output
+        assert "has exited: its motor is stopped" in output
         assert left_over() == []
 
 
@@ -169,7 +169,7 @@ def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
         for _ in range(3):
             assert '"RFR"' in recorder.process.stdout.readline()
         _, reported = recorder.end()
-        gone = f"run (pid {runner.process.pid}) is not on the line any more"
+        gone = f"run (pid {runner.process.pid}) is no longer on the line"
         assert f"{gone}: its motor is stopped." in reported
         assert left_over() == []
 
@@ -357,7 +357,7 @@ def test_by_default_the_motor_of_a_killed_panel_is_stopped(
         assert made.simulation.drive(1).fault is None
         wait_until(lambda: on_record() == [], "the record of the start goes")
         _, output = recorder.end()
-        assert "is gone: its motor is stopped" in output
+        assert "has exited: its motor is stopped" in output
         assert left_over() == []
 
 

@@ -162,7 +162,7 @@ async def test_the_motors_of_a_killed_program_are_stopped_at_once_and_no_others(
     bench.guardian()
     bench.gone()
     await bench.stopped(1)
-    assert bench.reported[0] == (1, "run on pts/3 (pid 900002) is gone: its motor is stopped.")
+    assert bench.reported[0] == (1, "run on pts/3 (pid 900002) has exited: its motor is stopped.")
     assert bench.turns(2)
     # the stop is one for all: what anybody meant for the drive before is void
     assert bench.line.facts.stops.stamp(1) >= 1
@@ -230,7 +230,7 @@ async def test_a_person_has_the_drives_own_time_out_to_take_the_motor_over(
     await come(lambda: bench.turns(1))
     bench.guardian(person=True)
     bench.gone()
-    await come(lambda: bench.says(f"stopped in {grace:g} s, unless a and T take it over here"))
+    await come(lambda: bench.says(f"stopped in {grace:g} s, unless you take it over (a, then T)"))
     bench.clock.advance(grace - 0.5)
     await asyncio.sleep(0.2)
     assert bench.line.facts.stops.stamp(1) == 0
@@ -242,7 +242,7 @@ async def test_a_motor_that_was_taken_over_runs_on(bench: Bench) -> None:
     bench.started(1)
     bench.guardian(person=True)
     bench.gone()
-    await come(lambda: bench.says("unless a and T take it over"))
+    await come(lambda: bench.says("unless you take it over (a, then T)"))
     (found,) = bench.starts.all_found(label(bench.line.link))
     assert isinstance(found, StartRecord)
     taken = bench.starts.taken_over(found, label(bench.line.link), program="panel")
@@ -262,8 +262,8 @@ async def test_a_recorder_waits_for_the_person_of_an_attached_panel_only(
     bench.started(1)
     bench.guardian()
     bench.gone()
-    await come(lambda: bench.says("is gone"))
-    assert bench.says("unless a and T") is waits
+    await come(lambda: bench.says("has exited"))
+    assert bench.says("unless you take it over") is waits
 
 
 # A program that lives: frozen, or gone from the line by itself
@@ -290,8 +290,7 @@ async def test_the_motor_of_a_frozen_program_is_stopped_where_nobody_can_take_it
     await come(lambda: drive.motor.frequency == 0)
     assert drive.fault is None
     assert (
-        bench.reported[0][1]
-        == "run (pid 900001) is not on the line any more: its motor is stopped."
+        bench.reported[0][1] == "run (pid 900001) is no longer on the line: its motor is stopped."
     )
 
 
@@ -300,8 +299,8 @@ async def test_a_person_has_the_drives_own_time_out_to_take_over_from_a_frozen_p
 ) -> None:
     await frozen(bench)
     let_go = bench.clock.monotonic() - ENDS_WITHIN - 0.1
-    await come(lambda: bench.says("is not on the line any more: its motor is stopped in "))
-    assert bench.says("unless it comes back or a and T take it over here.")
+    await come(lambda: bench.says("is no longer on the line: its motor is stopped in "))
+    assert bench.says("unless it comes back or you take it over (a, then T).")
     bench.clock.advance(3.0)
     await asyncio.sleep(0.2)
     assert bench.line.facts.stops.stamp(1) == 0
@@ -312,14 +311,14 @@ async def test_a_person_has_the_drives_own_time_out_to_take_over_from_a_frozen_p
     drive = bench.simulation.drive(1)
     await come(lambda: drive.motor.frequency == 0)
     assert drive.fault is None
-    assert "run (pid 900001) is not on the line any more" in bench.line.facts.stops.by[1]
+    assert "run (pid 900001) is no longer on the line" in bench.line.facts.stops.by[1]
 
 
 async def test_the_motor_of_a_program_that_comes_back_in_time_runs_on(bench: Bench) -> None:
     await frozen(bench)
     await come(lambda: bench.says("unless it comes back"))
     bench.line.facts.set_programs((bench.line.facts.me, FROZEN))
-    await come(lambda: bench.says("run (pid 900001) is back: its motor runs on."))
+    await come(lambda: bench.says("run (pid 900001) is back: its motor keeps running."))
     bench.clock.advance(20)
     await asyncio.sleep(0.2)
     assert bench.line.facts.stops.stamp(1) == 0

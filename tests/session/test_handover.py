@@ -179,7 +179,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
     bench.facts.events.emit(ControlRequested(1, REMOTE))
     request = bench.handover.requests[1]
     assert request.program == REMOTE
-    assert any("asks for this drive. G answers" in text for text in bench.reported)
+    assert any("requests this drive. Press G to reply" in text for text in bench.reported)
     bench.handover.answer(bench.handover.requests[1], yes=True)
     assert bench.handover.requests == {}
     assert bench.answers == [("reply", 1, REMOTE.id, True)]
@@ -190,7 +190,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
     assert len(bench.answers) == 1
     bench.handover.answer(request, yes=True)
     assert len(bench.answers) == 1
-    assert bench.reported[-1] == "Not given: the question of panel on pts/9 (pid 77) is over."
+    assert bench.reported[-1] == "Not given: panel on pts/9 (pid 77) requests it no longer."
 
 
 async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
@@ -326,7 +326,7 @@ async def test_asking_is_reported_there_and_the_answer_here(bench: Bench) -> Non
     assert bench.reported[-1] == "Drive 1 is commanded by panel."
     assert bench.facts.commander(1) == REMOTE
     bench.facts.hear_reply(1, "", yes=True)
-    assert bench.reported[-1] == "This drive is free: a arms it."
+    assert bench.reported[-1] == "This drive is free. Press a to arm it."
     bench.session.arming.arm()
 
 

@@ -14,7 +14,7 @@ from tui.session.starts.keeper import StartKeeper
 WATCH = Program("watch", "watch", 78)
 PANEL = Program("panel", "panel", 77, "", "pts/9")
 STOPPED = "the motor is stopped on its ramp within 10 s, unless"
-RUNS_ON = "the motor runs on."
+RUNS_ON = "the motor runs."
 
 
 def on_a_line(*others: Program, requested: bool = True) -> DriveSession:
@@ -47,7 +47,7 @@ def test_a_motor_that_is_not_left_on_purpose_is_stopped_by_the_others() -> None:
 
 def test_a_motor_that_is_left_on_purpose_runs_on_while_it_is_requested() -> None:
     reported = peer_effect_text(on_a_line(WATCH), on_purpose=True)
-    assert reported == f"Watch (pid 78) asks it on: while it does, {RUNS_ON}"
+    assert reported == f"Watch (pid 78) polls this drive. As long as it does, {RUNS_ON}"
     assert peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=True) == ""
 
 
@@ -56,7 +56,7 @@ def test_a_panel_whose_motors_go_on_leaves_them_running_by_closing_a_line_too() 
     assert session.starts is not None
     session.starts.leave(session)
     reported = peer_effect_text(session, on_purpose=False)
-    assert reported == f"Other programs on the line ask it on: while they do, {RUNS_ON}"
+    assert reported == f"Other programs on the line poll this drive. As long as they do, {RUNS_ON}"
 
 
 def test_a_motor_that_was_not_started_here_is_not_stopped_by_the_others() -> None:

@@ -526,7 +526,9 @@ async def test_leaving_with_a_motor_of_ours(key: str, turns: bool) -> None:
         line.pace.others = {1: 0.1}
         await made.pilot.press("q")
         await until(made.pilot, lambda: isinstance(app.screen, Leave))
-        assert "Watch (pid 78) asks it on" in str(app.screen.query_one("#follows", Static).render())
+        assert "Watch (pid 78) polls this drive" in str(
+            app.screen.query_one("#follows", Static).render()
+        )
         line.facts.set_programs((line.facts.me,))
         await made.pilot.press("escape")
         await until(made.pilot, lambda: isinstance(app.screen, MonitorScreen))

@@ -1,4 +1,4 @@
-"""Steps without which a stop must go on, whatever goes wrong in them."""
+"""Steps of a stop whose errors must not prevent it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ log = logging.getLogger(__name__)
 
 
 def carried_on(step: Callable[[], object]) -> None:
-    """Do a step on the way of a stop; an internal error in it is logged. Raises LineClosed."""
+    """Carry out a step of a stop; log an internal error in it. Raises LineClosed."""
     try:
         step()
     except LineClosed:

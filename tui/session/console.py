@@ -1,4 +1,4 @@
-"""One drive with everything that watches, commands and edits it."""
+"""One drive with its monitor, commander, editors and recorder."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class DriveConsole:
     proved: str = ""
     """Result of the last communication loss test, in a few words."""
     diagnosis: Diagnosis | None = None
-    """The last verdict on why it does not answer, or not well; None before the first."""
+    """The last diagnosis of missing or bad replies; None before the first."""
     diagnosed_at: float = 0.0
-    """Wall time of that verdict."""
+    """Wall time of that diagnosis."""
 
     def __post_init__(self) -> None:
         self.monitor = Monitor(self.session)
@@ -47,12 +47,12 @@ class DriveConsole:
         self.teacher = Teacher(self.session)
 
     async def read(self, codes: Iterable[str]) -> Mapping[str, Shown]:
-        """Readings by code, asked for by a person; raises the line's errors."""
+        """Read codes for a person. Raises the line's errors."""
         return await Reader(self.session).read(codes)
 
     @property
     def device(self) -> int:
-        """The drive's slave address."""
+        """The drive's address."""
         return self.session.device
 
     @property
@@ -83,12 +83,12 @@ class DriveConsole:
 
     @property
     def begun_editor(self) -> Editor | None:
-        """The editor, if anybody has looked at the parameters."""
+        """The editor, if a screen has opened the parameters."""
         return self.__dict__.get("editor")
 
     @property
     def begun_blocks(self) -> BlockEditor | None:
-        """The block editor, if anybody has looked at the blocks."""
+        """The block editor, if a screen has opened the blocks."""
         return self.__dict__.get("blocks")
 
     @property
@@ -103,5 +103,5 @@ class DriveConsole:
         return latest.state
 
     def close(self) -> None:
-        """Stop watching; the line stays open."""
+        """Stop monitoring; the line stays open."""
         self.monitor.stop()

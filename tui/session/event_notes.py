@@ -1,4 +1,4 @@
-"""Messages about the drives of a line, left for the next program on it."""
+"""Messages about the drives of a line, kept for the next program on it."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .events import Event, EventLog
 EVENTS_OF_LINE = "events"
 MOST_CHARACTERS = MOST_NOTE // 8
 SAME_WITHIN = 2.0
-"""Seconds in which several programs say the same of one thing that they all were told."""
+"""Seconds in which equal messages of several programs are about the same event."""
 
 
 class LeftEvent(msgspec.Struct, frozen=True):
-    """An event with the program that has left it."""
+    """An event with the program that has reported it."""
 
     program: str
     event: Event
 
 
 class EventNotes:
-    """Leaves the events of one log, and puts into it those that other programs have left."""
+    """Sends the events of one log to the owner of the line, and adds those of other programs."""
 
     def __init__(self, facts: SharedState, events: EventLog) -> None:
         self._facts = facts
@@ -35,7 +35,7 @@ class EventNotes:
         facts.events.subscribe(self._hear)
 
     def ask(self) -> None:
-        """Ask for the events of other programs."""
+        """Request the events of other programs."""
         self._facts.notes.ask(0, EVENTS_OF_LINE)
 
     def _leave(self, event: Event) -> None:
@@ -54,7 +54,7 @@ class EventNotes:
             self._events.join(left.event._replace(text=text))
 
     def _is_known(self, event: Event) -> bool:
-        """True if another program has left the same."""
+        """Return True if another program has reported the same."""
         return any(
             (item.device, item.kind, item.text) == (event.device, event.kind, event.text)
             and abs(item.wall - event.wall) < SAME_WITHIN

@@ -1,4 +1,4 @@
-"""Everything that was said about the drives of a line, newest last; for any thread."""
+"""Messages about the drives of a line, the newest last; for any thread."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ EVENTS_KEPT = 500
 
 
 class Event(NamedTuple):
-    """One thing that was said; `wall` is time.time(), `device` None where it is about none."""
+    """One message; `wall` is time.time(), `device` is None for a message about the line."""
 
     wall: float
     device: int | None
@@ -22,11 +22,11 @@ class Event(NamedTuple):
 
 
 class EventLog:
-    """Keeps the last events."""
+    """Keeps the last EVENTS_KEPT messages."""
 
     def __init__(self, wall: Callable[[], float] = time.time) -> None:
         self.left: Callable[[Event], None] = lambda _: None
-        """Gets each new event."""
+        """Called with each new event."""
         self._wall = wall
         self._newest: Event | None = None
         self._lock = Lock()
@@ -35,7 +35,7 @@ class EventLog:
     def add(
         self, kind: str, text: str, device: int | None = None, wall: float | None = None
     ) -> Event | None:
-        """Keep an event, of the time `wall` if given; None if it repeats the one before."""
+        """Add an event, at the time `wall` (default: now); None if it repeats the last one."""
         with self._lock:
             last = self._newest
             if last is not None and (last.device, last.kind, last.text) == (device, kind, text):
@@ -47,19 +47,19 @@ class EventLog:
         return new
 
     def join(self, event: Event) -> None:
-        """Keep an event of another program at its time; one that is there already is kept once."""
+        """Add an event of another program at its time, unless it is already there."""
         with self._lock:
             if event not in self._events:
                 events = sorted((*self._events, event), key=lambda item: item.wall)
                 self._events = deque(events, maxlen=EVENTS_KEPT)
 
     def __bool__(self) -> bool:
-        """A log is there however empty it is."""
+        """True even if empty, because `if log` asks for its existence."""
         return True
 
     @property
     def newest(self) -> Event | None:
-        """The last event of this program; None where nothing was said yet."""
+        """The last event of this program; None before the first."""
         with self._lock:
             return self._newest
 

@@ -1,6 +1,6 @@
-"""The drives of an open line: who was found, what commands each, and the stops of all.
+"""Drives of an open line: those that were found, their consoles, and stops of all.
 
-Everything may be looked at from any thread: a mapping is replaced as a whole, never changed.
+Everything may be read from any thread: a mapping is replaced as a whole, never changed.
 """
 
 from __future__ import annotations
@@ -42,22 +42,22 @@ from .work import Outcome, OutcomeKind
 log = logging.getLogger(__name__)
 
 PROGRAM_ENDS_WITHIN = 0.3
-"""Seconds after which a program that has left the line no longer exists as a process."""
+"""Seconds after which the process of a program that has left the line no longer exists."""
 
 Stamp = Mapping[int, int]
-"""The count of stops of each drive when something was typed."""
+"""The stop count of each drive at the moment when something was typed."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundDrive:
-    """A drive that answered: what it says of itself, and what it is taken for."""
+    """A drive that answered, with its reported identity and its assumed family."""
 
     identity: DriveIdentity
     console: DriveConsole | None = None
 
     @property
     def guessed(self) -> bool:
-        """True if its profile is one of several that may fit, and nobody has said which."""
+        """True if several profiles may fit, and no person has named one."""
         return self.session is not None and self.session.guessed
 
     @property
@@ -67,7 +67,7 @@ class FoundDrive:
 
 
 class Fleet:
-    """The drives of one line, with what looks after them and stops them."""
+    """The drives of one line, with their consoles, alarms, messages and stops."""
 
     def __init__(
         self,
@@ -96,11 +96,11 @@ class Fleet:
         self.alarms = LineAlarms(self.events, self._record_fault)
         """The faults of all of them."""
         self.handover = Handover(line, self.events, self._session_of, clock)
-        """Decides who commands a drive if two programs want to."""
+        """Decides which of two programs commands a drive."""
         self._departed = line.facts.departed
         line.facts.events.subscribe(self._look_for_left)
         self.search: Search | None = None
-        """The search for drives that goes on, or the last one."""
+        """The search for drives in progress, or the last one."""
 
     @property
     def found(self) -> Mapping[int, FoundDrive]:
@@ -114,7 +114,7 @@ class Fleet:
 
     @property
     def sessions(self) -> list[DriveSession]:
-        """The same, as sessions."""
+        """Sessions of the drives whose profile is known."""
         return [console.session for console in self.consoles]
 
     def console(self, device: int) -> DriveConsole | None:
@@ -123,9 +123,9 @@ class Fleet:
         return found.console if found else None
 
     def note(self, identity: DriveIdentity) -> None:
-        """A drive answered; what it is taken for is not known yet. It is kept polled.
+        """Add a drive that answered, without a profile yet, and keep it polled.
 
-        One that is known already stays as it is: without its session no key would stop it.
+        A known drive stays unchanged: without its session no key would stop it.
         """
         before = self.console(identity.device)
         if before is not None and before.session.known_identity == identity:
@@ -136,10 +136,10 @@ class Fleet:
     def take(
         self, session: DriveSession, identity: DriveIdentity | None = None, *, guessed: bool = False
     ) -> DriveConsole:
-        """Look after a drive from now on.
+        """Add a drive with its profile.
 
-        One that is known already stays as it is: what was commanded and staged is not forgotten.
-        So does one whose motor may run by a command from here, by whatever name it is called now.
+        A known drive stays unchanged, with its commands and staged edits. So does one whose motor
+        may run by a command of this program, even if its profile is another one now.
         """
         before = self.console(session.device)
         if before is not None and _same(before.session, session):
@@ -165,8 +165,7 @@ class Fleet:
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
-        """Return True if the same drive is taken for another family while its motor may run;
-        reports it."""
+        """Return True if a drive gets another family while its motor may run, and report that."""
         runs = any(item is before for item in self.line_watch.under_command())
         if not runs or before.known_identity != session.known_identity:
             return False
@@ -179,9 +178,9 @@ class Fleet:
         return True
 
     def _recall(self, console: DriveConsole) -> None:
-        """Load the state that earlier programs left of a drive: a running motor, taught scales.
+        """Load what earlier programs have left: a running motor, learned scales.
 
-        One that may be of another family is prepared to be stopped as that, too.
+        If the drive may be of another family, a stop for that is prepared too.
         """
         session, stated = console.session, console.session.known_identity
         if session.guessed or session.contradiction:
@@ -200,7 +199,7 @@ class Fleet:
         return console.session if console is not None else None
 
     def _look_for_left(self, event: LineEvent) -> None:
-        """Somebody may have left the line: perhaps a motor that runs; reads files."""
+        """Look for motors of programs that have left the line. Reads files."""
         if not isinstance(event, ProgramsChanged):
             return
         before, self._departed = self._departed, self.line.facts.departed
@@ -224,7 +223,7 @@ class Fleet:
             self.line_watch.onsets.note(device, latest.state, latest.wall)
 
     def _record_fault(self, fault: PresentFault, what: str) -> None:
-        """Put a trip, the first sight of a fault, or its end, into the journal."""
+        """Record a trip, a fault that was present at the first read, or its end in the journal."""
         console = self.console(fault.device)
         if console is None:
             return
@@ -245,7 +244,7 @@ class Fleet:
             self._found = MappingProxyType(dict(sorted(drives.items())))
 
     def forget(self) -> None:
-        """Let every drive go; the line stays open."""
+        """Close every drive; the line stays open."""
         with self._lock:
             before, self._found = self._found, MappingProxyType({})
         self.line_watch.stop()
@@ -260,13 +259,13 @@ class Fleet:
         order: OrderId = "stop",
         by: str = "the stop key",
     ) -> None:
-        """Stop drives; may be called in any thread. Raises LineClosed."""
+        """Stop drives; for any thread. Raises LineClosed."""
         self.stopper.stop(sessions, order, by)
 
     def last_stop(self, error: Exception, only: DriveConsole | None = None) -> None:
-        """Stop every drive, or only one, by its prepared frames, after an internal error.
+        """Stop every drive, or only one, by its prepared frames after an internal error.
 
-        Uses nothing that `stop` uses. May be called in any thread.
+        It uses no code of `stop`. For any thread.
         """
         for drive in tuple(self._found.values()):
             console = drive.console
@@ -279,7 +278,7 @@ class Fleet:
 
     @property
     def strangers(self) -> list[int]:
-        """Devices that answered and that no stop reaches: nobody knows the word that stops them."""
+        """Devices that answered, but that no stop reaches, because their stop word is not known."""
         return [device for device, drive in self._found.items() if drive.console is None]
 
     def left_behind(self, console: DriveConsole) -> str:
@@ -293,15 +292,15 @@ class Fleet:
 
     @property
     def stamp(self) -> Stamp:
-        """The count of stops of every drive now."""
+        """Return the current stop count of every drive."""
         return {session.device: session.work.stops for session in self.sessions}
 
     @property
     def commanded(self) -> list[DriveSession]:
-        """The drives that were commanded from here."""
+        """Return the drives that this program has commanded."""
         return [session for session in self.sessions if session.commanded]
 
 
 def _same(session: DriveSession, other: DriveSession) -> bool:
-    """Return True if two sessions are with one drive, by all that it says of itself."""
+    """Return True if two sessions are of one drive, by the identity that it reports."""
     return session.profile.id == other.profile.id and session.known_identity == other.known_identity

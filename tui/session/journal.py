@@ -1,8 +1,8 @@
-"""The record of everything that was written to a drive: JSON lines in the state folder, rotated.
+"""Record of all writes to drives: JSON lines in the state folder, in rotated files.
 
-Nobody waits for the disk: entries are put down by a thread, in their order and one by one, so a
-kill -9 or a power cut takes at most those that were not flushed by then. A program that ends waits
-for its last ones, `JOURNAL_PATIENCE` at most.
+No caller waits for the disk. A thread writes the entries one by one, in their order, so a kill -9
+or a power cut loses at most those that were not flushed yet. A program that ends waits for its last
+ones, `JOURNAL_PATIENCE` at most.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from .journal_file import JournalFile
 from .paths import state_folder
 
 ENTRIES_KEPT = 500
-"""Entries kept at hand."""
+"""Entries kept in memory."""
 JOURNAL_BACKLOG = 10_000
-"""Entries that wait for a disk which takes none; then the oldest of them is lost."""
+"""Entries that wait for a disk that accepts none; then the oldest is dropped."""
 RETRY_DISK_AFTER = 1.0
-"""Seconds after which a disk that took nothing is tried again."""
+"""Seconds after which a disk that refused an entry is tried again."""
 IDLE_ENDS_AFTER = 10.0
 """Seconds without an entry after which the thread ends; the next entry begins another."""
 SLOW = 5.0
-"""Seconds in which a disk has to take an entry, else it counts as hanging."""
+"""Seconds in which a disk must accept an entry, else it counts as hanging."""
 JOURNAL_PATIENCE = 3.0
-"""Seconds that who reads or closes the journal waits for the disk."""
+"""Seconds that a reader or the end of the program waits for the disk."""
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One word that was written, or refused on the way; or a trip that was seen."""
+    """One word that was written, or refused before its frame; or a trip that was seen."""
 
     time: str
     """Local time with its zone, to the millisecond."""
@@ -57,10 +57,10 @@ class Entry:
     new_raw: int
     new: str
     answer: str
-    """`ok`, or what the drive or the line said instead."""
+    """`ok`, or the error of the drive or the line."""
     read_back: int | None
     why: str
-    """The command or edit that it belongs to."""
+    """The command or edit of which it is a part."""
     kind: Literal["write", "fault", "read-back", "proof", "reset"] = "write"
     """`fault`: `code` and `new` are the fault's, nothing was written. `answer` is `tripped` for a
     trip that was seen, `seen` for a fault that was there at the first sight, `reset` for its end.
@@ -76,14 +76,14 @@ FAULT_WHYS = {
     "seen": "in fault when first seen",
     "reset": "the end was seen",
 }
-"""By the answer of a `fault` entry its reason. Older files have `seen from here` with each."""
+"""Reason by the answer of a `fault` entry. Older files have `seen from here` for each."""
 
 
 class Journal:
-    """Appends entries; keeps the last ones at hand. May be used from any thread.
+    """Appends entries, and keeps the last ones in memory. For any thread.
 
-    What the disk refuses is kept and tried again. `on_trouble` is called with `trouble`, in the
-    journal's thread, as soon as the disk refuses.
+    Entries that the disk refuses are kept and tried again. `on_trouble` is called with `trouble`,
+    in the journal's thread, as soon as the disk refuses.
     """
 
     def __init__(
@@ -92,19 +92,19 @@ class Journal:
         self._file = JournalFile(folder or state_folder())
         self._on_trouble = on_trouble
         self._changed = threading.Condition()
-        """Guards all below; never held over disk work."""
+        """Guards the fields below; never held during disk work."""
         self._recent: deque[Entry] = deque(maxlen=ENTRIES_KEPT)
         self._sent: deque[Entry] = deque(maxlen=ENTRIES_KEPT)
         self._waiting: deque[Entry] = deque()
         self._begun: float | None = None
-        """Since when an entry is being written, in monotonic time."""
+        """Since when an entry is being written (monotonic)."""
         self._thread: threading.Thread | None = None
         self._why = ""
         self._failures = 0
         self._lost = 0
         self._closed = False
         self._requested = False
-        """True if somebody waits for another try that was not begun yet."""
+        """True if a caller waits for another attempt that has not begun yet."""
         self._ending: Callable[[], None] | None = None
         """Wait for the last entries if the program ends without close()."""
 
@@ -115,7 +115,7 @@ class Journal:
 
     @property
     def files(self) -> list[Path]:
-        """The files that there may be, the oldest first."""
+        """All files that may exist, the oldest first."""
         return self._file.all
 
     @property
@@ -144,7 +144,7 @@ class Journal:
 
     @property
     def trouble(self) -> str:
-        """Why entries cannot be kept, for the person; empty while they can."""
+        """Why entries cannot be written, for a person; empty if they can."""
         with self._changed:
             why, lost = self._why, self._lost
             if self._begun is not None and (since := time.monotonic() - self._begun) > SLOW:
@@ -155,7 +155,7 @@ class Journal:
         return reported + (f" {lost} entries lost." if lost else "")
 
     def add(self, entry: Entry, *, sent: bool = True) -> None:
-        """Keep an entry; returns at once and never raises, whatever the disk does.
+        """Add an entry; return immediately and never raise, whatever the disk does.
 
         `sent` is False for a write that was refused before its frame.
         """
@@ -171,9 +171,9 @@ class Journal:
             self._changed.notify_all()
 
     def flush(self, timeout: float = JOURNAL_PATIENCE) -> bool:
-        """Wait until all entries are on the disk, at most so many seconds; False if they are not.
+        """Wait until all entries are on the disk, at most so many seconds; return False if not.
 
-        A disk that refuses is tried once more, and not waited for.
+        A disk that refuses is tried once more, without waiting.
         """
         with self._changed:
             failures = self._failures
@@ -185,7 +185,7 @@ class Journal:
             return self._is_done()
 
     def close(self, timeout: float = JOURNAL_PATIENCE) -> bool:
-        """Flush what is left, as flush() does; a disk that still refuses is tried no more."""
+        """Flush the rest as flush() does; a disk that still refuses is not tried again."""
         with self._changed:
             self._closed = True
             if self._ending is not None:
@@ -249,7 +249,7 @@ class Journal:
                 return
 
     def _next(self) -> Entry | None:
-        """The entry to write; None where the thread is to end."""
+        """Return the next entry to write; None if the thread must end."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closed, IDLE_ENDS_AFTER)
             if not self._waiting:
@@ -259,8 +259,7 @@ class Journal:
             return self._waiting.popleft()
 
     def _may_go_on(self) -> bool:
-        """Return True if the disk is to be tried again, after a moment or as soon as somebody
-        waits."""
+        """Wait, then return True if the disk must be tried again."""
         with self._changed:
             if self._closed and not self._requested:
                 self._thread = None
@@ -276,7 +275,7 @@ class Journal:
             log.exception("a listener of the journal failed")
 
     def _trouble_with(self, entry: Entry) -> str:
-        """Write an entry; what went wrong, or nothing."""
+        """Write an entry; return the error as text, or an empty string."""
         try:
             self._file.append(escaped_json(json.dumps(asdict(entry), ensure_ascii=False)))
         except OSError as error:
@@ -288,7 +287,7 @@ class Journal:
 
 
 def _tell(before: str, why: str, took: float, left: int, lost: int) -> None:
-    """Say in the log when the journal cannot be written, and when it can again."""
+    """Log when the journal cannot be written, and when it can again."""
     if why and not before:
         log.error("the journal cannot be written: %s", why)
     elif before and not why:
@@ -298,11 +297,11 @@ def _tell(before: str, why: str, took: float, left: int, lost: int) -> None:
 
 
 def now_text() -> str:
-    """The local time of an entry."""
+    """Return the current local time for an entry."""
     return entry_time(None)
 
 
 def entry_time(wall: float | None) -> str:
-    """The local time of an entry: that of `wall` in seconds since 1970, else now."""
+    """Return the local time for an entry: `wall` in seconds since 1970 (default: now)."""
     when = datetime.now() if wall is None else datetime.fromtimestamp(wall)
     return when.astimezone().isoformat(timespec="milliseconds")

@@ -1,7 +1,7 @@
-"""The files of the journal: each line is one write at the file's end, flushed to the disk.
+"""Files of the journal: each line is one write at the end of the file, flushed to the disk.
 
-Several programs append at a time: they take turns by a lock on the folder, and where there are no
-such locks the system's own append keeps their lines apart.
+Several programs may append at the same time. They take turns by a lock on the folder. Without such
+locks, the append mode of the system keeps their lines apart.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ except ImportError:  # Windows
 
 JOURNAL_NAME = "journal.jsonl"
 LARGEST_FILE = 1_000_000
-"""Bytes of one file; then the next one is begun."""
+"""Bytes of one file; the next line begins a new file."""
 FILES_KEPT = 9
-"""Older files beside the one that is written."""
+"""Number of older files that are kept."""
 TURN_PATIENCE = 0.5
-"""Seconds that a line waits for those of other programs; then it is appended anyway."""
+"""Seconds that a line waits for other programs; then it is appended anyway."""
 TURN_POLL_INTERVAL = 0.01
 OWN_MODE = 0o600
 CUT_OFF = "the line before this one was cut off: by a crash, a power cut or a full disk"
@@ -47,14 +47,14 @@ class JournalFile:
 
     @property
     def all(self) -> list[Path]:
-        """Every file that there may be, the oldest first."""
+        """All files that may exist, the oldest first."""
         return [*(self._older(number) for number in range(FILES_KEPT, 0, -1)), self.path]
 
     def append(self, text: str) -> None:
-        """Put a line down, flushed to the disk. Raises OSError; the line may be there even so.
+        """Append a line, flushed to the disk. Raises OSError; the line may be written even then.
 
-        Tried again, it is written over what the first try has left. What an earlier program has
-        left of a line stays, and is marked as cut off.
+        Another attempt overwrites what the first has left. An incomplete line of an earlier program
+        stays, and is marked as cut off.
         """
         line = text.encode("utf-8", "backslashreplace") + b"\n"
         tried, self._tried = self._tried, line
@@ -78,7 +78,7 @@ class JournalFile:
         self._tried = b""
 
     def _put(self, handle: int, line: bytes, tried: bytes, *, alone: bool) -> int:
-        """Write a line at the end; returns where it begins."""
+        """Write a line at the end; return its offset."""
         size = os.fstat(handle).st_size
         start = max(0, size - len(line))
         os.lseek(handle, start, os.SEEK_SET)
@@ -106,7 +106,7 @@ class JournalFile:
 
     @contextmanager
     def _turn(self) -> Iterator[bool]:
-        """While inside, other programs wait; gives False where one of them does not let us in."""
+        """Make other programs wait; yield False if one keeps its lock too long."""
         if fcntl is None:
             yield True
             return
@@ -118,7 +118,7 @@ class JournalFile:
 
 
 def _locked(folder: int) -> bool:
-    """Lock a folder against the other programs; True too where no such locks are to be had."""
+    """Lock a folder against other programs; also True if the system has no such locks."""
     end = time.monotonic() + TURN_PATIENCE
     while True:
         try:
@@ -134,7 +134,7 @@ def _locked(folder: int) -> bool:
 
 
 def _opened(path: Path) -> int:
-    """A handle that appends, to a file that its owner alone may read. Raises OSError."""
+    """Open a file for appending that only its owner may read. Raises OSError."""
     flags = os.O_RDWR | os.O_APPEND | os.O_CREAT
     # a pipe in its place must not hold up the journal
     flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -153,7 +153,7 @@ def _opened(path: Path) -> int:
 
 
 def _write(handle: int, data: bytes, start: int, alone: bool) -> None:
-    """Append in one write; what a full disk took of it is taken back. Raises OSError."""
+    """Append in one write; remove a part that a full disk has accepted. Raises OSError."""
     done = 0
     try:
         while done < len(data):
@@ -166,6 +166,6 @@ def _write(handle: int, data: bytes, start: int, alone: bool) -> None:
 
 
 def _mark() -> bytes:
-    """The line that says of the one before it that it is half a line."""
+    """Return the line that marks the previous one as incomplete."""
     when = datetime.now().astimezone().isoformat(timespec="milliseconds")
     return json.dumps({"time": when, "kind": "mended", "why": CUT_OFF}).encode() + b"\n"

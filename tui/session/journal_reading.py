@@ -1,4 +1,4 @@
-"""Reader of the journal's files, line by line; any content is survived."""
+"""Reader of the journal's files, line by line; it accepts any content."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from .connect.line_key import line_key
 from .journal import Entry, Journal
 
 LONGEST_LINE = 64_000
-"""Bytes of a line that may be an entry."""
+"""Longest line in bytes that may be an entry."""
 READ_MOST = 20_000_000
-"""Bytes of a file that are read, the last ones; each restarts long before that."""
+"""Bytes at the end of a file that are read; each file is shorter unless it is damaged."""
 DAMAGE_SHOWN = 200
 """Characters of a damaged line that are shown."""
 
@@ -33,9 +33,9 @@ class DamagedLine:
 
 
 def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
-    """Return the entries of the journal's files on a drive of a line, oldest first.
+    """Return the entries of the journal's files about a drive of a line, oldest first.
 
-    Waits a few seconds for entries that are not on the disk yet. Damaged lines are left out.
+    Waits a few seconds for entries that are not on the disk yet. Damaged lines are skipped.
     """
     journal.flush()
     found = [entry for entry in read_journal(journal.files) if isinstance(entry, Entry)]
@@ -43,9 +43,9 @@ def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
 
 
 def read_journal(files: Iterable[Path]) -> Iterator[Entry | DamagedLine]:
-    """Every entry of these files in their order; other lines are reported as damaged.
+    """Yield the entries of files in their order, and damaged lines.
 
-    Files that are not there are passed over. Raises OSError for one that cannot be read.
+    Missing files are skipped. Raises OSError for a file that cannot be read.
     """
     for file in files:
         for number, line in _lines(file):
@@ -58,7 +58,7 @@ def read_journal(files: Iterable[Path]) -> Iterator[Entry | DamagedLine]:
 
 
 def completed(entries: Iterable[Entry]) -> list[Entry]:
-    """The entries, with those whose answer was lost completed by what was read back later."""
+    """Return the entries; merge a value that was read back later into the entry of its write."""
     found: list[Entry] = []
     places: dict[tuple[str, str, int, str], int] = {}
     for entry in entries:
@@ -82,9 +82,9 @@ def selected(
     line: str = "",
     since: datetime | None = None,
 ) -> list[Entry]:
-    """Entries of a drive, of a line however it was typed, and since a time.
+    """Select entries by drive, by line however it was typed, and by time.
 
-    One without a valid time is kept: it may be the one searched for.
+    An entry without a valid time is kept, because it may be in the range.
     """
     key = line_key(line) if line else ""
     keys: dict[str, str] = {}
@@ -101,7 +101,7 @@ def selected(
 
 
 def time_of(entry: Entry) -> datetime | None:
-    """When an entry was made; None if its text is not a time."""
+    """Return the time of an entry; None if its text is not a time."""
     try:
         return datetime.fromisoformat(entry.time).astimezone()
     except (ValueError, OverflowError, OSError):
@@ -109,7 +109,7 @@ def time_of(entry: Entry) -> datetime | None:
 
 
 def _lines(file: Path) -> Iterator[tuple[int, bytes]]:
-    """The lines of a file with their numbers, none longer than may be an entry."""
+    """Yield the lines of a file with their numbers; skip the rest of one that is too long."""
     try:
         handle = open_regular(file)
     except FileNotFoundError:
@@ -140,7 +140,7 @@ def _entry(line: bytes) -> Entry | None:
 
 
 def _is_mark(line: bytes) -> bool:
-    """Return True if a line only says of the one before it that it was cut off."""
+    """Return True if a line only marks the previous one as incomplete."""
     try:
         reported = json.loads(line)
     except (ValueError, RecursionError):

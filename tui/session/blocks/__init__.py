@@ -1,1 +1,1 @@
-"""Setting up indirect blocks and scanners, and exchanging through them."""
+"""Configuration of indirect blocks and scanners, and exchanges through them."""

@@ -1,7 +1,7 @@
-"""Writing words through the outputs of a block or scanner, with the inputs in the same exchange.
+"""Writes through the outputs of a block or scanner, with the inputs in the same exchange.
 
-Only the places from the first to the last parameter that a person names are written. Their
-slots are read before and after, and each parameter is read back.
+Only the places from the first to the last named parameter are written. Their slots are read before
+and after, and each parameter is read back.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ class Exchanged:
     """Result of one exchange: values written through the outputs, and the inputs."""
 
     outputs: dict[str, int]
-    """Raw values by code of the parameter, as they were written."""
+    """Raw values by code, as they were written."""
     inputs: dict[str, int]
-    """Raw values by code, of the inputs whose slots still stand for the same afterwards."""
+    """Raw values by code, of inputs whose slots are unchanged after the exchange."""
 
 
 async def exchange(
@@ -53,11 +53,11 @@ async def exchange(
 ) -> Exchanged:
     """Write through the output slots, and read the inputs in the same exchange by function 23.
 
-    `wanted` are raw values by code; a slot between two named ones gets what its parameter holds
-    now. Commands pass through the same interlocks as a run order. `in_force` is a person's word
-    that the slots of an indirect block were set before the drive's last reset, which cannot be
-    read; without it nothing is written through such a block. Raises AssignmentRefused,
-    ValueRefused, RequestRefused, NotTaken, and the line's errors.
+    `wanted` are raw values by code; a slot between two named ones gets the current value of its
+    parameter. Commands are checked by the same interlocks as a run command. `in_force` is a
+    person's statement that the slots of an indirect block were set before the drive's last reset,
+    which cannot be read; without it nothing is written through such a block. Raises
+    AssignmentRefused, ValueRefused, RequestRefused, NotTaken, and the line's errors.
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
@@ -116,7 +116,7 @@ class _Exchange:
         return Exchanged(known, self._read(reply))
 
     async def _record_start(self, permit: Permit) -> bool:
-        """A command word that goes out with them may start the motor; whether one does."""
+        """Record a start if a command word is among the outputs; return True if one is."""
         commands = {chart.command for chart in self.session.profile.data.charts}
         if commands.isdisjoint(parameter.code for parameter in self.targets):
             return False
@@ -129,7 +129,7 @@ class _Exchange:
         await self.retrying.ask_raws(dict.fromkeys(sources))
 
     async def _held(self) -> dict[str, int]:
-        """Return the present outputs, with all targets of an indirect block."""
+        """Return the current outputs, with all targets of an indirect block."""
         codes = [p.code for p in self.targets]
         if self.outputs.block.effective == "after-reset":
             codes += [choice.parameter for choice in self.outputs.block.choices]
@@ -141,7 +141,7 @@ class _Exchange:
     async def _send(
         self, raws: Mapping[str, int], held: Mapping[str, int]
     ) -> tuple[tuple[int, ...], dict[str, int]]:
-        """The words that came back, and what the drive holds then; all into the journal."""
+        """Exchange the words, read the parameters back, and record both in the journal."""
         words = [to_words(parameter, raws[parameter.code])[0] for parameter in self.targets]
         answer, back, lost, sent = "ok", dict[str, int](), False, True
         image = self.session.image
@@ -193,7 +193,7 @@ class _Exchange:
     def _see_taken(
         self, raws: Mapping[str, int], held: Mapping[str, int], back: Mapping[str, int]
     ) -> None:
-        """Raise NotTaken where the drive holds something else than was written, or elsewhere."""
+        """Raise NotTaken if the drive holds another value than was written, or in another place."""
         profile = self.session.profile
         moved = [c for c in back if c not in raws and c in held and back[c] != held[c]]
         if moved:
@@ -211,7 +211,8 @@ class _Exchange:
             raise NotTaken(f"{'; '.join(texts)}.")
 
     def _not_held(self, raws: Mapping[str, int], back: Mapping[str, int]) -> list[str]:
-        """Codes of what was named and is not held; the state shows what a command word did."""
+        """Return named codes whose value differs; not commands, because the state shows their
+        effect."""
         commands = {chart.command for chart in self.session.profile.data.charts}
         named = [code for code in self.wanted if code in back and code not in commands]
         return [code for code in named if back[code] != raws[code]]
@@ -241,7 +242,7 @@ class _Exchange:
         return raw_text(self.session, parameter, raw)
 
     def _forbidden(self) -> str:
-        """Why the frame must no longer go out, or nothing."""
+        """Return why the frame must not be sent any more; empty if it may."""
         return self.writer.permit.refusal() if self.writer.permit is not None else ""
 
     def _read(self, reply: tuple[int, ...]) -> dict[str, int]:
@@ -257,7 +258,7 @@ class _Exchange:
 
 @dataclass(slots=True)
 class ExchangeChecks:
-    """The checks of one exchange; each raises AssignmentRefused with what is wrong."""
+    """Checks of one exchange; each raises AssignmentRefused with the reason."""
 
     session: DriveSession
     retrying: RetryingReader
@@ -276,7 +277,7 @@ class ExchangeChecks:
         self.targets = [parameter for parameter in found if parameter is not None]
 
     def check_named(self) -> None:
-        """Raise AssignmentRefused for a stranger, a hole, or a slot that must not be used."""
+        """Raise AssignmentRefused for an unknown code, a gap, or a slot that must not be used."""
         profile, block = self.session.profile, self.outputs.block
         known = {p.code for p in self.targets}
         if foreign := [code for code in self.wanted if code not in known]:
@@ -293,7 +294,8 @@ class ExchangeChecks:
             raise AssignmentRefused(" ".join(problem.text for problem in wrong))
 
     async def check_state(self) -> None:
-        """The interlocks of a run order where an output is an order; rest where one needs it."""
+        """Check the interlocks of a run command if an output is a command, and rest if one needs
+        it."""
         profile = self.session.profile
         state = await self.retrying.ask_state()
         stopped = [p.code for p in self.targets if p.access == "rw-stopped"]
@@ -316,7 +318,7 @@ class ExchangeChecks:
             raise AssignmentRefused(f"{held.text} {held.remedy}".strip())
 
     def check_values(self, raws: Mapping[str, int]) -> None:
-        """Raise ValueRefused for a value that its parameter cannot take."""
+        """Raise ValueRefused for a value outside the range of its parameter."""
         profile = self.session.profile
         for parameter in self.targets:
             if parameter.code in self.wanted:
@@ -325,7 +327,7 @@ class ExchangeChecks:
                 check_raw(parameter, raw, profile.names(parameter), scale)
 
     async def check_slots(self, when: str) -> None:
-        """Raise unless the slots stand for what the person saw; afterwards it may be too late."""
+        """Raise unless the slots are those that the person saw."""
         for plan in (self.outputs, self.inputs):
             if plan is None:
                 continue

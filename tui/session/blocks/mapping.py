@@ -1,9 +1,9 @@
-"""Mapping of the slots of a drive's blocks, the values that they return, and their check.
+"""Slots of a drive's blocks, the values that they return, and a check of these values.
 
-What a slot brings is compared with direct reads before and after. The slots of a scanner are read
-again after each use: a word counts only when its slot still stands for the same. What an indirect
-block really brings until the drive's next reset cannot be read; it is identified by the same
-comparison, with every parameter that could be in it. What the words prove, `proof` concludes.
+The value of a slot is compared with direct reads before and after. The slots of a scanner are read
+again after each use: a word is valid only if its slot is unchanged. The effective slots of an
+indirect block cannot be read until the drive's next reset. They are identified by the same
+comparison, with every parameter that they may hold. `proof` draws the conclusions.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from ..read.verdict import SlotMatch
 from ..reading import Reading
 
 COMPARISONS_MOST = 2 * SURE
-"""Comparisons after which unproved slots stay so: equal values cannot be distinguished."""
+"""Comparisons after which a slot stays unproved: equal values cannot be distinguished."""
 
 
 class Force(StrEnum):
-    """True if a slot already brings what was chosen for it."""
+    """True if a slot already returns the chosen parameter."""
 
     ACTIVE = "active"
     PENDING = "pending"
@@ -44,7 +44,7 @@ class Force(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One slot with all that was seen of it at one time."""
+    """One slot with everything that was read of it at one time."""
 
     code: str
     raw: int | None
@@ -52,14 +52,14 @@ class Slot:
     parameter: Parameter | None = None
     """Mapped parameter; None if the slot is unused or holds an unknown address."""
     word: int | None = None
-    """The raw value that came through the block."""
+    """The raw value that the block returned."""
     text: str = NOT_AVAILABLE
     """The same as a person reads it, with its unit."""
     direct: Reading | None = None
     verdict: SlotMatch = SlotMatch.UNREAD
     force: Force = Force.NOTHING
     brings: str = ""
-    """Code of what it brings in place of what was chosen, where that is sure."""
+    """Code of the parameter that it returns instead of the chosen one, if that is certain."""
 
     @property
     def direct_text(self) -> str:
@@ -75,11 +75,11 @@ class BlockView:
     block: Block
     slots: tuple[Slot, ...]
     trouble: str = ""
-    """Why the block brought nothing, or nothing sure; else empty."""
+    """Why the block returned no value, or none that is certain; else empty."""
 
     @property
     def is_doubtful(self) -> bool:
-        """True if a slot does not seem to bring what it stands for."""
+        """True if a slot seems to return another value than its parameter."""
         read = self.slots if self.block.direction == "read" else ()
         return any(
             slot.verdict is SlotMatch.DIFFERS
@@ -89,17 +89,17 @@ class BlockView:
 
     @property
     def is_unproved(self) -> bool:
-        """True if it is not sure of a slot's word yet what it is."""
+        """True if the parameter of a slot's value is not certain yet."""
         return any(s.word is not None and s.force is Force.UNPROVED for s in self.slots)
 
     @property
     def raws(self) -> dict[str, int]:
-        """Raw values by slot, of those that could be read."""
+        """Raw values by slot, for slots that could be read."""
         return {slot.code: slot.raw for slot in self.slots if slot.raw is not None}
 
     @property
     def plan(self) -> Assignment | None:
-        """The assignment that the drive holds; None where a slot could not be read."""
+        """The assignment that the drive holds; None if a slot could not be read."""
         return assignment(self.block, self.raws)
 
 
@@ -114,25 +114,25 @@ def wire_timing(session: DriveSession) -> WireTiming:
 
 @dataclass(slots=True)
 class Mapper:
-    """Looks at the blocks of one drive; raises the line's errors."""
+    """Reads the blocks of one drive. Raises the line's errors."""
 
     session: DriveSession
     in_force: Callable[[], Mapping[str, int]] = dict
     """Raw values by slot, which a monitor has confirmed for each place."""
     priority: Priority = Priority.OPERATOR_READ
     written: dict[str, int] = field(default_factory=dict)
-    """Slots written from here that count after a reset, which was not seen yet."""
+    """Slots that this program has written and that take effect after a reset, not seen yet."""
     _asker: RetryingReader = field(init=False)
 
     def __post_init__(self) -> None:
         self._asker = RetryingReader(self.session, self.priority)
 
     def note_reset(self) -> None:
-        """The drive may have been reset or switched off: what was written before may count now."""
+        """Note that the drive may have restarted, so that earlier slots may take effect now."""
         self.written = {}
 
     async def slots(self, block: Block) -> dict[str, int]:
-        """Raw values of a block's slots as the drive holds them now."""
+        """Read the raw values of a block's slots."""
         return await self._asker.ask_raws(block.slots)
 
     async def look(self, block: Block, *, rounds: int = 1) -> BlockView:

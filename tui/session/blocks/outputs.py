@@ -1,4 +1,4 @@
-"""Values to be written through the outputs of a block or scanner, and the consequences."""
+"""Values for the outputs of a block or scanner, and the consequences of writing them."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ REFERENCE_QUANTITIES = frozenset({"command_frequency", "command_speed"})
 
 @dataclass(frozen=True, slots=True)
 class ConfirmedWrite:
-    """Values for outputs as a person agrees to them, with the slots as they were seen then."""
+    """Values for outputs as a person has agreed to them, with the slots that were seen."""
 
     outputs: Assignment
     inputs: Assignment | None
     wanted: Mapping[str, int]
     """Raw values by code."""
     follows: str
-    """Frames and their consequences, a sentence a line."""
+    """Frames and their consequences, one sentence per line."""
 
 
 def output_codes(profile: Profile, outputs: Assignment) -> dict[str, Parameter]:
@@ -41,7 +41,7 @@ def example(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> str:
-    """Return an example text for the first two of these outputs: their present values."""
+    """Return an example text with the current values of the first two of these outputs."""
     first = list(output_codes(profile, outputs).values())[:2]
     return " ".join(
         f"{p.code}={typed_text(profile, p, raws.get(p.code, 0), raws, absent)}" for p in first
@@ -83,7 +83,7 @@ def intended(
 
 
 def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
-    """Raise MappingError where slots count only after a reset that was not seen yet.
+    """Raise MappingError if slots take effect only after a reset that was not seen yet.
 
     `waits` are raw values by slot that were written since.
     """
@@ -99,7 +99,7 @@ def values_text(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> str:
-    """Codes and their values in one line; `absent` are codes that the drive lacks."""
+    """Return codes with their values in one line; `absent` are codes that the drive lacks."""
     return ", ".join(
         f"{c} {shown_text(profile, profile[c], raw, raws, absent)}" for c, raw in values.items()
     )
@@ -148,7 +148,7 @@ def _word(
     wanted: Mapping[str, int],
     raws: Mapping[str, int],
 ) -> int:
-    """The word for a place, as far as it is known before the exchange."""
+    """Return the word for a place, as far as it is known before the exchange."""
     parameter = slot_target(profile, outputs.block, outputs.raws[place])
     if parameter is None:
         return 0

@@ -1,4 +1,4 @@
-"""The four words that a person watches on one drive: read one by one, kept in the state folder."""
+"""Four words of a drive that a person monitors, read singly and kept in the state folder."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from ..stored import store_json, stored_json
 
 
 async def read_words(session: DriveSession, words: UserWords) -> list[int | None]:
-    """The raw words; None where none is assigned, or the drive has it not or protects it.
+    """Read the raw words; None for one that is unassigned, missing or protected.
 
-    Raises the line's errors but a refusal. A family that meets unknown addresses with silence
-    is asked for known ones only.
+    Raises the line's errors except a refusal. If the family does not answer unknown addresses, only
+    known ones are read.
     """
     found: list[int | None] = []
     function = session.profile.function(3)
@@ -53,7 +53,7 @@ def load_words(session: DriveSession) -> UserWords:
 
 
 def save_words(session: DriveSession, words: UserWords) -> str:
-    """Keep them for this drive; returns why that failed, or nothing."""
+    """Store them for this drive; return why that failed, or an empty string."""
     kept = _kept()
     kept[_key(session)] = [{"address": w.address, "format": w.format} for w in words]
     try:

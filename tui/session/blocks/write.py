@@ -1,7 +1,7 @@
-"""Writing an assignment into a drive, slot by slot, each read back.
+"""Write of an assignment to a drive, slot by slot, each read back.
 
-Everything is read again before each write. What somebody else changed meanwhile is not overwritten.
-A slot whose answer was lost is read: it is written once, with any result.
+Everything is read again before each write. A slot that another source has changed in the meantime
+is not overwritten. A slot without a reply is read: it is written once, whatever the result.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ..work import Permit
 
 
 class AssignmentRefused(MappingError):
-    """An assignment or an exchange that is not written, or only in part; the text says which.
+    """An assignment or an exchange was not written, or only a part; the text says which.
 
-    Where the drive or the line kept it from being written, their error is its cause.
+    If the drive or the line is the reason, their error is its cause.
     """
 
 
@@ -40,9 +40,9 @@ class Written:
 
     changes: tuple[SlotChange, ...]
     after_reset: bool
-    """True where it counts only once the drive was reset."""
+    """True if it takes effect only after a reset of the drive."""
     unsaved: bool
-    """True if it is lost at power-off until the drive is ordered to save."""
+    """True if it is lost at power-off until the drive saves it."""
 
     @property
     def text(self) -> str:
@@ -67,11 +67,10 @@ async def write_assignment(
     expected: Mapping[str, int] | None = None,
     sent: Sent = lambda _change, _held: None,
 ) -> Written:
-    """Make the drive hold an assignment, with the motor at rest.
+    """Write an assignment, with the motor at rest.
 
-    `expected` are the raw values by slot that the person saw. Raises AssignmentRefused where
-    something speaks against it, or drive or line do not do it, and RequestRefused on a read-only
-    line.
+    `expected` are the raw values by slot that the person saw. Raises AssignmentRefused if a check,
+    the drive or the line prevents it, and RequestRefused on a read-only line.
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
@@ -86,7 +85,7 @@ async def write_assignment(
 
 
 def at_rest_only(block: Block, headline: str) -> str:
-    """Why slots are not written while the drive is in a state of that name."""
+    """Return the reason that slots are not written in a state of that name."""
     return (
         f"{block.name}: slots are changed with the motor stopped only; the drive is {headline}."
         " Stop it first."
@@ -133,7 +132,7 @@ class _Writing:
         return held
 
     async def _may(self) -> None:
-        """Raise unless the motor is surely at rest, and the task may still write."""
+        """Raise unless the motor is known to be at rest, and the task may still write."""
         permit = self.writer.permit
         if permit is not None and (why := permit.refusal()):
             raise AssignmentRefused(self.so_far(why))
@@ -155,8 +154,7 @@ class _Writing:
             await self._see_taken(step, error)
 
     async def _see_taken(self, step: SlotChange, lost: LineError) -> None:
-        """Read the result of a write without an answer; raises AssignmentRefused where it is not
-        held."""
+        """Read the result of a write without a reply; raise AssignmentRefused if it is not held."""
         try:
             now = (await self.retrying.ask_raws([step.slot])).get(step.slot)
         except LineError:
@@ -174,7 +172,7 @@ class _Writing:
         return AssignmentRefused(self.so_far(f"{text} Look at it, then write again."))
 
     def so_far(self, text: str, *, sent: str = "") -> str:
-        """A text with the slots that were written before; `sent` may have been written too."""
+        """Return a text with the slots that were written; `sent` may have been written too."""
         if sent:
             text = f"{sent} was sent: {text}"
         if not self.done:

@@ -1,5 +1,4 @@
-"""Commander of a drive through a gateway, and the effect of other programs' stops on its
-clients."""
+"""Client that commands a drive, and the effect of other programs' stops on clients."""
 
 from __future__ import annotations
 
@@ -26,12 +25,12 @@ STOPPED_ELSEWHERE = (
 
 
 class GatewayCommanding:
-    """The drives of one line that clients command; for any thread.
+    """Drives of one line that clients command; for any thread.
 
-    A client that repeats its words would start a motor again that a person has just stopped: after
-    such a stop its commands are refused until a client has sent a stop word, as a controller does
-    that has seen the motor at standstill. A stop by another client counts the same for those that
-    have commanded the drive: they have to send their own.
+    A client that repeats its words would restart a motor that a person has just stopped. So after
+    such a stop, commands of clients are refused until a client has sent a stop word itself, as a
+    controller does that has seen the standstill. After a stop by another client, each client that
+    has commanded the drive must send its own.
     """
 
     def __init__(
@@ -47,17 +46,17 @@ class GatewayCommanding:
         self._by: dict[int, str] = {}
         """The client that commands, by device."""
         self._stopped: dict[int, str] = {}
-        """Devices that were stopped from elsewhere since a client's last stop: by whom."""
+        """Source of a stop by another program since the last stop of a client, by device."""
         self._signs: dict[int, float] = {}
-        """When the client that commands was last heard, by device (monotonic)."""
+        """Time of the last request of the client that commands, by device (monotonic)."""
         self._commanded: dict[int, set[str]] = {}
         """The clients that have commanded each device since it was stopped."""
         self._barred: dict[tuple[int, str], str] = {}
-        """Clients whose drive another client has stopped: by whom, by device and client."""
+        """Source of a stop by another client, by device and by the client that must stop first."""
         self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def close(self) -> None:
-        """Command nothing any more."""
+        """End the subscription, and release all drives."""
         self._unsubscribe()
         with self._lock:
             devices = list(self._by)
@@ -65,7 +64,7 @@ class GatewayCommanding:
             self._release(device)
 
     def claim(self, device: int, client: str) -> str:
-        """Command a drive for a client; returns why not, or nothing."""
+        """Make a client the commander of a drive; return why not, or an empty string."""
         with self._lock:
             by = self._stopped.get(device) or self._barred.get((device, client))
         if by is not None:
@@ -83,18 +82,18 @@ class GatewayCommanding:
         return ""
 
     def heard(self, device: int, client: str) -> None:
-        """A client asks for a drive: a sign of life, if it is the one that commands it."""
+        """Note the time of a request, if its client commands the drive."""
         with self._lock:
             if self._by.get(device) == client:
                 self._signs[device] = REAL_CLOCK.monotonic()
 
     def last_sign(self, device: int) -> float:
-        """When a client that commands the drive was last heard (monotonic); never is -inf."""
+        """Return the time of the commander's last request (monotonic); -inf if there was none."""
         with self._lock:
             return self._signs.get(device, -math.inf)
 
     def stop(self, device: int, client: str) -> None:
-        """A client stops a drive: what was meant for it before is void, and nobody commands it."""
+        """Cancel earlier commands of all programs and release the drive, for a client's stop."""
         self._line.facts.give_stop([device], f"Modbus TCP client {client}")
         with self._lock:
             self._stopped.pop(device, None)
@@ -105,12 +104,12 @@ class GatewayCommanding:
         self._started.stopped(device)
 
     def stopped_too(self, device: int, client: str) -> None:
-        """A client has sent a stop, for which that of another client may have been sent."""
+        """Accept commands of a client again after its stop, even if an equal one was sent."""
         with self._lock:
             self._barred.pop((device, client), None)
 
     def gone(self, client: str) -> None:
-        """A client has closed its connection."""
+        """Release the drives of a client that has closed its connection."""
         with self._lock:
             left = [device for device, by in self._by.items() if by == client]
             for clients in self._commanded.values():
@@ -150,8 +149,10 @@ class GatewayCommanding:
             self._by.pop(device, None)
 
     def _requested(self, device: int, program: Program) -> None:
-        """A program requests a drive, which it gets if the motor is at standstill; in the line's
-        thread."""
+        """Give a drive to a program that requests it, if the motor is at standstill.
+
+        Called in the line's thread.
+        """
         with suppress(LineClosed):
             self._line.spawn(lambda: self._decide(device, program), f"question about {device}")
 

@@ -1,4 +1,4 @@
-"""The drive of each device of a line, found when a client first asks for it."""
+"""Drives of a line, identified when a client first sends a request to their address."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ READ_THROUGH = Limits(
     max_read_23=0,
     max_write_23=0,
 )
-"""For what no profile fits: it may be no drive at all, and is read as its client asks."""
+"""Limits of a device without a profile, which may not be a drive: reads pass unchanged."""
 WHO_AGAIN_AFTER = 30.0
 """Seconds after which an unidentified drive is identified again."""
 
 CHART_READ_EACH = 1.5
-"""Seconds after which the word that decides between charts is read again for a client."""
+"""Seconds after which the word that selects the chart is read again for a client."""
 
 Note = Callable[[int, DriveIdentity | None, str], None]
-"""Is given a device, what it says of itself, and the profile it is taken by."""
+"""Called with a device, the identity that it reports, and its profile."""
 
 
 class GatewayDrives:
-    """The drives of one line, for one loop; a line that was lost may have others afterwards."""
+    """Drives of one line, for one loop; after a loss of the line, others may be connected."""
 
     def __init__(self, line: ModbusLine, note: Note, named: Mapping[int, str]) -> None:
         self.line = line
@@ -58,32 +58,32 @@ class GatewayDrives:
         self._losses = 0
         """Number of losses of the line; the only field that is changed in the line's thread."""
         self._sure: dict[int, int] = {}
-        """Those losses when a device began to identify itself; none where it was silent since."""
+        """By device, the losses when it was identified; no entry if it was silent since."""
         self._candidates: dict[int, tuple[str, ...]] = {}
-        """Families of which a nameless device may be."""
+        """By device, the families of which an unidentified one may be."""
         self._requested: dict[int, tuple[int, float]] = {}
-        """Those losses, and the time, of a device's last identification."""
+        """By device, the losses and the time of its last identification."""
         self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
         self._charts: dict[int, float] = {}
-        """When the word that decides between charts was last asked for, by device."""
+        """By device, the time when the word that selects the chart was last read."""
         self._reads: set[asyncio.Task[None]] = set()
         self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def close(self) -> None:
-        """Look after nothing any more."""
+        """End the subscription, and cancel identifications and reads."""
         self._unsubscribe()
         for task in (*self._tasks.values(), *self._reads):
             task.cancel()
 
     def known(self, device: int) -> DriveSession | None:
-        """The drive as it was found out last, None before. An unknown device is made readable."""
+        """Return the drive as identified last, or None; allow reads of an unknown device."""
         if device not in self._found:
             self._found[device] = None
             self.line.describe(device, READ_THROUGH)
         return self._found[device]
 
     def find_out(self, device: int) -> None:
-        """Identify a device that answers, beside other work; not again and again."""
+        """Begin to identify a device that answers; every WHO_AGAIN_AFTER at most."""
         sure = self.known(device) is not None and self._is_sure(device)
         if not sure and device not in self._tasks:
             losses, since = self._requested.get(device, (-1, 0.0))
@@ -92,7 +92,10 @@ class GatewayDrives:
                 self._begin(device)
 
     async def found(self, device: int) -> DriveSession | None:
-        """The drive, asked now if need be; None where no profile fits. Raises the line's errors."""
+        """Return the drive, identified now if necessary; None if no profile fits.
+
+        Raises the line's errors.
+        """
         session = self.known(device)
         while session is None or not self._is_sure(device):
             task = self._tasks.get(device) or self._begin(device)
@@ -102,11 +105,14 @@ class GatewayDrives:
         return session
 
     def _is_sure(self, device: int) -> bool:
-        """False if another drive may answer there than the one that was found out."""
+        """Return False if another drive may have the address since the identification."""
         return self._sure.get(device) == self._losses
 
     def stoppable(self, device: int, words: Mapping[int, int]) -> DriveSession | None:
-        """A nameless drive by one of its families, for words that only stop each of them."""
+        """Return a session of an unidentified drive if the words stop all its candidate families.
+
+        Its profile is one of the candidates.
+        """
         profiles = [library.load(id) for id in self._candidates.get(device, ())]
         stops = all(
             word.kind is WordKind.STOP
@@ -116,25 +122,25 @@ class GatewayDrives:
         return DriveSession(self.line, device, profiles[0]) if profiles and stops else None
 
     def unknown_again(self, device: int) -> None:
-        """The stop of a nameless drive was sent: it is only read as before."""
+        """Allow only reads of an unidentified drive again, after its stop was sent."""
         self._take(device, None, self._losses)
 
     def doubt(self, device: int) -> None:
-        """It was silent: it is identified again before anything but a stop is written to it."""
+        """Identify a silent device again before anything but a stop is written to it."""
         self._sure.pop(device, None)
         self._requested.pop(device, None)
 
     async def read_deciding(
         self, session: DriveSession, codes: Sequence[str], *, hurry: bool
     ) -> Mapping[str, int]:
-        """Raw values of words, read before all else if in a `hurry`.
+        """Read raw values, with the priority of a stop if in a `hurry`.
 
-        Without those that cannot be read.
+        Values that cannot be read are missing.
         """
         priority = Priority.STOP if hurry else Priority.OPERATOR_WRITE
         chart, raws = chart_codes(session.profile), {}
         for code in codes:
-            # a state may be another one already; which chart holds changes with a write only
+            # a state may have changed already; the active chart changes only by a write
             age = CHART_AGE if code in chart else 0.0
             try:
                 raws[code] = await self._read_raw(session, code, priority, age)
@@ -145,7 +151,10 @@ class GatewayDrives:
     async def _read_raw(
         self, session: DriveSession, code: str, priority: Priority, max_age: float
     ) -> int:
-        """One word, also from a read by any program up to `max_age` seconds ago. Raises errors."""
+        """Read one word, or use a reply to any program of the last `max_age` seconds.
+
+        Raises the line's errors.
+        """
         parameter = session.profile.find(code)
         reply = await self.line.read(
             session.device, parameter.address, word_count(parameter),
@@ -154,9 +163,9 @@ class GatewayDrives:
         return from_words(parameter, reply.words)
 
     def keep_chart_known(self, device: int) -> None:
-        """Read what distinguishes a stop from a run command now and then, while a client asks.
+        """Read the word that selects the chart from time to time while a client sends requests.
 
-        So a stop that follows needs not wait for it.
+        So a stop does not have to wait for that read.
         """
         session = self._found.get(device)
         codes = chart_codes(session.profile) if session is not None else []
@@ -204,12 +213,12 @@ class GatewayDrives:
         profile = await asyncio.to_thread(library.load, named)
         session = DriveSession(self.line, device, profile, identity)
         if session.contradiction:
-            log.warning("%s It is read only.", session.contradiction)
+            log.warning("%s Clients can only read it.", session.contradiction)
             return self._take(device, None, losses)
         try:
             await check_byte_order(Reader(session), self._patience(device))
         except BytesSwapped as error:
-            log.warning("%s Its clients read and stop it only.", error)
+            log.warning("%s Clients can only read and stop it.", error)
             self._candidates[device] = (profile.id,)
             return self._take(device, None, losses)
         self._note(device, identity, profile.id)
@@ -222,13 +231,12 @@ class GatewayDrives:
         return session
 
     def _patience(self, device: int) -> Priority:
-        """Return the priority: a device that never answered gets a shorter wait, as clients do
-        not wait either."""
+        """Return the priority of reads; a device that never answered gets a shorter wait."""
         heard = self.line.device_state(device).heard
         return Priority.OPERATOR_READ if heard is not None else Priority.BACKGROUND
 
     def _remembered(self, device: int, identity: DriveIdentity) -> str:
-        """The profile that a nameless drive was taken by when the line was used last."""
+        """Return the profile of an unidentified drive when the line was last used; may be empty."""
         if identity.reference:
             return ""
         key = line_name(self.line.link).key

@@ -1,4 +1,4 @@
-"""The lines of a gateway: each request of a Modbus TCP client to its drive, and the answer back."""
+"""Requests of Modbus TCP clients: each is passed to its drive, and the reply back."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ log = logging.getLogger(__name__)
 
 
 class Gateway:
-    """Answers the requests of all clients; lives in one loop."""
+    """Answers the requests of all clients; for one loop."""
 
     def __init__(
         self,
@@ -61,18 +61,18 @@ class Gateway:
         self._rules = rules
 
     async def close(self) -> list[StopSummary]:
-        """Leave all lines alone; the results for the motors that had to be stopped."""
+        """Close all lines; return the results for the motors that were stopped."""
         return [reported for line in self._lines if (reported := await line.close()) is not None]
 
     def gone(self, client: TcpClient) -> None:
-        """A client has closed its connection."""
+        """Release the drives of a client that has closed its connection."""
         for line in self._lines:
             line.commanding.gone(client.peer)
 
     def answer(self, request: TcpRequest) -> Coroutine[Any, Any, bytes]:
-        """The answer to a request; whatever is wrong is an exception of Modbus.
+        """Return a coroutine for the reply; every error becomes an exception reply of Modbus.
 
-        Called when the request comes: a stop that is given from then on voids it.
+        Call it when the request arrives: a stop after that moment cancels the request.
         """
         function = request.pdu[0]
         place = self._units.get(request.unit)
@@ -80,7 +80,7 @@ class Gateway:
             return _refused(function, NO_PATH)
         line, device = self._lines[place[0]], place[1]
         if not request.stale:
-            # what waited while this program stood still says nothing of its client now
+            # a request that waited while this program was suspended proves no living client
             line.commanding.heard(device, request.client.peer)
             line.drives.keep_chart_known(device)
         try:
@@ -122,7 +122,7 @@ class Gateway:
             return exception_pdu(function, refused.code)
         except LineError as error:
             if isinstance(error, NoAnswer):
-                # another drive may answer there when one does
+                # the next reply may be from another drive
                 line.drives.doubt(device)
             return exception_pdu(function, exception_of(error))
         except DriveError as error:
@@ -174,16 +174,16 @@ class Gateway:
         self, line: GatewayLine, request: TcpRequest, requested: WriteAsked, write: PendingWrite
     ) -> bytes:
         device = write.device
-        # a stop does not wait until a drive that was silent has said again who it is
+        # a stop does not wait until a drive that was silent is identified again
         session = line.drives.known(device) or await line.drives.found(device)
         if session is not None:
             return await GatewayWrite(
                 line, session, requested, request, self._rules, write
             ).carry_out()
-        # a drive that does not say who it is is stopped by a word that stops all it may be
+        # an unidentified drive is sent a word that stops all its candidate families
         session = line.drives.stoppable(device, requested.words)
         if session is None:
-            raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
+            raise Unanswerable(ILLEGAL_FUNCTION, "a device without a profile is only read")
         try:
             return await GatewayWrite(
                 line, session, requested, request, self._rules, write
@@ -214,14 +214,14 @@ async def _refused(function: int, code: int) -> bytes:
 
 
 CHANGING_SUBFUNCTIONS = frozenset({1, 3, 4, 10})
-"""Of function 8: restarts, the delimiter, listen-only mode, the clearing of counters."""
+"""Subfunctions of function 8: restart, delimiter, listen-only mode, clearing of counters."""
 
 
 def _patience(line: ModbusLine, device: int) -> Priority:
-    """A device that never answered is not waited for as long: its client does not either.
+    """Return the priority of a read: a device that never answered gets a shorter wait.
 
-    One that is silent is asked as a poll, which leaves it alone between two tries: a client that
-    goes on asking for it would take the line from all others.
+    A silent device is read as a poll, which pauses between two attempts. Otherwise a client that
+    repeats its request would occupy the line.
     """
     state = line.device_state(device)
     if state.next_try is not None:
@@ -230,12 +230,12 @@ def _patience(line: ModbusLine, device: int) -> Priority:
 
 
 def _unsent(line: ModbusLine, device: int) -> int:
-    """The exception for a read that the line did not send."""
+    """Return the exception code for a read that the line did not send."""
     return BUSY if device in line.facts.paused else ILLEGAL_VALUE
 
 
 def exception_of(error: LineError) -> int:
-    """The exception that reports trouble on the line to a client, or the drive's own."""
+    """Return the exception code for an error of the line; that of the drive if it sent one."""
     if isinstance(error, DeviceException):
         return error.code
     if isinstance(error, ExchangeError):

@@ -32,7 +32,7 @@ STANDING_STILL = ("stopped", "ready", "blocked")
 
 
 class GatewayLine:
-    """One line of a gateway: its drives, and who commands them."""
+    """One line of a gateway, with its drives and its clients; for the gateway's loop."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class GatewayLine:
         self.commanding = GatewayCommanding(line, self._stands, self.started)
 
     async def close(self) -> StopSummary | None:
-        """Leave the line alone; the results for motors that clients had started, None for none."""
+        """Stop the motors that clients have started, then end; None if there were none."""
         summary = await self.started.end()
         self.resting.close()
         self.commanding.close()
@@ -61,7 +61,7 @@ class GatewayLine:
     async def identify_apart(
         self, host: str, session: DriveSession, words: Mapping[int, int]
     ) -> list[ExternalWord]:
-        """Sort the words of a client by kind, by a read if necessary."""
+        """Classify the words of a client; read what that depends on if necessary."""
         found = classify_words(session.profile, words, {})
         codes = tuple(stop_deciding_codes(session.profile, words))
         if not codes or not any(word.kind is WordKind.COMMAND for word in found):
@@ -75,20 +75,19 @@ class GatewayLine:
         return found
 
     def keep_resting(self, session: DriveSession) -> None:
-        """A drive has answered a client's stop: it must not trip while its motor rests."""
+        """Poll a drive whose motor a client has stopped, so that it does not trip at standstill."""
         if self.drives.known(session.device) is session:
             self.resting.keep(session)
 
     def sign(self, device: int) -> float | None:
-        """When the client that started a motor was last heard (monotonic); None for no such motor.
+        """Return when the client that started a motor last sent a request (monotonic).
 
-        For any thread.
+        None if no client has started it. For any thread.
         """
         return self.commanding.last_sign(device) if self.started.holds(device) else None
 
     async def _stands(self, device: int) -> bool:
-        """Return True if a motor is surely at standstill now, for another program that requests the
-        drive."""
+        """Read the state for a program that requests the drive; True if at standstill."""
         session = self.drives.known(device)
         if session is None:
             return False
@@ -109,23 +108,23 @@ READS_EACH_HOST = 8
 READING, DECIDING, STOPPING = "read", "read before a stop", "stop"
 SLOTS = {READING: READS_EACH_HOST, DECIDING: 1, STOPPING: 1}
 MOST_IN_VAIN, IN_VAIN_LASTS = 5, 10.0
-"""Words of a host that turned out to be no stop, in so many seconds, until its reads wait."""
+"""Words of a host that proved not to be a stop, in so many seconds, before its reads wait."""
 
 
 class HostTurns:
-    """One stop of each host at a time, and few reads; for one line and one loop.
+    """Turns of the hosts of clients on one line: one stop at a time each, and a few reads.
 
-    So a host that floods the line with requests does not hold up a stop of another one. A stop
-    waits for no read before another stop: it goes out as soon as its own read has come.
+    So a host that floods the line with requests does not delay a stop of another one. A stop waits
+    only for the read that precedes it. For one loop.
     """
 
     def __init__(self) -> None:
         self._slots: dict[tuple[str, str], tuple[asyncio.Semaphore, int]] = {}
-        """By host and kind of request, with the count of those that use or want one."""
+        """By host and kind of request, with the number of users."""
         self._waiting: dict[tuple[str, Hashable], asyncio.Future[Any]] = {}
-        """Stops, and reads before them, that have not been sent yet."""
+        """Stops, and reads before them, that were not sent yet."""
         self._in_vain: dict[str, deque[float]] = {}
-        """By host, when something was read for words that turned out to be no stop."""
+        """By host, the times of reads for words that proved not to be a stop."""
 
     @asynccontextmanager
     async def reading(self, host: str) -> AsyncIterator[None]:
@@ -147,13 +146,16 @@ class HostTurns:
                 self._slots[which] = slots, users - 1
 
     def may_hurry(self, host: str) -> bool:
-        """False if reads before stops of this host were often in vain: they go as commands do."""
+        """Return False if too many words of this host proved not to be a stop.
+
+        Then the reads before its stops have the priority of commands.
+        """
         last = self._in_vain.get(host, deque[float]())
         now = asyncio.get_running_loop().time()
         return len(last) < MOST_IN_VAIN or now - last[0] > IN_VAIN_LASTS
 
     def note_in_vain(self, host: str) -> None:
-        """Count a read before a command of this host."""
+        """Count a read of this host for a word that proved not to be a stop."""
         now = asyncio.get_running_loop().time()
         self._in_vain = {h: t for h, t in self._in_vain.items() if now - t[-1] <= IN_VAIN_LASTS}
         self._in_vain.setdefault(host, deque(maxlen=MOST_IN_VAIN)).append(now)
@@ -161,13 +163,13 @@ class HostTurns:
     async def deciding(
         self, host: str, codes: Hashable, read: Callable[[], Coroutine[Any, Any, T]]
     ) -> T:
-        """Read what decides about a stop in the turn of its host; a like one does for both."""
+        """Read what identifies a stop, in the turn of its host; equal reads share one request."""
         return await self._shared(host, DECIDING, codes, read)
 
     async def stopping(
         self, host: str, word: Hashable, send: Callable[[], Coroutine[Any, Any, T]]
     ) -> T:
-        """Send a stop in the turn of its host; one like it that waits already does for both."""
+        """Send a stop in the turn of its host; equal stops that wait share one frame."""
         return await self._shared(host, STOPPING, word, send)
 
     async def _shared(
@@ -185,11 +187,11 @@ class HostTurns:
         mine = self._waiting[which] = asyncio.get_running_loop().create_future()
         try:
             async with self._slot(host, kind):
-                del self._waiting[which]  # one that comes from here on is sent, too
+                del self._waiting[which]  # a later one is sent as well
                 mine.set_result(await send())
         except Exception as error:
             mine.set_exception(error)
-            mine.exception()  # perhaps no other one waits
+            mine.exception()  # marks it as retrieved, because perhaps no other one waits
             raise
         finally:
             if self._waiting.get(which) is mine:
@@ -201,47 +203,46 @@ class HostTurns:
 
 @dataclass(slots=True, eq=False)
 class PendingWrite:
-    """A write that came from a client and is not answered yet."""
+    """A write of a client that is not answered yet."""
 
     client: TcpClient
     device: int
     words: Mapping[int, int]
-    """Written words, by register."""
+    """Words to write, by register."""
     stops: int
-    """The device's count of stops when it came: one that comes later voids it."""
+    """Stop count of the device when it arrived: a later stop cancels it."""
 
 
 class PendingWrites:
-    """The writes to the drives of one line in the order in which they came; for one loop."""
+    """Writes to the drives of one line in the order of their arrival; for one loop."""
 
     def __init__(self, line: ModbusLine) -> None:
         self._line = line
         self._pending: list[PendingWrite] = []
 
     def came(self, client: TcpClient, device: int, words: Mapping[int, int]) -> PendingWrite:
-        """A write has come."""
+        """Add a write that has arrived."""
         write = PendingWrite(client, device, words, self._line.facts.stops.stamp(device))
         self._pending.append(write)
         return write
 
     def ended(self, write: PendingWrite) -> None:
-        """It is answered."""
+        """Remove a write that was answered."""
         self._pending.remove(write)
 
     def stops_by(self, write: PendingWrite) -> None:
-        """It has just stopped its drive: what its own client sent behind it means that stop."""
+        """Keep later writes of the same client valid after this one has stopped the drive."""
         at = self._pending.index(write)
         for pending_write in self._pending[at:]:
             if pending_write.client is write.client and pending_write.device == write.device:
                 pending_write.stops = next_count(pending_write.stops)
 
     def void(self, write: PendingWrite) -> bool:
-        """Return True if its drive was stopped since it came."""
+        """Return True if its drive was stopped since it arrived."""
         return write.stops != self._line.facts.stops.stamp(write.device)
 
     def changes_before(self, write: PendingWrite, registers: Collection[int]) -> bool:
-        """Return True if its client has sent a write before it, to one of these registers of its
-        drive."""
+        """Return True if an earlier write of its client to one of these registers still waits."""
         before = self._pending[: self._pending.index(write)]
         return any(
             pending_write.client is write.client and pending_write.device == write.device

@@ -1,7 +1,7 @@
 """Keeps drives from tripping on their communication timeout after a client has stopped them.
 
-A controller stops its motor and leaves. Without another request the drive trips. The holder of
-the line reads it as long as the motor was seen at rest within the time of that timeout.
+A controller may stop its motor and disconnect. Without another request the drive would trip. So
+the owner of the line reads it, as long as the motor was seen at rest within that timeout.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from ..read.reader import Reader
 log = logging.getLogger(__name__)
 
 LOOKS_PER_TIMEOUT = 2.0
-"""Looks at a motor at rest in each timeout of its drive."""
+"""Reads of the state in each timeout of a drive whose motor is at rest."""
 
 
 class RestingDrives:
-    """Keeps the stopped drives of one line alive; lives in the gateway's loop.
+    """Sends keep-alive reads to the stopped drives of one line; for the gateway's loop.
 
     Only while the motor is at rest: otherwise reads would keep it running for a dead controller.
     """
@@ -39,7 +39,7 @@ class RestingDrives:
         self._tasks: dict[int, asyncio.Task[None]] = {}
 
     def keep(self, session: DriveSession) -> None:
-        """Keep a drive that has answered its stop."""
+        """Keep a drive alive that has acknowledged a stop."""
         device = session.device
         before = self._tasks.get(device)
         if before is None or before.done():
@@ -48,13 +48,13 @@ class RestingDrives:
             task.add_done_callback(_ended)
 
     def release(self, device: int) -> None:
-        """Leave a drive to its controller, which starts the motor."""
+        """Keep a drive alive no longer, because its controller starts the motor."""
         if (task := self._tasks.pop(device, None)) is not None:
             task.cancel()
         self._line.facts.keep_alives.let_go(device)
 
     def close(self) -> None:
-        """Leave all drives alone."""
+        """Keep no drive alive any longer."""
         for device in tuple(self._tasks):
             self.release(device)
 
@@ -65,8 +65,8 @@ class RestingDrives:
         reader = Reader(session)
         while True:
             timeout = _timeout(session) if learned is not None else UNKNOWN_TIMEOUT
-            # a motor that turns then has not obeyed, or was started by another source: its drive
-            # is to act by itself
+            # a motor that turns then did not obey, or another source has started it: the drive's
+            # own timeout must act
             if timeout is None or not (rests or clock.monotonic() - begun < timeout):
                 return
             rest = timeout / READS_PER_TIMEOUT - self._silence(session)
@@ -102,7 +102,7 @@ class RestingDrives:
         return read_chart(profile, image.fresh(JUST_SEEN)).motion in AT_REST
 
     def _silence(self, session: DriveSession) -> float:
-        """Seconds since any program has heard the drive."""
+        """Return the seconds since the last reply of the drive to any program."""
         heard = self._line.device_state(session.device).heard
         return session.clock.monotonic() - session.clock.line_time(heard) if heard else 0.0
 
@@ -113,7 +113,7 @@ def _ended(task: asyncio.Task[None]) -> None:
 
 
 def _timeout(session: DriveSession) -> float | None:
-    """The drive's communication timeout in seconds; None if it has none."""
+    """Return the drive's communication timeout in seconds; None if it has none."""
     read = session.timeout
     if read is None or not read.known:
         return UNKNOWN_TIMEOUT

@@ -1,4 +1,4 @@
-"""Permissions of a gateway's clients, and the drive of each unit id."""
+"""Permissions of a gateway's clients, and the drive behind each unit id."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAPPED = re.compile(r"(\d+)(?:-(\d+))?=(\d+)(?:@(\d+))?")
 
 
 class RulesError(DriveError):
-    """Typed ids or codes make no sense."""
+    """Typed unit ids or codes are not valid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class GatewayRules:
     """Permissions of clients; reading is always allowed, and so are words that only stop."""
 
     fresh: float = 0.0
-    """Seconds up to which what was read before is an answer."""
+    """Seconds for which a value that was read before is sent as a reply; 0 reads each time."""
     writes: frozenset[str] = frozenset()
     """Codes of settings that may be written, or `ALL`."""
     commands: bool = False
@@ -33,23 +33,23 @@ class GatewayRules:
 
 
 def allowed_codes(text: str) -> frozenset[str]:
-    """Codes as they are typed, with commas between; `all` in any case. Raises RulesError."""
+    """Parse typed codes, separated by commas, or `all` in any case. Raises RulesError."""
     codes = frozenset(part.strip() for part in text.split(",") if part.strip())
     if not codes:
-        raise RulesError(f"{text!r}: name codes, such as ACC,DEC, or all.")
+        raise RulesError(f"{text!r} has no code. Name codes such as ACC,DEC, or all.")
     return frozenset(ALL if code.casefold() == ALL else code for code in codes)
 
 
 def as_written(codes: frozenset[str]) -> frozenset[str]:
-    """Codes as the families write them that have them, typed in any case.
+    """Return codes in the case that the families use.
 
-    Raises RulesError for one that no family has: nobody would notice that nothing is allowed by it.
+    Raises RulesError for a code that no family has; it would allow nothing, and silently.
     """
     if codes <= {ALL}:
         return codes
     known = defaultdict[str, set[str]](set)
     for listing in library.listings():
-        with suppress(DriveError):  # a profile that cannot be read serves no drive either
+        with suppress(DriveError):  # no drive uses a profile that cannot be read
             for parameter in library.load(listing.id).parameters:
                 known[parameter.code.casefold()].add(parameter.code)
     if strange := sorted(code for code in codes - {ALL} if code.casefold() not in known):
@@ -60,16 +60,16 @@ def as_written(codes: frozenset[str]) -> frozenset[str]:
 
 
 def unit_map(lines: int, texts: Sequence[str]) -> Mapping[int, tuple[int, int]]:
-    """The line, counted from 0, and the device that each unit id means.
+    """Return the line (from 0) and the device of each unit id.
 
-    `texts` are `FIRST-LAST=LINE[@DEVICE]`: the ids are the devices from DEVICE on (else the same
-    numbers) of the line of that number, counted from 1. Without any all ids are those of the one
-    line. Raises RulesError.
+    `texts` are `FIRST-LAST=LINE[@DEVICE]`: these ids are the devices from DEVICE on (default: the
+    same numbers) of line LINE, from 1. Without texts, ids are the devices of the only line.
+    Raises RulesError.
     """
     if not texts:
         if lines > 1:
             raise RulesError(
-                "Several lines have the same ids: say which id is where, for example"
+                "Several lines have the same ids. Map them, for example"
                 " --map 1-31=1 --map 101-131=2@1."
             )
         return {device: (0, device) for device in range(1, HIGHEST_DEVICE + 1)}
@@ -77,11 +77,13 @@ def unit_map(lines: int, texts: Sequence[str]) -> Mapping[int, tuple[int, int]]:
     for text in texts:
         match = _MAPPED.fullmatch(text.strip())
         if match is None:
-            raise RulesError(f"{text!r}: write IDS=LINE[@DEVICE], for example 101-131=2@1.")
+            raise RulesError(
+                f"{text!r} is not a mapping. Write IDS=LINE[@DEVICE], for example 101-131=2@1."
+            )
         first, last = int(match[1]), int(match[2] or match[1])
         line, device = int(match[3]), int(match[4] or match[1])
         if not 1 <= line <= lines:
-            raise RulesError(f"{text!r}: there is no line {line}; {lines} named.")
+            raise RulesError(f"{text!r}: there is no line {line}. Lines named: {lines}.")
         if not 1 <= first <= last <= 255 or not 1 <= device <= HIGHEST_DEVICE - (last - first):
             raise RulesError(f"{text!r}: ids are 1 to 255, devices 1 to {HIGHEST_DEVICE}.")
         for offset in range(last - first + 1):

@@ -1,6 +1,6 @@
-"""Motors that clients have started: on record before the frame, stopped when the gateway ends.
+"""Motors that clients have started: recorded before the frame, stopped when the gateway ends.
 
-The record is what other programs on the line go by where this one is killed: they stop the motor.
+If this program is killed, the owner of the line stops the motors by these records.
 """
 
 from __future__ import annotations
@@ -24,16 +24,15 @@ log = logging.getLogger(__name__)
 
 STANDSTILL_LOOK = 0.5
 LONGEST_LOOK = 300.0
-"""Seconds after a stop in which the motor is read until it is at standstill."""
+"""Seconds after a stop for which the motor is read, to see its standstill."""
 CLIENT_MOTORS_STOP_WITHIN = 10.0
-"""Seconds that the end of the gateway waits for its motors."""
+"""Seconds that a gateway which ends waits for the standstill of its motors."""
 
 
 class StartedMotors:
-    """The motors of one line that clients have started; lives in the gateway's loop.
+    """Motors of one line that clients have started; for the gateway's loop.
 
-    A motor is looked at after a stop only: before, that would keep its drive from noticing that
-    its controller is lost.
+    A drive is read only after a stop. Earlier reads would hide the loss of its controller from it.
     """
 
     def __init__(self, line: ModbusLine, journal: Journal) -> None:
@@ -46,12 +45,11 @@ class StartedMotors:
         self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def holds(self, device: int) -> bool:
-        """Return True if a motor that a client has started is not yet known to be at standstill.
-        For any thread."""
+        """Return True if a motor that a client has started may still run. For any thread."""
         return self._keeper.holds(device)
 
     async def begin(self, session: DriveSession, order: StartDirection) -> bool:
-        """Put a start on record, before its frame; False where it is already.
+        """Record a start before its frame; return False if it is already recorded.
 
         Raises StartNotRecorded.
         """
@@ -59,16 +57,16 @@ class StartedMotors:
         self._sessions[session.device] = session
         look = self._looks.pop(session.device, None)
         if look is not None:
-            # the rest before this start must not end its record
+            # the standstill before this start must not end its record
             look.cancel()
         elif self._keeper.holds(session.device):
-            # a controller repeats its word: the disk is written once
+            # a controller repeats its word, so only the first is written to the disk
             return False
         await asyncio.to_thread(self._keeper.begin, session, order)
         return True
 
     def sent(self, session: DriveSession, *, sent: bool) -> None:
-        """The frame went out, or was refused before."""
+        """Note that the frame was sent, or was refused before."""
         (self._keeper.sent if sent else self._keeper.never_sent)(session)
 
     def _hear(self, event: LineEvent) -> None:
@@ -76,14 +74,13 @@ class StartedMotors:
             self.stopped(*event.devices)
 
     def stopped(self, *devices: int) -> None:
-        """A stop was given, by any program: check that the motors reach standstill. For any
-        thread."""
+        """Follow motors to standstill after a stop by any program. For any thread."""
         for device in devices:
             if self._keeper.holds(device):
                 self._loop.call_soon_threadsafe(self._look_at, device)
 
     def given(self, device: int) -> None:
-        """Another program commands the drive from now on."""
+        """Remove the record of a drive that another program commands now."""
         if (session := self._sessions.get(device)) is not None:
             self._keeper.give_away(session)
 
@@ -113,7 +110,7 @@ class StartedMotors:
             await session.clock.sleep(STANDSTILL_LOOK)
 
     async def end(self) -> StopSummary | None:
-        """Stop what still runs: nobody commands it any more. None where nothing does."""
+        """Stop the motors that still run; None if there are none."""
         self._unsubscribe()
         left = [session for device, session in self._sessions.items() if self._keeper.holds(device)]
         summary = None

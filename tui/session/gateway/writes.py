@@ -1,4 +1,4 @@
-"""Writes of Modbus TCP clients: which pass, which pass as a stop, and what the journal keeps."""
+"""Writes of Modbus TCP clients: permissions, words that only stop, and the journal."""
 
 from __future__ import annotations
 
@@ -70,12 +70,12 @@ class GatewayWrite:
         self._rules = rules
         self._write = write
         self._commands = False
-        """True if it commands the drive, and does not only stop it."""
+        """True if a word of it commands the drive otherwise than by a stop."""
 
     async def carry_out(self) -> bytes:
-        """Write what is allowed; the answer. Raises Unanswerable and the line's errors.
+        """Write what is allowed, and return the reply. Raises Unanswerable and the line's errors.
 
-        What only stops goes past the writes that its client sent before it, and voids them.
+        A write that only stops overtakes the earlier writes of its client, and cancels them.
         """
         if not self._may_go_first():
             await self._request.turn()
@@ -84,7 +84,7 @@ class GatewayWrite:
         if len(stops) == len(words):
             return await self._send(Priority.STOP)
         for stop in stops:
-            # first of all: whatever becomes of the rest
+            # first, because the rest may be refused
             await self._send_alone(stop)
         await self._request.turn()
         await self._check(words)
@@ -92,13 +92,12 @@ class GatewayWrite:
         return await (self._start(order) if order else self._send(Priority.OPERATOR_WRITE))
 
     def _may_go_first(self) -> bool:
-        """Return True if a stop may be in it, which no write before it turns into something
-        else."""
+        """Return True if it may contain a stop, and no earlier write changes its meaning."""
         profile = self._session.profile
         kinds = {word.kind for word in classify_words(profile, self._requested.words, {})}
         if WordKind.COMMAND not in kinds:
             return WordKind.STOP in kinds
-        # the command before it tells the state, not what the word means
+        # an earlier command word changes the state, but not the meaning of this word
         own = {chart.command for chart in profile.data.charts}
         codes = stop_deciding_codes(profile, self._requested.words)
         deciding = [profile.find(code) for code in codes if code not in own]
@@ -108,7 +107,7 @@ class GatewayWrite:
         return not self._line.pending.changes_before(self._write, registers)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
-        """Words whose shown values are surely present."""
+        """Read codes; return raw values of the last JUST_READ seconds, none after an error."""
         try:
             await Reader(self._session).read(codes, priority=Priority.OPERATOR_WRITE)
         except LineError as error:
@@ -117,7 +116,7 @@ class GatewayWrite:
         return self._session.image.fresh(JUST_READ)
 
     async def _check(self, words: list[ExternalWord]) -> None:
-        """Raise Unanswerable where the request is not allowed as a whole."""
+        """Raise Unanswerable if any part of the request is not allowed."""
         self._commands = any(word.kind is WordKind.COMMAND for word in words)
         if why := self._voided() or self._session.byte_order.text:
             self._refuse(BUSY, why)
@@ -126,7 +125,7 @@ class GatewayWrite:
             self._refuse(BUSY, "another drive answers now")
         if any(word.kind is WordKind.UNKNOWN for word in words):
             lacking = [word.address for word in words if word.kind is WordKind.UNKNOWN]
-            self._refuse(ILLEGAL_FUNCTION, f"nothing is known to be written at {lacking}")
+            self._refuse(ILLEGAL_FUNCTION, f"no parameter can be written at {lacking}")
         if self._commands and not self._rules.commands:
             self._refuse(ILLEGAL_FUNCTION, "commands are not allowed: --allow-commands")
         settings = [word for word in words if word.kind is WordKind.SETTING]
@@ -146,7 +145,7 @@ class GatewayWrite:
         for parameter in parameters:
             if why := value_refusal(profile, parameter, self._requested.words):
                 self._refuse(ILLEGAL_VALUE, why)
-        # what the journal tells besides: the value before, and its unit
+        # for the journal: the value before, and its unit
         codes = [
             code for parameter in parameters for code in (parameter.code, *depends_on(parameter))
         ]
@@ -166,7 +165,7 @@ class GatewayWrite:
         raise Unanswerable(code, why)
 
     async def _start(self, order: StartDirection) -> bytes:
-        """Send what may start the motor, once that is on record. Raises StartNotRecorded."""
+        """Record the start, then send the request. Raises StartNotRecorded."""
         begun = await self._line.started.begin(self._session, order)
         sent = True
         try:
@@ -181,7 +180,7 @@ class GatewayWrite:
                 self._line.started.sent(self._session, sent=sent)
 
     def _stop(self) -> None:
-        """Void what was meant for the drive before this request."""
+        """Cancel what any program has commanded before this request."""
         self._line.commanding.stop(self._session.device, self._client)
         self._line.pending.stops_by(self._write)
 
@@ -208,7 +207,7 @@ class GatewayWrite:
             self._keep(list(word.parameters), {}, answer, "stop")
 
     async def _send(self, priority: Priority) -> bytes:
-        """The request as it came; its answer. A stop like it that waits may do for it."""
+        """Send the request unchanged, and return the reply; equal stops share one frame."""
         send = partial(self._send_now, priority)
         if priority is not Priority.STOP:
             return await send()
@@ -218,7 +217,7 @@ class GatewayWrite:
         return pdu
 
     async def _send_now(self, priority: Priority) -> bytes:
-        """Send it. Each parameter of it goes to the journal."""
+        """Send the request, and record each parameter in the journal."""
         stops = priority is Priority.STOP
         if stops:
             self._stop()
@@ -262,16 +261,16 @@ class GatewayWrite:
         return written_pdu(requested)
 
     def _voided(self) -> str:
-        """Why it must not go out any more; asked in the line's thread just before."""
+        """Return why it must not be sent; called in the line's thread just before the frame."""
         if self._line.pending.void(self._write):
-            return "Not sent: a stop came meanwhile."
+            return "Not sent: a stop came after it."
         if self._request.stale:
             return "Not sent: serve was suspended when it came, and it is too late now."
         gone = self._commands and self._request.client.left
-        return "Not sent: its client has gone, and would not stop the motor." if gone else ""
+        return "Not sent: its client has disconnected and cannot stop the motor." if gone else ""
 
     def _refusal_code(self) -> int:
-        """The exception for what the line did not send."""
+        """Return the exception code for a write that the line did not send."""
         line, profile = self._session.line, self._session.profile
         if profile.function(self._requested.function) is None or line.read_only or line.held:
             return ILLEGAL_FUNCTION
@@ -287,7 +286,7 @@ class GatewayWrite:
         answer: str,
         what: str,
     ) -> None:
-        """Put each parameter whose words were all written into the journal."""
+        """Record each parameter whose words were all written in the journal."""
         session, words = self._session, self._requested.words
         why = f"{what} of Modbus TCP client {self._client}"
         for parameter in parameters:

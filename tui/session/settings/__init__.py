@@ -1,1 +1,1 @@
-"""Changing settings: the editor, writing what is staged, restoring, keeping in the EEPROM."""
+"""Settings of a drive: the editor, writing of staged edits, restoring, EEPROM."""

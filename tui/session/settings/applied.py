@@ -1,4 +1,4 @@
-"""Result of writing staged edits, and the edits that remain."""
+"""Results of written edits, the edits that remain, and changes of the line settings."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class EditOutcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """One edit with its outcome, a sentence for a person, and what the drive holds now."""
+    """One edit with its outcome, a sentence for a person, and the raw value that is held."""
 
     edit: Edit
     outcome: EditOutcome
     text: str
     held: int | None = None
     voided: bool = False
-    """True if a stop, or the end of arming, kept it from being sent."""
+    """True if it was not sent because of a stop or the end of arming."""
 
     @property
     def done(self) -> bool:
@@ -51,48 +51,48 @@ class Applied:
 
     results: tuple[Result, ...]
     left: Edits
-    """Edits still staged, against the present values of the drive."""
+    """Edits that stay staged, compared with the current values of the drive."""
     links: tuple[LinkChange, ...] = ()
-    """Changes of the line itself, now or after a reset."""
+    """Changes of the line settings, in effect now or after a reset."""
     after_reset: tuple[str, ...] = ()
-    """Codes whose new value is in force only once the drive was reset."""
+    """Codes whose new value takes effect only after a reset of the drive."""
     unsaved: tuple[str, ...] = ()
-    """Codes whose new value is lost at power-off until the drive is ordered to save."""
+    """Codes whose new value is lost at power-off until the drive saves it."""
     stopped: str = ""
-    """Why the rest was not tried; empty where all were."""
+    """Why the rest was not written; empty if all were tried."""
     stamp: int = 0
-    """The count of stops under which they were written: a stop since voids what waits."""
+    """Stop count with which they were written: a stop since cancels what waits."""
     waits: tuple[str, ...] = ()
-    """Codes that could be written yet, once a person says so: one before them failed."""
+    """Codes that a person may still write after an earlier one has failed."""
 
     @property
     def written(self) -> tuple[Result, ...]:
-        """The edits that the drive has now."""
+        """The edits that the drive holds now."""
         return tuple(result for result in self.results if result.done)
 
 
 WriteProgress = Callable[[int, int, Result], None]
-"""Called after each edit with how many are done, how many there are, and the result."""
+"""Called after each edit with the number of finished edits, the number of all, and the result."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkChange:
-    """New settings of the drive's side of the line."""
+    """New line settings of the drive, of one edit."""
 
     code: str
     role: str
     value: str
-    """The new value as a person reads it."""
+    """The new value with its unit or name."""
     device: int
-    """The address at which the drive answers then; 0 where its server is switched off."""
+    """The address at which the drive will answer; 0 if its server is switched off."""
     line: str
-    """The line as it has to be written then; as now where another port may be meant."""
+    """The line as a person must type it then; unchanged if the setting may be of another port."""
     at_once: bool
-    """False where it comes into force only when the drive is reset."""
+    """True if it takes effect immediately, False if after a reset of the drive."""
 
     @property
     def text(self) -> str:
-        """Effect, and the next step."""
+        """The effect, and the next step, for a person."""
         when = "From now on" if self.at_once else "After its next reset"
         if not self.device:
             return f"{when} the drive's server is off ({self.code} = {self.value})."
@@ -128,7 +128,8 @@ def _choice(setting: LinkSetting, raw: int) -> LinkChoice:
 
 
 def _changed(link: Link, choice: LinkChoice) -> Link:
-    """The link with what the choice says; gateways keep their serial settings to themselves."""
+    """Return the link with the new settings; for a gateway, which hides its serial settings, the
+    old."""
     if not isinstance(link, SerialLink):
         return link
     format_ = choice.format or link.format

@@ -1,7 +1,8 @@
-"""Applying staged edits to a drive: each looked at before, written once, read back, recorded.
+"""Application of staged edits to a drive: each value is read before, written once, read back,
+recorded.
 
-A value that somebody else changed meanwhile is not overwritten; what could not be written stays
-staged. Nothing is printed: a screen or a command shows the results.
+A value that another source has changed in the meantime is not overwritten. An edit that could not
+be written stays staged. Nothing is printed: a screen or a command shows the results.
 """
 
 from __future__ import annotations
@@ -49,13 +50,13 @@ async def apply_edits(
     progress: WriteProgress | None = None,
     ask_after_failure: bool = False,
 ) -> Applied:
-    """Write staged edits one after another, in their order, as long as the permit holds.
+    """Write staged edits in their order, as long as the permit holds.
 
-    Where one fails, those that build on it are held back; with `ask_after_failure` the others
-    are not written either, but told in `Applied.waits`, so that a person can be asked first.
-    `confirmed` are codes of unverified parameters that the user confirmed; `why` goes into the
-    journal. Raises RequestRefused on a read-only line, and the line's errors while nothing has
-    been written yet.
+    If one fails, those that depend on it are not written. With `ask_after_failure` the others are
+    not written either, but listed in `Applied.waits`, so that a person can be asked first.
+    `confirmed` are codes of unverified parameters that the user has confirmed; `why` is the reason
+    in the journal. Raises RequestRefused on a read-only line, and the line's errors as long as
+    nothing was written.
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
@@ -94,12 +95,12 @@ class _Work:
     why: str
     stopped: str = ""
     voided: bool = False
-    """True if a stop, or the end of arming, ended it."""
+    """True if a stop or the end of arming has ended it."""
     results: list[Result] = field(default_factory=list)
     links: list[LinkChange] = field(default_factory=list)
 
     async def look_at_all(self) -> None:
-        """Read every parameter that the edits and their limits are about."""
+        """Read every parameter that the edits and their limits depend on."""
         codes = {edit.code for edit in self.edits}
         codes |= limit_sources(self.session.profile, codes)
         await self.retrying.ask_many(self._with_sources(codes))
@@ -113,22 +114,22 @@ class _Work:
 
     @property
     def missed(self) -> list[str]:
-        """Codes of the edits that the drive did not take so far."""
+        """Codes of the edits that the drive has not taken so far."""
         return [r.edit.code for r in self.results if not r.done]
 
     def missed_base(self, edit: Edit) -> str:
-        """The edit before this one that it builds on and that was not written."""
+        """Return the earlier edit on which this one depends, if it was not written."""
         raws = self.retrying.raws
         return builds_on(self.session.profile, edit, self.missed, self.edits, raws)
 
     def not_sent(self, edit: Edit, held: int | None = None) -> Result:
-        """Return the result of an edit once nothing more is sent."""
+        """Return the result of an edit that is not sent because the rest was ended."""
         why = self.stopped.removeprefix("Not sent: ")
         text = f"{edit.code} was not sent: {why}"
         return Result(edit, EditOutcome.NOT_SENT, text, held, self.voided)
 
     async def apply(self, edit: Edit) -> Result:
-        """One edit, from the look before to the look after."""
+        """Read, write and compare one edit."""
         try:
             if (reason := await self._reason_against(edit)) is not None:
                 return reason
@@ -152,7 +153,7 @@ class _Work:
             return Result(edit, EditOutcome.UNKNOWN, f"Whether {edit.code} was written: {error}")
 
     async def _reason_against(self, edit: Edit) -> Result | None:
-        """Why the edit is not written now, with fresh values; None where it may be."""
+        """Return why the edit must not be written, by fresh values; None if it may."""
         profile, retrying = self.session.profile, self.retrying
         parameter = profile[edit.code]
         state = await retrying.ask_state()
@@ -184,8 +185,7 @@ class _Work:
         return None
 
     def _means(self, edit: Edit) -> bool:
-        """Return True if the raw value still stands for what was staged: its scale may have
-        changed."""
+        """Return True if the raw value still has the staged meaning: its scale may have changed."""
         parameter = self.session.profile[edit.code]
         if parameter.scale_by is None:
             return True
@@ -233,9 +233,10 @@ class _Work:
         )
 
     async def _after_a_lost_answer(self, edit: Edit, error: LineError) -> Result:
-        """A write is sent once; the result is found by reading.
+        """Find the result of a write without a reply, by reading.
 
-        A line may go on at once: where the program ended that owned it, another one takes it over.
+        The line may be open again immediately: if its owner has ended, another program takes it
+        over.
         """
         try:
             held = (await self.retrying.ask_raws([edit.code])).get(edit.code)
@@ -260,7 +261,7 @@ class _Work:
         return bool(self.session.profile.data.exceptions)
 
     def summary(self) -> Applied:
-        """All results, and what is left to be done."""
+        """Combine all results with the edits that remain."""
         profile = self.session.profile
         done = [result.edit.code for result in self.results if result.done]
         parameters = [profile[code] for code in done]
@@ -276,7 +277,7 @@ class _Work:
         )
 
     def _left(self, done: set[str]) -> Edits:
-        """Return the edits still staged, against the present values of the drive."""
+        """Return the edits that stay staged, compared with the current values of the drive."""
         left = Edits(tuple(edit for edit in self.edits.requested if edit.code not in done))
         held = {r.edit.code: r.held for r in self.results if r.held is not None}
         raws = {**self.retrying.raws, **held}

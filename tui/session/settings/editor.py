@@ -1,7 +1,7 @@
-"""Editing the parameters of one drive: what may be written, what was, what waits for a reset.
+"""Editor of the parameters of one drive: values, staged edits, writes.
 
-What the drive holds is in `values`, what is staged in `staging`. The writing is work on the drive,
-in the line's loop; everything else belongs to the thread of the screen.
+The values of the drive are in `values`, the staged edits in `staging`. Writing is work on the
+drive, in the line's loop. Everything else belongs to the thread of the screen.
 """
 
 from __future__ import annotations
@@ -33,29 +33,29 @@ from .staging import Staging
 from .watched_values import WatchedValues
 
 LEFT_NAMED = 8
-"""Codes that are named of what is still staged; more are counted."""
+"""Number of staged codes that a text names; the others are counted."""
 
 
 @dataclass(slots=True)
 class Editor:
-    """The values, the staged edits and the work on one drive."""
+    """Values, staged edits and writes of one drive."""
 
     session: DriveSession
     journal: Journal
     watched: Callable[[], DriveState | None]
-    """The drive's state as it is watched; None while it is not known."""
+    """The monitored state of the drive; None if it is not known."""
     values: WatchedValues = field(init=False)
     staging: Staging = field(init=False)
     waits_for_reset: set[str] = field(default_factory=set)
     applied: Applied | None = None
     """Result of the last write, until a screen has shown it."""
     moved: LinkChange | None = None
-    """Present address of the drive, after a setting of the line itself was written."""
+    """Address of the drive after a write of its own address; None without one."""
     marks: Marks = field(init=False)
     other: Mapping[str, int] = field(default_factory=dict)
     other_label: str = "factory"
     source: ParameterSet | None = None
-    """The parameter set that the drive is compared with, if it is one."""
+    """The parameter set with which the drive is compared; None without one."""
 
     def __post_init__(self) -> None:
         self.marks = load_marks(self.session.profile.id)
@@ -64,7 +64,7 @@ class Editor:
 
     @property
     def unsaved(self) -> frozenset[str]:
-        """Values written to the drive, here or as slots of a block, that are not saved."""
+        """Codes written to the drive, also as slots of a block, that are not saved."""
         return self.session.unsaved
 
     @property
@@ -74,7 +74,7 @@ class Editor:
 
     @property
     def facts(self) -> FilterContext:
-        """Facts by which filters decide."""
+        """Facts that filters of the list use."""
         return FilterContext(
             self.session.profile,
             self.session.image.raws,
@@ -88,7 +88,7 @@ class Editor:
 
     @property
     def state(self) -> StateKind | None:
-        """The kind of the drive's state as it is watched, by what its motor does; None: unknown."""
+        """The monitored kind of state by the motor's motion; None if it is not known."""
         state = self.watched()
         return state.motion if state is not None else None
 
@@ -98,12 +98,12 @@ class Editor:
         return self.session.work.busy_for(self)
 
     def refusal(self, code: str) -> Refusal | None:
-        """Why a parameter cannot be written now."""
+        """Return why a parameter cannot be written now; empty if it can."""
         profile = self.session.profile
         return write_refusal(profile, profile[code], self.state, self.marks.confirmed)
 
     async def plan(self) -> RestorePlan:
-        """Plan the writes that make the drive hold the set; reads it. Raises the line's errors."""
+        """Read the drive, and plan the writes for the set. Raises the line's errors."""
         from tui.drive.profile import library
         from tui.drive.settings.restore_plan import Options
         from tui.drive.settings.restore_planner import plan_restore
@@ -119,11 +119,11 @@ class Editor:
     # Marks
 
     def toggle_favorite(self, code: str) -> None:
-        """Mark a parameter, or take the mark away."""
+        """Add a parameter to the favorites, or remove it."""
         self._mark(self.marks.toggled(code))
 
     def confirm(self, code: str) -> None:
-        """A person has compared an unverified parameter with the keypad."""
+        """Note that a person has compared an unverified parameter with the keypad."""
         self._mark(self.marks.with_confirmed(code))
 
     def _mark(self, marks: Marks) -> None:
@@ -133,7 +133,7 @@ class Editor:
     # Writing
 
     def apply(self, codes: tuple[str, ...] = (), stamp: int | None = None) -> None:
-        """Write what is staged, or only these; returns at once."""
+        """Write the staged edits (default: all); return immediately."""
         staging = self.staging
         edits, held_back = staging.only(codes)
         staging.results, self.applied = {}, None
@@ -165,7 +165,7 @@ class Editor:
         self.moved = next((link for link in applied.links if link.at_once), None)
 
     def _cut_short(self) -> str:
-        """A stop came: what the drive has is no longer staged, the rest is."""
+        """After a stop, unstage what the drive holds, and keep the rest."""
         done = self.staging.drop_written()
         self._mark(self.marks.edited(done))
         with suppress(LineError):
@@ -174,14 +174,14 @@ class Editor:
         return f"Wrote {len(done)}, all verified. {left} still staged." if left else ""
 
     async def _see_what_is_held(self) -> None:
-        """Of the edit that a stop cut short it is not known whether the drive took it: look."""
+        """Read the edit that a stop has interrupted: its result is not known."""
         with suppress(LineError, DriveError):
             codes = [edit.code for edit in self.staging.edits]
             await RetryingReader(self.session).ask(codes)
             self.staging.drop_held()
 
     def _was_reset(self) -> None:
-        """Clear the values that waited for a reset, and those that were not saved."""
+        """Clear the lists of values that wait for a reset or for saving."""
         if self.waits_for_reset or self.unsaved:
             lost = ", ".join(sorted(self.unsaved))
             gone = f" Not saved before, so look at: {lost}." if lost else ""
@@ -190,7 +190,7 @@ class Editor:
         self.session.unsaved_settings.clear()
 
     def save(self, stamp: int | None = None) -> None:
-        """Copy the settings to EEPROM, where the family needs that."""
+        """Copy the settings to the EEPROM, if the family needs that."""
 
         async def work(permit: Permit) -> str:
             done = await save_to_eeprom(self.session, self.journal, permit)
@@ -217,7 +217,7 @@ class Editor:
         stamp: int | None,
         given_up: Callable[[], str] | None = None,
     ) -> None:
-        """Do it as work on the drive; objections are reported."""
+        """Queue work on the drive; report a refusal as the outcome."""
         queue = self.session.work
         if queue.busy:
             self._say("Another command is still being carried out.", OutcomeKind.REFUSED)
@@ -232,7 +232,7 @@ class Editor:
 
 
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
-    """Return the result of all edits and the staged ones, in a sentence or two."""
+    """Describe the result of all edits, and the edits that stay staged."""
     done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
     parts = [f"Wrote {done}, all verified" if done else "Nothing written"]
     if left := list(dict.fromkeys((*failed, *staged))):

@@ -1,4 +1,4 @@
-"""Saving a drive's settings to its EEPROM, and recalling its factory settings."""
+"""Commands that save a drive's settings to its EEPROM, or recall its factory settings."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ SAVING_LONGEST = 10.0
 """Seconds that a drive may take to save or to recall."""
 SAVE_POLL_INTERVAL = 0.1
 SETTINGS_NAMED = 8
-"""Most settings named in a text."""
+"""Number of settings that a text names at most."""
 
 
 async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit) -> str:
-    """Copy the settings to EEPROM and wait until the drive is done; returns what was done.
+    """Copy the settings to the EEPROM, wait until the drive is done, and return the result as text.
 
-    Raises MemoryRefused (wrong state, or the family needs or knows no such order),
-    DeviceException with what the drive's refusal means, and the line's other errors.
+    Raises MemoryRefused (wrong state, or the family needs or has no such command), DeviceException
+    with the meaning of the drive's refusal, and the line's other errors.
     """
     order = save_order(session.profile)
     writer = Writer(session, journal, permit)
@@ -41,10 +41,11 @@ async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit
 async def factory_reset(
     session: DriveSession, journal: Journal, permit: Permit, *, confirmed: Collection[str] = ()
 ) -> str:
-    """Recall the factory settings and read the result; returns what was done.
+    """Recall the factory settings, read them, and return the result as text.
 
-    Raises MemoryRefused (wrong state, order not known, or its word unverified and not among
-    `confirmed`), DeviceException with what the drive's refusal means, and the line's other errors.
+    Raises MemoryRefused (wrong state, unknown command, or an unverified word that is not among
+    `confirmed`), DeviceException with the meaning of the drive's refusal, and the line's other
+    errors.
     """
     order = factory_order(session.profile)
     writer = Writer(session, journal, permit)
@@ -95,7 +96,7 @@ async def _carry_out(
 
 
 async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
-    """Raise MemoryRefused unless the drive surely is at rest and something would be recalled."""
+    """Raise MemoryRefused unless the drive is known to be at rest, and has settings to recall."""
     state = await retrying.ask_state()
     if state not in AT_REST:
         raise MemoryRefused(f"This needs the motor stopped; the drive is now {retrying.headline}.")
@@ -114,7 +115,8 @@ async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
 
 
 async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
-    """Wait until the order's bit or value has gone and the EEPROM is no longer written."""
+    """Wait until the drive has reset the bit or value of the command, and writes its EEPROM no
+    more."""
     profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
     reported = [order.done.parameter] if order.done else []
@@ -139,7 +141,7 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
 
 
 def _is_pending(order: MemoryOrder, raws: Mapping[str, int]) -> bool:
-    """Return True if the drive has not yet said that it is done."""
+    """Return True if the drive has not reported yet that it is done."""
     if order.done is not None:
         return raws.get(order.done.parameter) not in order.done.values
     if order.keeps_value:
@@ -149,7 +151,7 @@ def _is_pending(order: MemoryOrder, raws: Mapping[str, int]) -> bool:
 
 
 async def _report(session: DriveSession, retrying: RetryingReader) -> str:
-    """Which of the known factory settings the drive holds now."""
+    """Count the known factory settings that the drive holds now, and name the others."""
     profile = session.profile
     settings = [
         p

@@ -17,7 +17,7 @@ STORED_KEYS = {"favorites": "favourites", "confirmed": "confirmed", "recent": "r
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """Codes of one drive family."""
+    """Marked codes of one drive family."""
 
     favorites: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
@@ -26,17 +26,17 @@ class Marks:
     """The last edited first."""
 
     def toggled(self, code: str) -> Marks:
-        """With one more favorite, or one less."""
+        """Return marks with a code added to the favorites, or removed."""
         if code in self.favorites:
             return replace(self, favorites=tuple(c for c in self.favorites if c != code))
         return replace(self, favorites=(*self.favorites, code))
 
     def with_confirmed(self, code: str) -> Marks:
-        """With one more confirmed."""
+        """Return marks with a code added to the confirmed ones."""
         return replace(self, confirmed=tuple(dict.fromkeys((*self.confirmed, code))))
 
     def edited(self, codes: Iterable[str]) -> Marks:
-        """With these edited last."""
+        """Return marks with these codes as the ones edited last."""
         return replace(self, recent=tuple(dict.fromkeys((*codes, *self.recent)))[:RECENT_KEPT])
 
 
@@ -52,7 +52,7 @@ def _texts(found: object) -> tuple[str, ...]:
 
 
 def save_marks(profile_id: str, marks: Marks) -> None:
-    """Keep them; a folder that cannot be written is not an error."""
+    """Store the marks; errors of the folder are ignored."""
     with suppress(OSError):
         fields = asdict(marks)
         store_json(_file(profile_id), {key: fields[name] for name, key in STORED_KEYS.items()})

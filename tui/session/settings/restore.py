@@ -1,7 +1,7 @@
-"""Restoring a parameter set to a drive: planned against the drive, written, planned again.
+"""Restore of a parameter set to a drive: planned, written, and planned again.
 
-What is done is known by reading the drive, never from a file: an interrupted restoring is resumed
-by starting it again. A mark in the state folder only shows that one was interrupted.
+Progress is known only from the drive, never from a file. So an interrupted restore is resumed by
+starting it again. A mark in the state folder only shows that one was interrupted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .applied import Applied, LinkChange, Result, WriteProgress
 from .apply import apply_edits
 
 PASSES = 5
-"""Most planning passes: writing some settings changes others."""
+"""Maximum number of planning passes: some settings change others when written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +48,16 @@ class Restored:
     stopped: str
     """Why it ended early; empty if it finished."""
     unseen: str = ""
-    """Why the drive could not be looked at again after writing; empty where it was."""
+    """Why the drive could not be read again after writing; empty if it could."""
 
     @property
     def complete(self) -> bool:
-        """True if the drive holds all that was planned."""
+        """True if the drive holds all planned values."""
         return not self.stopped and not len(self.left)
 
 
 async def held_by(session: DriveSession, reading: ReadProgress | None = None) -> Held:
-    """The settings that the drive holds now; raises the line's errors."""
+    """Read the settings of the set from the drive. Raises the line's errors."""
     upload = Upload(session, setting_codes(session.profile), reading)
     await upload.run()
     reference = session.identity.reference if session.identity is not None else ""
@@ -75,9 +75,9 @@ async def restore_set(
     progress: WriteProgress | None = None,
     reading: ReadProgress | None = None,
 ) -> Restored:
-    """Write what differs, read it back, and look again until nothing more is to be done.
+    """Write the settings that differ, read them back, and plan again until none differs.
 
-    Raises the line's errors while nothing was written yet.
+    Raises the line's errors as long as nothing was written.
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
@@ -128,7 +128,7 @@ async def plan_for(
     options: Options = NO_OPTIONS,
     reading: ReadProgress | None = None,
 ) -> RestorePlan:
-    """Plan a restore to this drive now; reads it, writes nothing."""
+    """Read the drive and plan a restore; write nothing."""
     held = await held_by(session, reading)
     return plan_restore(session.profile, held, source, source_profile, options)
 
@@ -154,20 +154,20 @@ async def _one_pass(
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A file in the state folder that is there while a drive's restoring is not complete."""
+    """A file in the state folder that exists while a restore of a drive is not complete."""
 
     path: Path
 
     @classmethod
     def of(cls, session: DriveSession) -> Mark:
-        """The mark of this drive on this line."""
+        """Return the mark of this drive on this line."""
         name = f"{session.line_text}-{session.device}-{session.profile.id}"
         safe = re.sub(r"[^A-Za-z0-9]+", "-", name)
         return cls(state_folder() / f"restore-{safe}.json")
 
     @property
     def interrupted(self) -> str:
-        """Known state of a restore that did not finish; else empty."""
+        """Describe a restore that did not finish; empty if there is none."""
         reported = stored_json(self.path)
         if not isinstance(reported, dict) or not {"begun", "parameters", "set"} <= set(reported):
             return ""
@@ -178,13 +178,13 @@ class Mark:
         )
 
     def begin(self, source: ParameterSet, count: int) -> None:
-        """Leave the mark; a folder that cannot be written stops no restoring."""
+        """Create the mark; an error of the folder does not stop the restore."""
         reported = {"begun": now_text(), "parameters": count, "set": source.head.time or "no time"}
         with suppress(OSError):
             store_json(self.path, reported)
 
     def end(self) -> None:
-        """Take the mark away."""
+        """Remove the mark."""
         try:
             self.path.unlink(missing_ok=True)
         except OSError:

@@ -1,4 +1,4 @@
-"""The edits of one drive that are staged: typed, checked and not written yet."""
+"""Staged edits of one drive: typed and checked, but not written yet."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Staging:
 
     session: DriveSession
     busy: Callable[[], bool]
-    """True if something is being written: nothing is staged meanwhile."""
+    """Returns True while something is being written; then nothing can be staged."""
     edits: Edits = field(default_factory=Edits)
     results: dict[str, Result] = field(default_factory=dict)
     """Result of the last write of each parameter."""
@@ -35,7 +35,7 @@ class Staging:
 
     @property
     def changed_elsewhere(self) -> dict[str, int]:
-        """Staged codes that somebody else has changed since, with the value before."""
+        """Staged codes that another source has changed since, with the value before."""
         if self.busy():
             return {}
         raws = self._raws
@@ -46,12 +46,12 @@ class Staging:
         }
 
     def stage(self, code: str, typed: str) -> str:
-        """Stage what was typed; returns what should be shown at once. Raises ValueRefused."""
+        """Stage a typed value; return a remark to show immediately. Raises ValueRefused."""
         edits = self.edits.stage(self.session.profile, code, typed, self._raws, self._lacking)
         return self._staged(code, edits)
 
     def stage_raw(self, code: str, raw: int) -> str:
-        """Stage a raw value: a name of a list, a word of bits. Raises ValueRefused."""
+        """Stage a raw value, for a name of a list or a word of bits. Raises ValueRefused."""
         edits = self.edits.stage_raw(self.session.profile, code, raw, self._raws, self._lacking)
         return self._staged(code, edits)
 
@@ -64,12 +64,12 @@ class Staging:
         return edit.remark if edit else ""
 
     def undo(self, code: str) -> None:
-        """Take one edit back."""
+        """Unstage one edit."""
         self.edits = self.edits.undo(code, self.session.profile, self._raws, self._lacking)
         self.results.pop(code, None)
 
     def stage_old(self) -> str:
-        """Stage what the drive held before the last write; says what was staged."""
+        """Stage the values before the last write; return the result as text."""
         done = [result.edit for result in self.results.values() if result.done]
         olds = [(edit.code, edit.old) for edit in done if edit.old is not None]
         staged = 0
@@ -82,20 +82,20 @@ class Staging:
         return f"{staged} {'old value is' if staged == 1 else 'old values are'} staged."
 
     def undo_all(self) -> None:
-        """Take every edit back."""
+        """Unstage every edit."""
         self.edits, self.results = Edits(), {}
 
     def accept_changes(self) -> None:
-        """Take what others wrote for the value before, knowingly."""
+        """Accept values that other sources have written as the values before the edits."""
         self.edits = self.edits.now(self.session.profile, self._raws, self._lacking)
 
     def take_plan(self, plan: RestorePlan) -> None:
-        """Stage what a plan would write."""
+        """Stage the edits of a restore plan."""
         profile = self.session.profile
         self.edits = self.edits.stage_many(profile, plan.edits.requested, self._raws, self._lacking)
 
     def only(self, codes: Iterable[str]) -> tuple[Edits, tuple[Edit, ...]]:
-        """The edits of these codes, of all where there are none; and those held back."""
+        """Return the edits of these codes (default: all), and the other edits."""
         wanted = frozenset(codes) or frozenset(edit.code for edit in self.edits.requested)
         chosen = Edits(tuple(edit for edit in self.edits.requested if edit.code in wanted))
         return chosen, tuple(edit for edit in self.edits.requested if edit.code not in wanted)
@@ -103,7 +103,7 @@ class Staging:
     def take_left(self, left: Sequence[Edit]) -> None:
         """Keep the edits that a write has left; an unchanged value only while its scale waits.
 
-        Kept, it would become one silently once another program sets that parameter otherwise.
+        Otherwise it would silently become an edit once another program sets that parameter.
         """
         changing = {edit.code for edit in self.edits}
         waits = {edit.code for edit in left if edit.code in changing}
@@ -116,7 +116,7 @@ class Staging:
         self.edits = Edits(tuple(edit for edit in left if stays(edit)))
 
     def take_result(self, result: Result) -> None:
-        """One edit was written, or could not be."""
+        """Note the result of one edit."""
         self.results = {**self.results, result.edit.code: result}
 
     def drop_written(self) -> list[str]:

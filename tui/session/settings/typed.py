@@ -1,4 +1,4 @@
-"""Settings that were typed, staged against what the drive holds now."""
+"""Typed settings, staged with the current values of the drive."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from ..read.retrying_reader import RetryingReader
 
 
 class WouldRound(ValueRefused):
-    """A value that the drive can hold only as another one."""
+    """The drive can hold a typed value only after rounding it."""
 
 
 async def stage_typed(
     session: DriveSession, pairs: Sequence[tuple[str, str]], *, rounded: bool = False
 ) -> tuple[Edits, RetryingReader]:
-    """The edits of codes with the values typed for them, and what was read of the drive for that.
+    """Stage the values typed for codes; return the edits, and the reader with the values of the
+    drive.
 
-    Raises WouldRound where a value would be rounded to another one and `rounded` is not given,
-    ValueRefused, UnknownParameter, and the line's errors.
+    Raises WouldRound if a value would be rounded and `rounded` is False. Raises ValueRefused,
+    UnknownParameter, and the line's errors.
     """
     profile = session.profile
     codes = [code for code, _ in pairs]

@@ -1,7 +1,7 @@
-"""The values of one drive for a screen of parameters: what is looked at first, then the rest.
+"""Values of one drive for a screen of parameters: those that are shown first, then the rest.
 
-They come in through a worker of the line's loop, behind everything else where nobody looks; what
-is looked at is read again and again, so that another's change is noticed.
+A worker in the line's loop reads them, with low priority unless they are shown. Shown values are
+read again and again, so that a change by another source becomes visible.
 """
 
 from __future__ import annotations
@@ -22,55 +22,55 @@ from ..read.retrying_reader import RetryingReader, neighbors
 from ..read.upload import readable_codes
 
 IDLE_POLL_INTERVAL = 0.1
-"""Seconds between two turns of the reader that has nothing to do."""
+"""Seconds between two checks of a reader that has nothing to do."""
 REREAD_AFTER = 1.0
-"""Seconds after which what is looked at is read again."""
+"""Seconds after which a shown value is read again."""
 REREAD_AFTER_ERROR = 1.0
 
 
 @dataclass(slots=True)
 class WatchedValues:
-    """Values of a drive, read as long as they are shown."""
+    """Values of a drive, read while they are shown."""
 
     session: DriveSession
     state: Callable[[], StateKind | None]
-    """The kind of the drive's state as it is watched; None while it is not known."""
+    """The monitored kind of state of the drive; None if it is not known."""
     was_reset: Callable[[], None]
     """Called in the line's thread when the drive was reset or switched off."""
     visible: tuple[str, ...] = ()
     """Codes that are shown now."""
     trouble: str = ""
-    """Why nothing can be read now; empty while that works."""
+    """Why nothing can be read now; empty if it can."""
     _reader: LineWorker | None = None
     _silent: float | None = None
-    """Since when the drive does not answer."""
+    """Since when the drive has not answered."""
     _starting: bool = False
-    """True if the drive was starting up when it was last looked at."""
+    """True if the drive was starting up when it was last read."""
     _requested: dict[str, float] = field(default_factory=dict)
 
     @property
     def raws(self) -> Mapping[str, int]:
-        """Raw values as last read, by whomever."""
+        """Last raw values, by whichever reader."""
         return self.session.image.raws
 
     @property
     def absent(self) -> dict[str, str]:
-        """Codes without a value, and what the drive or the line said instead."""
+        """Codes without a value, with the error of the drive or the line."""
         return {code: reading.error for code, reading in self.session.image.refused.items()}
 
     @property
     def lacking(self) -> frozenset[str]:
-        """Codes that the drive itself said it does not have."""
+        """Codes that the drive itself reported as missing."""
         return self.session.image.lacking
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Readable parameters read so far, and their number."""
+        """Number of parameters read so far, and of all that can be read."""
         codes = readable_codes(self.session.profile)
         return sum(code in self.raws or code in self.absent for code in codes), len(codes)
 
     def value(self, code: str, raw: int | None = None) -> Value | None:
-        """A parameter's value as a person reads it: the held one, or another raw value's."""
+        """Return a value with its unit or name: the held one, or that of another raw value."""
         held = self.raws.get(code) if raw is None else raw
         if held is None:
             return None
@@ -79,13 +79,13 @@ class WatchedValues:
         )
 
     def start(self) -> None:
-        """Begin to read, all of it again."""
+        """Begin to read, and read all values again."""
         self.stop()
         self._requested = {}
         self._reader = self.session.line.spawn(self._read, f"editor {self.session.device}")
 
     def stop(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         if self._reader is not None:
             self._reader.cancel()
             self._reader = None
@@ -121,7 +121,7 @@ class WatchedValues:
                 await self.session.clock.sleep(REREAD_AFTER_ERROR)
 
     def _look_for_a_reset(self) -> None:
-        """A drive that was silent, or starts, was switched off: everything may be another value."""
+        """Read all values again after the drive was silent or has restarted."""
         since, self._silent = self._silent, None
         off = since is not None and self.session.clock.monotonic() - since > WAS_OFF
         before, self._starting = self._starting, self.state() == "starting"
@@ -132,7 +132,7 @@ class WatchedValues:
         self.session.image.forget()
 
     def _due(self) -> list[str]:
-        """Return the shown codes that were not read lately."""
+        """Return the shown codes whose value is old."""
         oldest = self.session.clock.monotonic() - REREAD_AFTER
         due = [code for code in self.visible if self._requested.get(code, 0.0) < oldest]
         if not due:

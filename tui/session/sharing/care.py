@@ -1,4 +1,4 @@
-"""The drives that programs on a line have armed, as their holder can stop them."""
+"""Drives that programs on a line have armed, with the data that their owner needs to stop them."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MOST_PROFILES = 16
-"""Profiles that are kept unpacked for the next drive of their family."""
+"""Unpacked profiles that are kept for further drives of their family."""
 
 
 class DrivesInCare:
-    """Keeps a session for each of them, and the journal of writes whose program ended too soon.
+    """Keeps a session for each of them, and records writes whose program has ended.
 
-    Called in the line's thread.
+    Its methods are called in the line's thread.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class DrivesInCare:
         journal: Journal,
         session_of: Callable[[int], DriveSession | None] = lambda _: None,
     ) -> None:
-        """`session_of` finds a drive that this program has open itself."""
+        """`session_of` returns the session of a drive that this program itself has open."""
         self._session_of = session_of
         self._line = line
         self._journal = journal
@@ -54,17 +54,17 @@ class DrivesInCare:
         self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     def close(self) -> None:
-        """Keep nothing more."""
+        """Accept no further drives, and end the subscription."""
         self._line.facts.accepts_care = accepts_any_care
         self._unsubscribe()
 
     def session(self, device: int) -> DriveSession | None:
-        """The drive as the program knew it that has armed it last; None if none has."""
+        """Return the drive with the profile of the program that armed it last; None if none did."""
         _, session = self._sessions.get(device, (b"", None))
         return session
 
     def _registered(self, device: int, care: bytes) -> bool:
-        """A program arms a drive; False if its care cannot be used."""
+        """Store the data of a program that arms a drive; return False if they cannot be used."""
         before, _ = self._sessions.get(device, (b"", None))
         if before == care or self._session_of(device) is not None:
             return True
@@ -76,7 +76,7 @@ class DrivesInCare:
             log.error("drive %s cannot be taken into care: %s", device, error)
             return False
         except Exception:
-            # a profile that only its sender has checked
+            # only the sender has checked the profile, so decoding it may raise anything
             log.exception("drive %s cannot be taken into care", device)
             return False
         session.guessed = data.guessed
@@ -86,7 +86,7 @@ class DrivesInCare:
         self._sessions[device] = (care, session)
         return True
 
-    # Writes that were left
+    # Writes of programs that have ended
 
     def _hear(self, event: LineEvent) -> None:
         match event:
@@ -97,7 +97,7 @@ class DrivesInCare:
 
     def _keep(self, entry: Entry, answer: Future[Reply]) -> None:
         if answer.cancelled():
-            return  # it was not sent
+            return  # the write was not sent
         error = answer.exception()
         self._journal.add(replace(entry, answer="ok" if error is None else str(error)))
 
@@ -126,7 +126,7 @@ class DrivesInCare:
 
 
 def _first_word(request: Request) -> tuple[int, tuple[int, ...]] | None:
-    """The first address that a request writes, and its words; None if it writes no register."""
+    """Return the first address and the words that a request writes; None if it writes none."""
     match request:
         case WriteOne(address=address, value=value):
             return address, (value,)

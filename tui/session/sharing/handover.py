@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from ..starts.keeper import StartKeeper
 
 TAKEN_WITHIN, TAKEN_LOOK = 5.0, 0.1
-"""Seconds in which a program puts a motor on record that it was given, and between two looks."""
+"""Seconds in which a program records a motor that it was given, and between two checks."""
 SURELY_STANDING = ("stopped", "ready", "blocked")
-"""States in which a motor surely is at standstill; a tripped one may coast."""
+"""States in which a motor is known to be at standstill; a tripped one may coast."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveRequest:
-    """A program wants a drive that is commanded from here; `until` is monotonic."""
+    """A program requests a drive that this one commands; `until` is monotonic."""
 
     device: int
     program: Program
@@ -48,7 +48,7 @@ class DriveRequest:
 
 
 class Handover:
-    """The questions about the drives of one line, asked here and asked elsewhere."""
+    """Requests for the drives of one line, by this program and by others."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Handover:
         clock: Clock = REAL_CLOCK,
     ) -> None:
         self.person = False
-        """True if somebody is here who can answer; a command without one decides at once."""
+        """True if a person can answer requests; without one they are decided immediately."""
         self.requests: Mapping[int, DriveRequest] = MappingProxyType({})
         """Requests of other programs, by device."""
         self._line = line
@@ -71,7 +71,7 @@ class Handover:
         self._changed()
 
     def close(self) -> None:
-        """Hear nothing any more."""
+        """End the subscription."""
         self._unsubscribe()
 
     def _hear(self, event: LineEvent) -> None:
@@ -87,25 +87,25 @@ class Handover:
             case ProgramsChanged():
                 self._changed()
 
-    # Asked here
+    # Requests by this program
 
     def ask_for(self, device: int) -> None:
-        """Request the drive from its commander."""
+        """Request a drive from the program that commands it."""
         other = self._line.facts.commander(device)
         if other is None:
             self._say(device, "No other program commands this drive. Press a to arm it.")
             return
         self._line.facts.ask_for(device)
-        self._say(device, f"Asked {other.text} for this drive; the answer comes here.")
+        self._say(device, f"Requested this drive from {other.text}. The reply appears here.")
 
     def _replied(self, device: int, yes: bool, why: str) -> None:
-        self._say(device, "This drive is free: a arms it." if yes else why)
+        self._say(device, "This drive is free. Press a to arm it." if yes else why)
         session = self._session_of(device)
         if yes and session is not None and session.starts is not None:
             self._spawn(partial(self._adopt, session, session.starts), f"start of {device}")
 
     async def _adopt(self, session: DriveSession, starts: StartKeeper) -> None:
-        """A motor that runs is this program's from now on: its end stops it."""
+        """Record a motor that runs as this program's, so that it is stopped when this one ends."""
         state = session.state(STANDSTILL_SEEN_WITHIN)
         if state.motion in SURELY_STANDING:
             return
@@ -123,17 +123,17 @@ class Handover:
         with suppress(LineClosed):
             self._line.spawn(work, name)
 
-    # Asked elsewhere
+    # Requests by other programs
 
     def _requested(self, device: int, program: Program) -> None:
-        """A program wants a drive; called in the line's thread."""
+        """Handle the request of a program for a drive; in the line's thread."""
         if not self.person:
             self._decide(device, program)
             return
         request = DriveRequest(device, program, self._clock.monotonic() + REQUEST_ANSWERED_WITHIN)
         self.requests = MappingProxyType({**self.requests, device: request})
         who = f"{program.text[0].upper()}{program.text[1:]}"
-        self._say(device, f"{who} asks for this drive. G answers; unanswered it stays"
+        self._say(device, f"{who} requests this drive. Press G to reply; without a reply it stays"
                   " here while its motor runs.")  # fmt: skip
         self._spawn(partial(self._expire, request), f"question about {device}")
 
@@ -144,15 +144,15 @@ class Handover:
             self._decide(request.device, request.program)
 
     def answer(self, request: DriveRequest, *, yes: bool) -> None:
-        """A person's answer to a question; the end of one is reported."""
+        """Reply to a request for a person; report if it has expired in the meantime."""
         if self.requests.get(request.device) is request:
             self._forget(request.device)
             self._reply(request.device, request.program, yes=yes)
         elif yes:
-            self._say(request.device, f"Not given: the question of {request.program.text} is over.")
+            self._say(request.device, f"Not given: {request.program.text} requests it no longer.")
 
     def _decide(self, device: int, program: Program) -> None:
-        """Without an answer: no while the motor runs, or may run."""
+        """Decide without a person: no while the motor runs, or may run."""
         session = self._session_of(device)
         stands = (
             session is not None and session.state(STANDSTILL_SEEN_WITHIN).motion in SURELY_STANDING
@@ -175,9 +175,9 @@ class Handover:
     async def _hand_over(
         self, session: DriveSession, starts: StartKeeper, program: Program
     ) -> None:
-        """Look after a motor that was started here until it is on record as the other program's.
+        """Keep the record of a motor until the other program has recorded it as its own.
 
-        That may end before it has taken it: then nobody else would stop the motor.
+        If that program ends before, this one must still stop the motor.
         """
         device, end = session.device, self._clock.monotonic() + TAKEN_WITHIN
         while starts.holds(device) and self._clock.monotonic() < end:
@@ -187,14 +187,14 @@ class Handover:
                 return
             await self._clock.sleep(TAKEN_LOOK)
         if starts.holds(device):
-            self._say(device, f"{program.text} has not taken the motor over: it stays this"
-                      " program's to stop. a arms it.")  # fmt: skip
+            self._say(device, f"{program.text} has not taken the motor over. It stays this"
+                      " program's to stop: press a to arm it.")  # fmt: skip
 
     def _forget(self, device: int) -> None:
         rest = {d: request for d, request in self.requests.items() if d != device}
         self.requests = MappingProxyType(rest)
 
-    # What others do
+    # Effects of other programs
 
     def _stopped(self, devices: tuple[int, ...], by: str, program: Program) -> None:
         for device in devices:
@@ -219,13 +219,13 @@ class Handover:
         self._names, self._commanders = names, facts.commanders
 
     def _void_questions_of(self, id: str) -> None:
-        """A program that asked has gone: there is nobody to be given a drive."""
+        """Drop the requests of a program that has left the line."""
         for device, request in self.requests.items():
             if request.program.id == id:
                 self._forget(device)
 
     def _is_anothers(self, session: DriveSession | None) -> None:
-        """Another program commands a drive; a motor started here stays this program's to stop."""
+        """Note that another program commands a drive, unless this one must still stop its motor."""
         if session is not None and not (session.starts and session.starts.holds(session.device)):
             session.note_given()
 
@@ -233,14 +233,11 @@ class Handover:
         self._events.add("told", text, device)
 
 
-OTHERS_ASK = "Other programs on the line ask"
-
-
 def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
-    """Return the reaction of other programs to a motor that is left; empty if none.
+    """Describe the effect of other programs on a motor that this one leaves; empty if none.
 
-    `on_purpose`: it is put on record as left running. Otherwise the owner of the line stops a motor
-    that was started here, by its OrphanMotorGuard.
+    `on_purpose` is True if it is recorded as left running. Otherwise the OrphanMotorGuard of the
+    line's owner stops a motor that this program has started.
     """
     others, starts = session.line.facts.others, session.starts
     if not others:
@@ -255,5 +252,6 @@ def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
         )
     if session.device not in session.line.pace.others:
         return ""
-    who, do = (f"{text[0].upper()}{text[1:]} asks", "it does") if text else (OTHERS_ASK, "they do")
-    return f"{who} it on: while {do}, the motor runs on."
+    if text:
+        return f"{text[0].upper()}{text[1:]} polls this drive. As long as it does, the motor runs."
+    return "Other programs on the line poll this drive. As long as they do, the motor runs."

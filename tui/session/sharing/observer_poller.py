@@ -1,7 +1,7 @@
-"""When a drive may be asked by who only looks on, for hours, without a person before it.
+"""When a program that only observes may poll a drive, unattended and for hours.
 
-Each request keeps the drive's communication timeout from running out: kept polled, the motor of a
-commander that has died would run for ever.
+Each request restarts the drive's communication timeout. So a motor whose commander has died would
+run forever if its drive were polled all the time.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 COMMANDER_SILENT = "Not polled: the program that started its motor gives no heartbeat."
 UNKNOWN_TIMEOUT_ACTED = 60.0
-"""Seconds of silence after which a drive has reacted that does not report its timeout."""
+"""Seconds without a request after which a drive with an unknown timeout has reacted."""
 ACTED_AFTER = 1.0
-"""Seconds beyond its timeout after which a drive has begun to act."""
+"""Seconds after its timeout in which a drive begins to react."""
 
 
 class ObserverPoller:
-    """Looks on at one drive, and keeps no motor running whose commander has died.
+    """Decides when to poll one drive, so that no motor whose commander has died keeps running.
 
-    `sign` is the time of the last heartbeat of the program that started its motor (monotonic), or
-    None if there was none. The drive is polled once for each such heartbeat, and for a quarter of
-    its timeout after it, until its motor was seen at standstill; one that was silent for longer
-    than its timeout has acted: it is looked at once.
+    `sign` returns the time of the last heartbeat of the program that started the motor
+    (monotonic), or None if there was none. Until the motor is seen at standstill, the drive is
+    polled only after a heartbeat, for a quarter of its timeout. After silence for longer than its
+    timeout the drive has reacted, and is polled again.
     """
 
     def __init__(
@@ -43,9 +43,9 @@ class ObserverPoller:
         now: Callable[[], float] = REAL_CLOCK.monotonic,
     ) -> None:
         self.orphan = False
-        """True if a program that has ended started the motor, and it was not seen at standstill."""
+        """True if the motor was started by a program that has ended, and not yet seen stopped."""
         self.waits = False
-        """True if the drive was left alone when it was to be asked last."""
+        """True if the drive was not polled when its last poll was due."""
         self._session = session
         self._sign = sign
         self._latest = latest
@@ -53,11 +53,11 @@ class ObserverPoller:
         self._requested = now()
 
     def freely(self) -> bool:
-        """Return True if it may be asked at any time: nobody is known to have started its motor."""
+        """Return True if it may be polled at any time: no program has started its motor."""
         return self._sign() is None and not self.orphan
 
     def held_back(self) -> str:
-        """Why the drive must not be asked now, or nothing: then it counts as asked."""
+        """Return why the drive must not be polled now; if empty, it counts as polled."""
         self.waits = not self._may_ask()
         if self.waits:
             return COMMANDER_SILENT
@@ -92,7 +92,7 @@ class ObserverPoller:
         return self._now() - (heard if heard is not None else self._requested)
 
     def _timeout(self) -> float | None:
-        """The drive's communication timeout in seconds, 0 for one that has none; None: unknown."""
+        """Return the drive's communication timeout in seconds; 0 for none, None if not known."""
         reported = self._session.timeout
         if reported is None or not reported.known:
             return None

@@ -1,7 +1,7 @@
-"""Stops the motors of a program that is gone; at work in whichever program owns the line.
+"""Stops the motors of programs that have ended; runs in the program that owns the line.
 
-The records of starts show which motors they are. A recorder goes on asking a drive, so its own
-timeout would never stop a motor whose commander died.
+The records of starts show which motors they are. Other programs keep polling the drive, so its own
+communication timeout would not stop a motor whose commander has died.
 """
 
 from __future__ import annotations
@@ -40,17 +40,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-GONE, ABSENT = "is gone", "is not on the line any more"
-"""Texts on a program that has ended, and on one that lives: frozen, or detached."""
-BY_KEYS = "a and T take it over here"
-LINE_STAYS_LOST = "NOT STOPPED: the line stays lost. Stop the motor at the machine."
+EXITED, ABSENT = "has exited", "is no longer on the line"
+"""States of a program that has ended, and of one that lives: frozen, or detached."""
+LINE_STAYS_LOST = "NOT STOPPED: the line is still lost. Stop the motor at the machine."
 ENDS_WITHIN = 0.5
-"""Seconds that a program takes to be gone from the list of processes."""
+"""Seconds in which a program that ends disappears from the list of processes."""
 LOOK_INTERVAL = 0.05
 
 
 class OrphanMotorGuard:
-    """Looks after the motors that other programs on one line have started."""
+    """Stops motors on one line whose program has ended, and carries out stops without a program."""
 
     def __init__(
         self,
@@ -68,25 +67,25 @@ class OrphanMotorGuard:
         self._starts = starts or Starts()
         self._stopper = Stopper(line, journal, events)
         self._key = line_key(label(line.link))
-        """The line by its adapter, also while that is unplugged."""
+        """The line by the name of its adapter, kept while that is unplugged."""
         self._care = DrivesInCare(line, journal, session_of)
         self._lost: dict[int, float] = {}
-        """By device, when its line was lost before a stop; it may have come and gone since."""
+        """By device, when the line was first lost during its stop (monotonic)."""
         self._followed: set[int] = set()
-        """Devices whose due stop is seen to its end."""
+        """Devices whose stop for other programs is followed to standstill."""
         self._workers: list[LineWorker] = []
         self._changing = threading.Lock()
         self._unsubscribe = line.facts.events.subscribe(self._hear)
 
     @property
     def busy(self) -> bool:
-        """True until the motors of each program that is gone are stopped, or were taken over."""
+        """True until all motors of programs that have ended are stopped or taken over."""
         with self._changing:
             self._workers = [worker for worker in self._workers if not worker.done()]
             return bool(self._workers)
 
     def close(self) -> None:
-        """Look after nothing any more; waits a moment for what is still to be removed."""
+        """End the subscriptions; wait a moment for records that are being removed."""
         self._unsubscribe()
         self._care.close()
         self._starts.close()
@@ -103,7 +102,7 @@ class OrphanMotorGuard:
             self._workers.append(self._line.spawn(work, name))
 
     async def _look_after(self, program: Program) -> None:
-        """Stop each motor that it has started and that nobody takes over in time."""
+        """Stop each motor that a program has started, unless a person takes it over in time."""
         left = self._clock.monotonic()
         records = await self._left_by(program)
         if not records:
@@ -119,38 +118,38 @@ class OrphanMotorGuard:
     async def _stop_unless_taken(
         self, record: StartRecord, program: Program, *, takers: bool, left: float
     ) -> None:
-        """Stop a motor, unless an attached person takes it over within the drive's timeout.
+        """Stop a motor, unless a panel takes it over within the drive's timeout.
 
-        With such a person, a program that lives has as long to look after it again.
+        `takers` is True if there is a panel. Then a frozen program may also return in that time.
         """
         device, frozen = record.device, self._starts.is_alive(record)
         grace = min(record.acts_after or TAKEN_OVER_WITHIN, LONGEST_GRACE)
-        # one that is frozen had been silent before it was let go
+        # a frozen program had sent nothing for a while before it was disconnected
         begun = left - SILENT_CLIENT if frozen else self._clock.monotonic()
         end = begun + grace if takers else begun
         self._announce(device, program, end, frozen=frozen, takers=takers)
         while self._clock.monotonic() < end:
             if frozen and self._is_back(program):
-                self._tell(device, f"{program.text} is back: its motor runs on.")
+                self._tell(device, f"{program.text} is back: its motor keeps running.")
                 return
             if not await self._is_left(device, program):
                 self._tell(device, f"The motor that {program.text} started was taken over.")
                 return
             await self._clock.sleep(LOOK_INTERVAL)
-        session, why = await self._session(record), ABSENT if frozen else GONE
+        session, why = await self._session(record), ABSENT if frozen else EXITED
         while session is not None and await self._is_left(device, program):
             self._stopper.stop([session], by=f"{program.text} {why}")
             if not await self._ended_by_loss(session):
                 return
             if frozen and self._is_back(program):
-                self._tell(device, f"{program.text} is back: its motor runs on.")
+                self._tell(device, f"{program.text} is back: its motor keeps running.")
                 return
 
     async def _stop(self, devices: tuple[int, ...], by: str) -> None:
-        """Carry a stop out that all programs have heard of.
+        """Carry out a stop that all programs already know of.
 
-        Of drives that no program has armed here: a word by a start on record might start a drive
-        of another family that has its address now.
+        Only drives that a program has armed are stopped. The profile of a record is not enough:
+        its stop word might start a drive of another family at the same address.
         """
         if unknown := [device for device in devices if self._known(device) is None]:
             log.warning("drives %s are not stopped for %s: no program has armed them", unknown, by)
@@ -162,7 +161,7 @@ class OrphanMotorGuard:
         await asyncio.gather(*(self._follow(session, by) for session in new))
 
     async def _follow(self, session: DriveSession, by: str) -> None:
-        """See a stop to its end, also beyond a loss of the line."""
+        """Follow a stop to its end, and repeat it after each loss of the line."""
         try:
             while await self._ended_by_loss(session):
                 self._stopper.stop([session], by=by, given=True)
@@ -170,9 +169,9 @@ class OrphanMotorGuard:
             self._followed.discard(session.device)
 
     async def _ended_by_loss(self, session: DriveSession) -> bool:
-        """Wait for the end of a stop; True if the line was lost, and is back.
+        """Wait for the end of a stop; return True if the line was lost, and is connected again.
 
-        Nothing was heard of the motor then: it has to be stopped once more.
+        The motor was not seen at standstill then, so it must be stopped once more.
         """
         await self._until_ended(session)
         if self._is_connected():
@@ -193,24 +192,36 @@ class OrphanMotorGuard:
     def _announce(
         self, device: int, program: Program, end: float, *, frozen: bool, takers: bool
     ) -> None:
+        state = f"{program.text} {ABSENT if frozen else EXITED}"
         seconds = max(0.0, end - self._clock.monotonic())
-        ways = [*(["it comes back"] if frozen else []), *([BY_KEYS] if takers else [])]
-        unless = f" in {seconds:.2g} s, unless {' or '.join(ways)}" if ways and seconds else ""
-        what = ABSENT if frozen else GONE
-        self._tell(device, f"{program.text} {what}: its motor is stopped{unless}.")
+        if not takers or not seconds:
+            self._tell(device, f"{state}: its motor is stopped.")
+        elif frozen:
+            self._tell(
+                device,
+                f"{state}: its motor is stopped in {seconds:.2g} s, unless it comes back or you"
+                " take it over (a, then T).",
+            )
+        else:
+            self._tell(
+                device,
+                f"{state}: its motor is stopped in {seconds:.2g} s, unless you take it over (a,"
+                " then T).",
+            )
 
     def _is_back(self, program: Program) -> bool:
         return any(item.process == program.process for item in self._line.facts.programs)
 
     async def _is_left(self, device: int, program: Program) -> bool:
-        """Return True if no living program but that one has the motor's start on record."""
+        """Return True if no other living program has recorded the motor's start."""
         found = await asyncio.to_thread(self._found, program)
         return any(record.device == device for record in found)
 
     async def _left_by(self, program: Program) -> list[StartRecord]:
-        """The motors that it has started and not meant to leave running.
+        """Return the starts by a program, except motors left running on purpose.
 
-        A program that has not ended after a while is frozen, or has left the line to itself.
+        A program that has not ended after a while is frozen, or has closed the line. Empty if it
+        is back on the line.
         """
         end = self._clock.monotonic() + ENDS_WITHIN
         while True:
@@ -228,7 +239,7 @@ class OrphanMotorGuard:
             await self._clock.sleep(LOOK_INTERVAL)
 
     def _is_of(self, record: StartRecord, program: Program) -> bool:
-        """True for a start by this program; one before a reboot had its number by chance."""
+        """Return True for a start by a program; a PID from before a reboot does not count."""
         same = record.process == program.process
         return same and self._starts.processes.is_same_boot(record.boot_id)
 
@@ -237,11 +248,11 @@ class OrphanMotorGuard:
         text = label(self._line.link)
         if self._is_connected():
             self._key = line_key(text)
-        # an adapter that is unplugged has no name but the one that it had
+        # an adapter that is unplugged is found only by the name that it had
         return self._starts.all_found(text, absent) or self._starts.all_found(self._key, absent)
 
     async def _until_ended(self, session: DriveSession) -> None:
-        """Take the record away once the motor is at standstill; one that does not stop keeps it."""
+        """Wait for the end of a stop; remove the record if the motor is at standstill."""
         device = session.device
         while True:
             await self._clock.sleep(LOOK_INTERVAL)
@@ -253,11 +264,11 @@ class OrphanMotorGuard:
                 return
 
     def _tell(self, device: int, text: str) -> None:
-        """Have every person on the line read it."""
+        """Show a text in every program on the line."""
         self._line.facts.tell_all(device, text)
 
     def _known(self, device: int) -> DriveSession | None:
-        """A drive that this program has open, or that another one has armed on the line."""
+        """Return the session of a drive that this program has open, or another one has armed."""
         return self._session_of(device) or self._care.session(device)
 
     async def _session(self, record: StartRecord) -> DriveSession | None:
