@@ -17,6 +17,7 @@ from ..shared.errors import (
     REFUSED_HERE,
     USAGE,
     Failure,
+    end_with,
     status_of,
 )
 from ..shared.options import (
@@ -90,9 +91,7 @@ def block(
         session = await connect_drive(opened, target)
         return await _carry_out(session, target.line_text, wanted)
 
-    status = on_line(target, work, read_only=read_only or not writes)
-    if status != DONE:
-        raise click.exceptions.Exit(status)
+    end_with(on_line(target, work, read_only=read_only or not writes))
 
 
 def _check_usage(wanted: Wanted) -> None:

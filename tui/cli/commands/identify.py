@@ -6,11 +6,9 @@ import asyncio
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import click
-
 from tui.drive.plain import plain
 
-from ..shared.drives import each_drive
+from ..shared.drives import on_each_drive
 from ..shared.errors import DONE, REFUSED_HERE, Failure
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import (
@@ -18,7 +16,6 @@ from ..shared.options import (
     hold_option,
     json_option,
     line_argument,
-    on_line,
     read_only_option,
     several_devices_option,
 )
@@ -55,7 +52,6 @@ def identify(
     from tui.session.connect.identify import identify_drive as ask
 
     from ..documents.drive_documents import IdentityDocument
-    from ..running.holding import hold_on
     from ..shared.output import drive_fields
 
     target = Target(line_text, device[0], None, others=device[1:])
@@ -92,15 +88,9 @@ def identify(
         )
         return document, DONE
 
-    async def work(opened: OpenLine) -> int:
-        status = await each_drive(
-            target, lambda drive: identify_drive(opened, drive), as_json=as_json
-        )
-        await hold_on(opened, sessions, hold)
-        return status
-
-    if status := on_line(line_text, work, read_only=read_only):
-        raise click.exceptions.Exit(status)
+    on_each_drive(
+        target, identify_drive, as_json=as_json, read_only=read_only, hold=hold, held=sessions
+    )
 
 
 def _session(opened: OpenLine, identity: DriveIdentity) -> DriveSession | None:

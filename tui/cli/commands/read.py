@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.completion import complete_code
-from ..shared.drives import each_drive
+from ..shared.drives import on_each_drive
 from ..shared.errors import DONE, DRIVE_REFUSED
 from ..shared.options import (
     Target,
@@ -17,7 +17,6 @@ from ..shared.options import (
     hold_option,
     json_option,
     line_argument,
-    on_line,
     read_only_option,
 )
 from ..shared.registration import ON_LINE, command
@@ -54,7 +53,6 @@ def read(
     from tui.session.read.reader import Reader
 
     from ..documents.drive_documents import ReadDocument
-    from ..running.holding import hold_on
     from ..shared.output import drive_fields, print_readings, value_field
 
     sessions: list[DriveSession] = []
@@ -75,10 +73,6 @@ def read(
         )
         return document, DRIVE_REFUSED if refused else DONE
 
-    async def work(opened: OpenLine) -> int:
-        status = await each_drive(target, lambda drive: read_drive(opened, drive), as_json=as_json)
-        await hold_on(opened, sessions, hold)
-        return status
-
-    if status := on_line(target, work, read_only=read_only):
-        raise click.exceptions.Exit(status)
+    on_each_drive(
+        target, read_drive, as_json=as_json, read_only=read_only, hold=hold, held=sessions
+    )

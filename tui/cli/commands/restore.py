@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 import click
 
-from ..shared.drives import each_drive
+from ..shared.drives import on_each_drive
 from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE
 from ..shared.options import (
     Target,
@@ -17,7 +17,6 @@ from ..shared.options import (
     json_option,
     line_argument,
     never_forced,
-    on_line,
     profile_option,
     read_only_option,
 )
@@ -139,19 +138,11 @@ def restore(
 
     where = Target(line_text, devices[0], profile_id, others=devices[1:])
     try:
-        status = on_line(
-            where,
-            lambda opened: each_drive(
-                where, lambda drive: restore_drive(opened, drive), as_json=as_json
-            ),
-            read_only=read_only or dry_run,
-        )
+        on_each_drive(where, restore_drive, as_json=as_json, read_only=read_only or dry_run)
     except KeyboardInterrupt:
         if dry_run:
             raise
         raise telling.interrupted() from None
-    if status != DONE:
-        raise click.exceptions.Exit(status)
 
 
 def _either(*, dry_run: bool, arm: bool) -> None:

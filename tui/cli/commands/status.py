@@ -19,8 +19,8 @@ from ..shared.drive_status import (
     status_of_drive,
     status_table,
 )
-from ..shared.drives import USUAL_SEARCH, each_drive, every_drive, failed, failed_line
-from ..shared.errors import DONE, failure_of
+from ..shared.drives import USUAL_SEARCH, every_drive, failed, failed_line, on_each_drive
+from ..shared.errors import DONE, end_with, failure_of
 from ..shared.line_argument import takes_line_as
 from ..shared.options import (
     Target,
@@ -29,7 +29,6 @@ from ..shared.options import (
     force_profile_option,
     hold_option,
     json_option,
-    on_line,
     read_only_option,
 )
 from ..shared.output import print_json
@@ -87,16 +86,13 @@ def status(
             lambda lines: status_of_lines(list(zip(lines, wishes, strict=True)), wanted),
             read_only=read_only,
         )
+        end_with(worst)
     else:
-        worst = _on_one_line(wishes[0], wanted, read_only=read_only)
-    if worst:
-        raise click.exceptions.Exit(worst)
+        _on_one_line(wishes[0], wanted, read_only=read_only)
 
 
-def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
-    """Report the drives of the one named line, and the highest exit status."""
-    from ..running.holding import hold_on
-
+def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> None:
+    """Report the drives of the one named line. Raises Exit with the highest status."""
     first, *others = wish.drives
     target = first._replace(others=tuple(other.device for other in others))
     sessions: list[DriveSession] = []
@@ -111,20 +107,19 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> int:
             say_status(found)
         return status_document(target.line_text, found), found.status
 
-    async def work(opened: OpenLine) -> int:
-        drives = target
-        if wanted.every:
-            drives = await every_drive(opened, target, wanted.where(wish))
-        worst = await each_drive(
-            drives,
-            lambda drive: show_drive(opened, drive),
-            as_json=wanted.as_json,
-            titled=not wanted.every,
-        )
-        await hold_on(opened, sessions, wanted.hold)
-        return worst
+    async def answering(opened: OpenLine) -> Target:
+        return await every_drive(opened, target, wanted.where(wish))
 
-    return on_line(target, work, read_only=read_only)
+    on_each_drive(
+        target,
+        show_drive,
+        as_json=wanted.as_json,
+        read_only=read_only,
+        choose=answering if wanted.every else None,
+        titled=not wanted.every,
+        hold=wanted.hold,
+        held=sessions,
+    )
 
 
 LEFT_INDENT = 5

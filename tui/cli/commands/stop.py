@@ -18,7 +18,7 @@ from ..running.stop_targets import (
 )
 from ..running.stop_telling import StopTelling
 from ..shared.control import GIVE_BACK_OPTION, taking_of
-from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, end_with
 from ..shared.left_behind import forget_start
 from ..shared.options import (
     Target,
@@ -114,8 +114,7 @@ def stop(
     if as_json:
         several = every or len(target.each()) > 1
         print_json(telling.documents if several else telling.documents[0])
-    if worst:
-        raise click.exceptions.Exit(worst)
+    end_with(worst)
 
 
 def _devices(text: str | None) -> list[int]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.completion import complete_code
-from ..shared.errors import DIFFERENT
+from ..shared.errors import DIFFERENT, end_with
 from ..shared.options import (
     Target,
     connect_drive,
@@ -92,8 +92,7 @@ def teach(
         _tell_trouble(teacher)
         return 0
 
-    if status := on_line(target, work, read_only=True):
-        raise click.exceptions.Exit(status)
+    end_with(on_line(target, work, read_only=True))
 
 
 async def _teacher(opened: OpenLine, target: Target) -> Teacher:

@@ -16,7 +16,7 @@ import click
 from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
 from ..shared.drives import failed
-from ..shared.errors import DONE, INTERRUPTED, LINE_TROUBLE, Failure, failure_of
+from ..shared.errors import DONE, INTERRUPTED, LINE_TROUBLE, Failure, end_with, failure_of
 from ..shared.numbers import check_rate
 from ..shared.options import (
     Target,
@@ -172,8 +172,7 @@ def watch(
             wish.file.close()
     if seen.silent:
         raise Failure(seen.silent, LINE_TROUBLE)
-    if seen.missing:
-        raise click.exceptions.Exit(seen.missing)
+    end_with(seen.missing)
 
 
 @dataclass(slots=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypedDict
 import click
 
 from ..shared.completion import complete_setting
-from ..shared.errors import DONE, REFUSED_HERE
+from ..shared.errors import DONE, REFUSED_HERE, end_with
 from ..shared.options import (
     Target,
     connect_drive,
@@ -120,8 +120,7 @@ def write(
         if dry_run:
             raise
         raise telling.interrupted() from None
-    if status != DONE:
-        raise click.exceptions.Exit(status)
+    end_with(status)
 
 
 def _pairs(wanted: tuple[str, ...]) -> list[tuple[str, str]]:

@@ -2,30 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING
 
-from .errors import DONE, LINE_TROUBLE, Failure, failure_of
-from .options import Target
+from .errors import DONE, LINE_TROUBLE, Failure, end_with, failure_of
+from .options import Target, on_line
 from .output import command_name, print_json
 from .say import say
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import ScanResult
     from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
 
     from ..documents.document import Document, ErrorDocument
 
-Work = Callable[[Target], Awaitable[tuple["Document", int]]]
-"""Work for one drive: reports its lines, returns its document and exit status."""
+DriveWork = Callable[["OpenLine", Target], Awaitable[tuple["Document", int]]]
+"""Work for one drive of a line: reports its lines, returns its document and exit status."""
 
 
-async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool = True) -> int:
+def on_each_drive(
+    target: Target,
+    work: DriveWork,
+    *,
+    as_json: bool,
+    read_only: bool,
+    choose: Callable[[OpenLine], Awaitable[Target]] | None = None,
+    titled: bool = True,
+    hold: float | None = None,
+    held: Sequence[DriveSession] = (),
+) -> None:
+    """Open the line, do the work at every drive of the target, and close the line.
+
+    `choose` names the drives once the line is open. With `as_json` one document is printed, or the
+    list of several. The `held` drives are kept polled for `hold` seconds afterwards. Raises Exit
+    with the highest status other than 0, and what the work raises if there is one drive only.
+    """
+
+    async def at_drives(opened: OpenLine) -> int:
+        from ..running.holding import hold_on
+
+        chosen = target if choose is None else await choose(opened)
+        status = await _each_drive(opened, chosen, work, as_json=as_json, titled=titled)
+        await hold_on(opened, held, hold)
+        return status
+
+    end_with(on_line(target, at_drives, read_only=read_only))
+
+
+async def _each_drive(
+    opened: OpenLine, target: Target, work: DriveWork, *, as_json: bool, titled: bool
+) -> int:
     """Do the work at every drive; with `as_json` print one document, or the list of several.
 
-    With `titled` each of several has its address above it. What is wrong with one of several is
-    told and keeps it from no other. Returns the highest exit status; raises what the work raises
-    where there is one drive only.
+    With `titled`, the address of each of several drives is printed above its output. An error at
+    one of several drives is reported, and the others follow. Returns the highest exit status.
     """
     targets = target.each()
     documents: list[Document] = []
@@ -35,7 +66,7 @@ async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool 
             say(f"Device {item.device}:")
         document: Document
         try:
-            document, status = await work(item)
+            document, status = await work(opened, item)
         except Exception as error:
             if len(targets) == 1:
                 raise

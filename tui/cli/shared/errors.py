@@ -130,6 +130,12 @@ def failure_of(error: Exception) -> Failure:
     return Failure(str(error), status)
 
 
+def end_with(status: int) -> None:
+    """End the command with a status other than 0; raises Exit."""
+    if status != DONE:
+        raise click.exceptions.Exit(status)
+
+
 def note_journal(journal: Journal) -> None:
     """Let the end of this command know of the writes in a journal."""
     if (context := click.get_current_context(silent=True)) is not None:
