@@ -1,1 +1,1 @@
-"""The command line: composition root beside the panel; imports what a command needs, no more."""
+"""The command line: puts commands together; imports only what a command needs."""

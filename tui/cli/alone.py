@@ -1,4 +1,4 @@
-"""`drivepanel` alone: there is no command line to take apart, so nothing is imported for that."""
+"""`drivepanel` without arguments: opens the panel without importing a parser."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ VERBOSE = frozenset({"-v", "-vv", "-vvv", "--verbose"})
 
 
 class Commands(click.Group):
-    """Subcommands by name; a LINE in place of one opens the panel on it."""
+    """Subcommands by name; a LINE instead opens the panel on it."""
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run the command line, or answer a shell that completes."""

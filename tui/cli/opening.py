@@ -107,7 +107,7 @@ def _open_with_demo(
 
 
 def collect_garbage() -> None:
-    """Collect garbage from now on, more seldom than usual, and not among what is there by now."""
+    """Collect garbage again, less often than usual, and skip the objects that exist now."""
     gc.freeze()
     gc.set_threshold(YOUNGEST, *gc.get_threshold()[1:])
     gc.enable()

@@ -140,7 +140,7 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 
 def _status(views: list[BlockView]) -> int:
-    """0 where every slot in use that can be compared brings what it is mapped to."""
+    """0 if every comparable slot in use returns its mapped parameter."""
     from tui.session.read.verdict import SlotMatch
 
     wrong = (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE)
@@ -270,7 +270,7 @@ async def plans_of(
     profile = session.profile
     named = [_pair(text) for text in wanted.words] if wanted.action == "set" else []
     _check_once([slot for slot, _ in named])
-    # told before anything is asked: a slot that is not there
+    # before any request: report a slot that does not exist
     places = [(*place_of(profile, slot), code) for slot, code in named]
     loaded = _loaded(session, wanted)
     mapper, held = Mapper(session), dict[str, int]()

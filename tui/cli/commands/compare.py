@@ -131,7 +131,7 @@ def _set_of(text: str, target: Target) -> ParameterSet:
 
 
 def _target(text: str, device: int | None, profile_id: str | None) -> Target:
-    """The drive of a LINE, or of the name of one; what was typed goes before what the name says."""
+    """The drive of a LINE or of its name; typed options override those of the name."""
     named = named_line_of(text)
     if named is None:
         return Target(text, device or 1, profile_id)

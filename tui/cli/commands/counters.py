@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..documents.drive_documents import CountersDocument
 
 FRAMES_SENT = 20
-"""Frames that are sent to be counted, unless told."""
+"""Frames sent for counting (default)."""
 MOST_FRAMES = 10_000
 COUNTER_LOOKS = 3
 COUNTER_TITLES = 18
@@ -110,7 +110,7 @@ def counters(
 
 
 async def _look(watch: CounterWatch) -> None:
-    """Look, again where a reply was lost: on such a line the counters are wanted."""
+    """Read the counters, again after a lost reply: they matter most on such a line."""
     for _ in range(COUNTER_LOOKS):
         await watch.look()
         if not watch.trouble:

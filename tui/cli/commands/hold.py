@@ -77,7 +77,7 @@ def hold(
             taking = asyncio.create_task(_take_all(opened, targets, holding, tell))
             end = asyncio.create_task(ending.event.wait())
             try:
-                # drives that answer are asked on while others are looked for
+                # drives that answer are kept polled during the search for others
                 await asyncio.wait({taking, end}, return_when=asyncio.FIRST_COMPLETED)
                 if taking.done():
                     await taking

@@ -105,7 +105,7 @@ def _session(opened: OpenLine, identity: DriveIdentity) -> DriveSession | None:
     try:
         return DriveSession(opened.line, identity.device, library.load(named), identity)
     except DriveError:
-        return None  # who it is was asked for and is known
+        return None  # the identity is known; a session is optional
 
 
 def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
@@ -135,7 +135,7 @@ async def _model_words(session: DriveSession | None) -> Mapping[str, int]:
     try:
         found = await Reader(session).read(codes)
     except (DriveError, LineError):
-        return {}  # who it is was asked for and is known; its model is more than that
+        return {}  # the identity is known; the model is optional
     return {code: reading.raw for code, reading in found.items() if reading.raw is not None}
 
 

@@ -138,7 +138,7 @@ def _say(entries: list[Entry], damaged: list[DamagedLine], path: str, *, filtere
 
 
 def entry_line(entry: Entry) -> str:
-    """An entry in a line: when, which drive, from what to what, the answer, why."""
+    """One line about an entry: time, drive, old and new value, answer, reason."""
     from tui.session.journal_reading import time_of
 
     when = time_of(entry)

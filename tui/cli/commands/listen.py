@@ -157,7 +157,7 @@ def profiles_named(given: tuple[str, ...]) -> dict[int | None, Profile]:
 
 
 def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> CaptureFile | None:
-    """The file that is wanted; raises Failure where it cannot be begun."""
+    """The capture file; None without --pcap. Raises Failure if it cannot be written."""
     from tui.session.capture_file import CaptureFile
 
     if path is None:

@@ -36,13 +36,13 @@ arm_option = click.option(
 
 
 def complain(text: str) -> None:
-    """Say something on standard error, if anybody is there: what is under way goes on."""
+    """Report on standard error; a closed stream does not interrupt the command."""
     with suppress(OSError):
         say(f"drivepanel: {text}", err=True)
 
 
 def journal_document() -> Journal:
-    """A journal whose trouble is said at once, on standard error."""
+    """A journal that reports its errors immediately, on standard error."""
     from tui.session.journal import Journal
 
     journal = Journal(on_trouble=lambda trouble: complain(f"{trouble} The command goes on."))
@@ -62,9 +62,10 @@ def close_journal(journal: Journal) -> None:
 async def watched(
     opened: OpenLine, target: Target, starts: StartKeeper | None = None
 ) -> AsyncIterator[tuple[Fleet, DriveConsole]]:
-    """The wanted drive, watched and fed, its state known; `starts` records those of its motor.
+    """Yield the drive, monitored and kept alive, once its state is known.
 
-    Raises LineError where it does not answer, and what `connect` raises.
+    `starts` records the starts of its motor. Raises LineError without an answer, and the errors of
+    `connect_drive`.
     """
     from tui.session.fleet import Fleet
     from tui.session.running.watching import WATCH_PERIOD, first_cycle
@@ -112,8 +113,8 @@ def arm_drive(console: DriveConsole) -> None:
 async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome:
     """Give a command and wait for its result.
 
-    Raises OrderRefused where it is not even begun; Failure where it is refused, with the status
-    of who refused it: 5 here, 4 the drive, 3 no answer.
+    Raises OrderRefused if it is not begun. Raises Failure if it is refused: status 5 by Drive
+    Panel, 4 by the drive, 3 without an answer.
     """
     from tui.session.running.watching import outcome_of
 
@@ -138,7 +139,7 @@ def _status(error: Exception | None) -> int:
 
 
 def need_arming(arm: bool, does: str) -> None:
-    """Raise Failure where --arm was not given; `does` says what the command does to the drive."""
+    """Raise Failure without --arm; `does` is the effect of the command on the drive."""
     if not arm:
         raise Failure(
             f"Not armed: {does}.\n--arm lets this one command write to this one drive. Look at the"

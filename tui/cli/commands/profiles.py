@@ -131,7 +131,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     if len(words) != 1 or origin is None:
         raise click.UsageError("Name the new id and the profile to copy: new NEW-ID --from ID.")
     known = {listing.id: listing for listing in library.listings()}
-    library.load(origin)  # a broken one is told, and is no start
+    library.load(origin)  # reports a broken profile, which cannot be copied
     new_id = words[0].strip()
     if new_id in known:
         raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")

@@ -196,7 +196,7 @@ def _restored(
 
 
 def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> None:
-    """The plan: what is written in its order, and what is left out with its reason."""
+    """Report the plan: writes in their order, and omitted settings with the reason."""
     from tui.drive.settings.write_sequence import ordered
 
     items = {item.code: item for item in plan.items_of_kind("write")}

@@ -1,4 +1,4 @@
-"""`drivepanel simulate`: simulated drives for anybody's Modbus program."""
+"""`drivepanel simulate`: serves simulated drives to any Modbus client."""
 
 from __future__ import annotations
 

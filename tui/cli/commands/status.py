@@ -1,4 +1,4 @@
-"""`drivepanel status`: what a drive does, who commands it, and what it would do left alone."""
+"""`drivepanel status`: a drive's state, its commander, and its reaction to lost polling."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ STATUS_TITLES = 18
 
 @dataclass(frozen=True, slots=True)
 class StatusWish:
-    """Options of `status` besides lines and drives."""
+    """Options of `status` except lines and drives."""
 
     every: bool
     """True if every drive that answers is reported, a line each."""
@@ -169,7 +169,7 @@ def say_in_a_line(status: Status, before: str = "") -> None:
 async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: StatusWish) -> int:
     """Report the drives of several lines, in order; problems of one are reported as they occur.
 
-    Returns the highest exit status. Raises what nobody foresaw.
+    Returns the highest exit status. Raises unexpected errors.
     """
     from ..running.holding import hold_lines_on
 

@@ -150,10 +150,10 @@ async def ended(
 
 
 async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
-    """Stop one drive: first by the word that stops whatever it may be, then by its own.
+    """Stop one drive: first by a word that stops every possible family, then by its own word.
 
-    Returns the exit status, and the session with it. Raises UsageError where it is not known what
-    stops it, NoAnswer where it is not there.
+    Returns the exit status and the session. Raises UsageError if no word is known that stops it,
+    NoAnswer if it does not answer.
     """
     from tui.bus.errors import LineLost
     from tui.session.command.stop import Stopper
@@ -174,7 +174,7 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
     from tui.session.command.stop_report import Phase
 
     session, order, telling = found.session, wish.order, wish.telling
-    # a drive without the wished way is stopped all the same; it is told by which
+    # a drive without the requested kind of stop gets the ramp stop, and the result says so
     way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
     stopper.stop([session], way, by="drivepanel stop")
     who = f"Device {session.device}" + ("" if session.guessed else f", {found.name}")

@@ -96,7 +96,7 @@ def teach(
 
 
 async def _teacher(opened: OpenLine, target: Target) -> Teacher:
-    """The teacher of the wanted drive; what cannot be recalled was said by `connect_drive`."""
+    """The teacher of the drive; `connect_drive` has reported scales that cannot be read."""
     from tui.session.teaching.teacher import Teacher
 
     teacher = Teacher(await connect_drive(opened, target))

@@ -76,7 +76,7 @@ class CsvOptions:
         refuse_unasked(self.path, append=self.append, force=self.force)
 
     def opened(self, watched: Sequence[WatchedDrive], several: LabelsNeeded) -> CsvOutput | None:
-        """The file with the columns of these drives; None where none is wanted."""
+        """The file with the columns of these drives; None without --csv."""
         if self.path is None:
             return None
         units = csv_units(watched)
@@ -240,9 +240,9 @@ FoundOnLines = list[tuple[LineWish, "DriveSession"]]
 async def find_drives(
     lines: Sequence[tuple[OpenLine, LineWish]], *, as_json: bool
 ) -> tuple[FoundOnLines, int]:
-    """The wanted drives that are there, in order, and the highest status of the others.
+    """The drives that answer, in order, and the highest status of the others.
 
-    Errors of one of several are reported; raises it where there is one drive only.
+    An error of one of several drives is reported; that of a single drive is raised.
     """
     wanted = sum(len(wish.on(opened)) for opened, wish in lines)
     found = _Finding(alone=wanted == 1, several=len(lines) > 1, as_json=as_json)

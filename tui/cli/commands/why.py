@@ -92,7 +92,7 @@ async def _looked_after(
 ) -> DriveFields | None:
     """Report the reaction of a drive that was polled and is polled no longer.
 
-    On a sick line it is asked once, at the end.
+    On a bad line its timeout is read once, at the end.
     """
     from tui.drive.profile import library
     from tui.session.drive import DriveSession

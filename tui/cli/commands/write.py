@@ -136,9 +136,9 @@ def _pairs(wanted: tuple[str, ...]) -> list[tuple[str, str]]:
 async def _staged(
     session: DriveSession, typed: list[tuple[str, str]], messages: Messages, *, rounded: bool
 ) -> Edits:
-    """The edits against what the drive holds; what is to be known of them is said.
+    """The edits against the values of the drive; remarks and consequences are reported.
 
-    Raises ValueRefused where a value would be rounded to another without a person's wish.
+    Raises ValueRefused if a value would be rounded to another one without --round.
     """
     from tui.drive.errors import ValueRefused
     from tui.drive.settings.edits import consequences

@@ -69,7 +69,7 @@ class CycleDocument(Document, kw_only=True):
 
 
 class IdentityDocument(DriveDocument, kw_only=True):
-    """`identify`: who a drive says it is."""
+    """`identify`: the drive's identity."""
 
     command: Literal["identify"] = "identify"
     vendor: str
@@ -80,7 +80,7 @@ class IdentityDocument(DriveDocument, kw_only=True):
 
 
 class StatusDocument(DriveDocument, kw_only=True):
-    """`status`: what a drive does and who commands it."""
+    """`status`: a drive's state, and its commander."""
 
     command: Literal["status"] = "status"
     state: StateField
@@ -191,7 +191,7 @@ class ScanUnclearDocument(Document, kw_only=True):
 
 
 class ScanSlowDocument(Document, kw_only=True):
-    """`scan`: the likely settings are through; those that are left take so many seconds."""
+    """`scan`: the likely settings are done; the remaining ones take this many seconds."""
 
     command: Literal["scan"] = "scan"
     line: str

@@ -100,7 +100,7 @@ class OpenLineDocument(DocumentPart):
 
 
 class LinesDocument(Document, kw_only=True):
-    """`lines`: the names, what is wrong with the settings file, and what is remembered."""
+    """`lines`: named lines, errors of the settings file, and remembered lines."""
 
     command: Literal["lines"] = "lines"
     settings: str

@@ -78,7 +78,7 @@ class HeardField(DocumentPart):
 
 
 class FirstWordField(DocumentPart):
-    """A word that a stop sent before the drive had said what it is."""
+    """A word that a stop sent before the drive was identified."""
 
     address: int
     word: int
@@ -147,7 +147,7 @@ class ComparedSettingField(DocumentPart):
 
 
 class FaultField(DocumentPart):
-    """The fault that a drive is in, with what it points at."""
+    """The fault of a drive, with causes and checks."""
 
     raw: int | None
     code: str | None
@@ -162,7 +162,7 @@ class FaultField(DocumentPart):
 
 
 class AlarmField(DocumentPart):
-    """The first alarm of a drive without a fault, with what it points at."""
+    """The first alarm of a drive without a fault, with causes and checks."""
 
     name: str
     causes: list[str]
@@ -209,7 +209,7 @@ class ControlField(DocumentPart):
 
 
 class OldTimeoutField(DocumentPart):
-    """The communication timeout as `status` has told it; `timeout` takes its place."""
+    """The communication timeout in the older form of `status`; `timeout` replaces it."""
 
     timeout_s: float
     reaction: str | None

@@ -1,4 +1,4 @@
-"""Documents about what a drive holds: settings, sets, blocks, what was taught."""
+"""Documents about settings, sets, blocks and learned scales of a drive."""
 
 from __future__ import annotations
 

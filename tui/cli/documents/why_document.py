@@ -34,7 +34,7 @@ class MeasuredReads(DocumentPart):
 
 
 class WhyDocument(DriveDocument, kw_only=True):
-    """`why`: the rung that fails, `answers` where none does, in a sentence; what to do next."""
+    """`why`: the failing check (`answers` if none), the cause in a sentence, and the next steps."""
 
     command: Literal["why"] = "why"
     rung: str

@@ -1,4 +1,4 @@
-"""Which broker is meant, and by which password: what a person says of MQTT."""
+"""The MQTT broker of the options, and its password."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_LEVEL = re.compile(r"[/+#\s\x00-\x1f\x7f]+")
 
 
 class Broker(NamedTuple):
-    """A broker, and the topic under which everything goes out."""
+    """A broker, and the topic of all messages."""
 
     host: str
     port: int
@@ -103,7 +103,7 @@ def level(text: str) -> str:
 
 
 def need_mqtt(load: Callable[[str], Any] = __import__) -> None:
-    """Raise Failure with what to do where the package for MQTT is not installed."""
+    """Raise Failure with advice if the package for MQTT is not installed."""
     try:
         load("aiomqtt")
     except ImportError as error:

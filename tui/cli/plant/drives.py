@@ -171,7 +171,7 @@ class PlantDrive:
         from tui.bus.api import contact_of
 
         if self._sign(self.device) is not None:
-            # who it is was not asked before: nothing feeds a motor whose client may have died
+            # not identified before: never keep a motor alive whose client may have exited
             self._error = f"Device {self.device} was not identified: a client runs its motor."
             return None
         try:

@@ -50,7 +50,7 @@ BASE_UNITS: Mapping[str, tuple[str, str]] = {
     "m/s": ("meters_per_second", "1"),
     "bar": ("pascals", "1e5"),
 }
-"""The end of a metric's name, and what its value is multiplied by, for each unit of a profile."""
+"""Suffix of a metric's name and factor of its value, by unit of a profile."""
 _NO_NAME = re.compile(r"[^a-z0-9]+")
 
 Labels = Mapping[str, str]

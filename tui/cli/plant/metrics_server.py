@@ -32,7 +32,7 @@ class MetricsServer:
         self._tasks: dict[asyncio.Task[None], tuple[str, float]] = {}
         """Host and time of each connection."""
         self._names: frozenset[str] = frozenset()
-        """Names by which this server may be asked for, besides the address of each connection."""
+        """Host names accepted in requests, in addition to the address of each connection."""
 
     async def listen(self, host: str, port: int) -> tuple[str, int]:
         """Listen at an address; returns it with the port that was found for 0. Raises OSError."""
@@ -73,7 +73,7 @@ class MetricsServer:
         except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError) as error:
             log.info("who asked for metrics was let go: %s", error or "too slow")
         except asyncio.CancelledError:
-            # closing the server is no error of this connection
+            # closing the server is not an error of this connection
             return
         finally:
             self._tasks.pop(task, None)
@@ -95,7 +95,7 @@ class MetricsServer:
         try:
             text = self._text()
         except Exception:
-            # one answer that nobody foresaw ends no service
+            # one unexpected error must not end the service
             log.exception("the metrics were not told")
             return _http(HTTPStatus.INTERNAL_SERVER_ERROR, "The log says what is wrong.\n")
         return _http(HTTPStatus.OK, text, METRICS_TYPE, body=method == "GET")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 _client_log = logging.getLogger(f"{__name__}.client")
-# it tells every message that a broker sends unasked; what counts is raised
+# it logs every unrequested message of a broker; real errors are raised
 _client_log.setLevel(logging.CRITICAL)
 
 MQTT_KEEPALIVE = 10
@@ -33,7 +33,7 @@ MQTT_KEEPALIVE = 10
 TRY_AGAIN_FIRST, TRY_AGAIN_LONGEST = 1.0, 30.0
 """Seconds from a lost connection to the next try; each one that fails doubles it."""
 LINES_EVERY = 10.0
-"""Seconds between two messages about a line that stays as it is; the status goes out with them."""
+"""Seconds between two messages about an unchanged line; the status is sent with them."""
 LOOKED_EVERY = 2.0
 """Seconds after which is looked without anything new: what was read last may be too old by now."""
 LAST_WORD_WITHIN = 3.0
@@ -42,7 +42,7 @@ Sights = Callable[[], Sequence[LineReport]]
 
 
 class MqttPublisher:
-    """Keeps a broker told of lines and drives; lives in one loop."""
+    """Publishes lines and drives to a broker; lives in one loop."""
 
     def __init__(self, broker: Broker, sights: Sights) -> None:
         self._broker = broker
@@ -124,7 +124,7 @@ class MqttPublisher:
         )
 
     async def _publish(self, client: aiomqtt.Client, lost: asyncio.Task[None]) -> None:
-        """Publish what has changed; raises what ended the connection."""
+        """Publish changed values. Raises the error that ended the connection."""
         sent: dict[str, str] = {}
         loop = asyncio.get_running_loop()
         reported = float("-inf")

@@ -50,7 +50,7 @@ def check_names(broker: Broker, names: list[str]) -> None:
 
 
 def check_drives(lines: Sequence[ServedLine]) -> None:
-    """Raise UsageError where nobody says which drives of a line are read."""
+    """Raise UsageError if no drive of a line is named."""
     from tui.session.connect.line_key import SIMULATED_PREFIX
 
     for line in lines:
@@ -68,7 +68,7 @@ def read_drives(line: ServedLine, simulated: Sequence[int]) -> list[Target]:
 
 
 def warn_of_strangers(host: str, port: int) -> None:
-    """Say what it means that other computers read the metrics."""
+    """Warn if other computers can read the metrics."""
     if not is_loopback(host):
         say(
             "drivepanel: metrics have no password: anyone who can reach"
@@ -79,7 +79,7 @@ def warn_of_strangers(host: str, port: int) -> None:
 
 
 def warn_of_plain_password(broker: Broker) -> None:
-    """Say that a password goes out readable."""
+    """Warn if a password is sent unencrypted."""
     if broker.password is not None and not broker.tls and not is_loopback(broker.host):
         say(
             f"drivepanel: the password goes to {broker.place} unencrypted: mqtts:// is for TLS.",

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Changes:
-    """Notifies one listener that something was read; set once that is there."""
+    """Notifies one listener of new values; set once it exists."""
 
     def __init__(self) -> None:
         self.listener: Callable[[], None] = lambda: None
@@ -75,7 +75,7 @@ async def metrics_at(lines: Sequence[PlantLine], host: str, port: int) -> AsyncI
 async def published_to(
     lines: Sequence[PlantLine], broker: Broker, changes: Changes
 ) -> AsyncIterator[str]:
-    """While inside, a broker is kept told; returns what is reported where, for a person."""
+    """Publish to a broker while inside; yields the place as text."""
     from .mqtt import LAST_WORD_WITHIN, MqttPublisher
 
     warn_of_plain_password(broker)

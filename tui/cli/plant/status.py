@@ -31,7 +31,7 @@ class LineReport:
     """One line with its drives."""
 
     name: str
-    """As it was typed: the name of the settings file where that has one."""
+    """The line as typed: its name in the settings file if it has one."""
     text: str
     state: LineState
     counters: LineCounters

@@ -20,7 +20,7 @@ def may_ask() -> bool:
 async def says_yes(question: str) -> bool:
     """Show a question on standard error, and wait for a line; everything but y is no.
 
-    The loop goes on meanwhile, and may be cancelled.
+    The loop runs on, and may be cancelled.
     """
     _forget_typed()
     say_prompt(f"{question} [y/N]")

@@ -1,4 +1,4 @@
-"""Asking drives on, so that their communication timeout does not run out: --hold and hold."""
+"""Keeps polling drives so that they do not time out: --hold and hold."""
 
 from __future__ import annotations
 
@@ -83,9 +83,9 @@ class Holding:
 async def hold_on(
     opened: OpenLine, sessions: Sequence[DriveSession], seconds: float | None
 ) -> None:
-    """Keep polling drives for so many seconds; nothing is done where none are named.
+    """Keep polling drives for this many seconds; None returns immediately.
 
-    Raises Exit with 128 and the number of the signal that ended it before.
+    Raises Exit with 128 plus the number of a signal that ended it earlier.
     """
     await hold_lines_on([("", opened, sessions)], seconds)
 

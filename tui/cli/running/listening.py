@@ -1,4 +1,4 @@
-"""`listen` at work: what comes of a line that is listened to, and its end."""
+"""`listen` at work: traffic of a monitored line, and its end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..shared.listen_outputs import HeardOutput
 
 
 class HearingRun:
-    """Takes what comes, hands it to an output and a file, and sums it up."""
+    """Passes traffic to an output and a file, and summarizes it."""
 
     def __init__(
         self,

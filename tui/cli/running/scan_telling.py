@@ -50,7 +50,7 @@ class Progress:
     of: int
     found: int
     left: float
-    """Seconds that it still takes where nobody else answers."""
+    """Remaining seconds if no further drive answers."""
     settings_left: int = 0
 
     @property
@@ -65,7 +65,7 @@ class Progress:
 
 
 class ScanTelling:
-    """Reports on one search; a hit goes out at once."""
+    """Reports on one search; a hit is printed immediately."""
 
     def __init__(self, line_text: str, *, as_json: bool) -> None:
         self._line = line_text

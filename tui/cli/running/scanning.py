@@ -33,7 +33,7 @@ NONE_TRIED = "No other setting is tried"
 
 @dataclass(slots=True)
 class Scan:
-    """One run of the command; what it has found stays, however it ends."""
+    """One run of the command; its hits stay, however it ends."""
 
     opened: OpenLine
     line_text: str
@@ -44,7 +44,7 @@ class Scan:
     costs: ScanEstimate | None = None
     """Estimate for other settings; None if none is tried."""
     yes: bool = False
-    """True if other settings are tried although drives that were found may act meanwhile."""
+    """True if other settings are tried although drives found may react in that time."""
     hits: list[Hit] = field(default_factory=list)
     tried: list[LineSetting] = field(default_factory=list)
     held_back: str = ""
@@ -88,7 +88,7 @@ class Scan:
 
         line = self.opened.line
         if self.opened.simulation is not None or isinstance(line.link, TcpLink):
-            return  # nobody else is heard there
+            return  # other masters cannot be heard there
         if line.facts.others:
             return  # what is said there comes from programs of ours
         self.tell.note(f"Listening for {LISTEN:g} s before the first request.")
@@ -194,7 +194,7 @@ class Scan:
             self.unknown.append(result.device)
             self.tell.unclear(self.setting, result)
             if result.identity is not None and fleet.console(result.device) is None:
-                fleet.note(result.identity)  # it is there: its timeout is not to run out
+                fleet.note(result.identity)  # it answers: keep its timeout from running out
             return
         hit = Hit(self.setting, result.identity, result.by)
         self.hits.append(hit)
@@ -225,7 +225,7 @@ class Scan:
         return DriveSession(line, who.device, profile, who) if profile is not None else None
 
     async def _why_no_other(self) -> str:
-        """Why no other setting is tried; empty where one may be. What is found is held on."""
+        """Why no other setting is tried; empty if one may be. Drives found are kept polled."""
         if others := self.opened.line.facts.others:
             return f"{NONE_TRIED}: {others[0].text} uses the line now."
         acting = [text for session in self.sessions if (text := await self._acts(session))]
@@ -254,7 +254,7 @@ class Scan:
         """Have the line at another setting; False where the port has no such one."""
         from tui.session.connect.open_line import reopen
 
-        self.opened.farewells.clear()  # what they do was told where other settings were decided on
+        self.opened.farewells.clear()  # their reactions were reported before
         try:
             await asyncio.to_thread(
                 reopen, self.opened, setting.baud, setting.format, wait=OPEN_WITHIN

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 SHARE_OF_WATCHDOG = 3
-"""A sign of life goes out so many times in the time that systemd allows."""
+"""Heartbeats per time that systemd allows."""
 
 
 class Service:
@@ -38,7 +38,7 @@ class Service:
         self._tell("STOPPING=1\nSTATUS=Ending")
 
     async def watch(self, alive: Callable[[], bool]) -> None:
-        """Give signs of life for as long as `alive` says so; returns at once without a watchdog."""
+        """Send heartbeats while `alive` returns True; return immediately without a watchdog."""
         if self._limit is None:
             return
         while True:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class GatewayWish:
-    """The gateway that is wanted: where it listens, and what its clients may do."""
+    """Options of the gateway: its address, and the rights of its clients."""
 
     host: str
     port: int
@@ -62,7 +62,7 @@ class ServedAt:
 
 
 Ready = Callable[[ServedAt], str]
-"""Says that all is served, and where; gives it in one line for systemd."""
+"""Reports that all is served, with the addresses; returns one line for systemd."""
 
 
 async def served_until_signal(
@@ -184,7 +184,7 @@ def _noting(opened: OpenLine) -> Note:
 
 
 def _warn(wish: GatewayWish, host: str, port: int) -> None:
-    """Say what it means to listen where other computers reach it."""
+    """Warn if other computers can reach the gateway."""
     if is_loopback(host):
         return
     more = ", and do what the options allow" if _allows(wish.rules) else ""

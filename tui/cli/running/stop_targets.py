@@ -1,4 +1,4 @@
-"""Which drive a stop is for: what it may be, what it says it is, and what it is stopped as."""
+"""The drive of a stop: its possible families, its identity, and the profile that stops it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ REMEMBERED_WITHIN = 0.5
 
 @dataclass(frozen=True, slots=True)
 class StoppableDrive:
-    """A drive that can be stopped, and what it is called."""
+    """A drive that can be stopped, with its name."""
 
     session: DriveSession
     name: str
@@ -160,7 +160,7 @@ async def remembered(opened: OpenLine) -> dict[int, StartRecord]:
             with suppress(OSError):
                 found.append(Starts().newest(label(opened.line.link)))
         finally:
-            with suppress(RuntimeError):  # the loop has ended: nobody waits for it
+            with suppress(RuntimeError):  # the loop has ended: no task waits for it
                 loop.call_soon_threadsafe(done.set)
 
     if opened.simulation is not None:
@@ -174,7 +174,7 @@ async def remembered(opened: OpenLine) -> dict[int, StartRecord]:
 async def found_at(
     wish: StopWish, device: int, before: StartRecord | None, patience: Priority
 ) -> StoppableDrive | None:
-    """The drive at an address; None where nobody answers.
+    """The drive at an address; None without an answer.
 
     Damaged answers are requested again with an operator's patience. A drive that shows no family is
     sent the word that stops them all first. Raises what `first_stopped` raises, Failure for answers
@@ -185,7 +185,7 @@ async def found_at(
     from tui.session.connect.identify import identify_drive
 
     line = wish.opened.line
-    # nothing else goes past an owner that is frozen, or to a drive that is left alone
+    # only a stop reaches a frozen owner, or a drive whose polling is paused
     past = line.state.status is LineStatus.LOST or device in line.facts.paused
     try:
         priority = Priority.STOP if past else patience

@@ -64,7 +64,7 @@ class StopTelling:
         self._keep(device, profile, text, status)
 
     def silent(self, devices: list[int], status: int) -> None:
-        """Nobody answered at these addresses; a status other than 0 where somebody was to."""
+        """Report addresses without an answer; a status other than 0 if a drive was expected."""
         if status:
             complain(f"NOT STOPPED: no answer at {', '.join(map(str, devices))}.")
         else:

@@ -1,4 +1,4 @@
-"""Output about a running motor, as lines or as JSON, for a reader that may be slow or gone."""
+"""Output about a running motor, as lines or JSON, for a reader that may be slow or have exited."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ AFTER_RESET = (
 def show_blocks(
     session: DriveSession, line_text: str, views: list[BlockView], *, as_json: bool
 ) -> None:
-    """Print the blocks of a drive, what they bring, and what they spare on the line."""
+    """Print the blocks of a drive, their values, and the time that they save on the line."""
     from ..documents.setting_documents import BlocksDocument, MonitoringTimeField
     from .output import console, drive_fields, print_json
 
@@ -186,7 +186,7 @@ def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...
 
 
 def show_neighbors(session: DriveSession, line_text: str, *, as_json: bool) -> None:
-    """Print that there is no block, and which neighbors are worth reading in one request."""
+    """Report that the family has no block, and which neighbors to read in one request."""
     from tui.drive.blocks.assignment import no_blocks
     from tui.drive.blocks.wire_cost import stretches
     from tui.session.blocks.mapping import wire_timing

@@ -17,7 +17,7 @@ GIVES_BACK = f"drivepanel {GIVE_BACK_OPTION} gives it back, in the panel g on Mo
 
 
 def taking_of(session: DriveSession) -> ControlTaking | None:
-    """Return what can be done about a drive's control, from what was read."""
+    """Return the possible changes of a drive's control, from the values read."""
     from tui.drive.control_taking import control_taking
 
     return control_taking(session.profile, session.image.raws)

@@ -42,10 +42,10 @@ def refuse_unasked(path: Path, *, append: bool, force: bool) -> None:
 
 
 class CsvFile:
-    """Rows in a CSV file, each there as soon as it was written.
+    """Rows in a CSV file, each flushed to the file as it is written.
 
-    Raises Failure where the file exists and is neither to be continued nor replaced, where it has
-    other columns than are to be written, and where it cannot be written.
+    Raises Failure if the file exists without --append or --force, if its columns differ, or if it
+    cannot be written.
     """
 
     def __init__(

@@ -80,7 +80,7 @@ class Status:
 
 
 def shown_codes(profile: Profile) -> list[str]:
-    """Codes of what is SHOWN, as far as the profile has them, and of what was taught."""
+    """Codes of the SHOWN quantities that the profile has, and of learned scales."""
     found = (profile.quantity(quantity) for quantity in SHOWN_QUANTITIES)
     codes = [parameter.code for parameter in found if parameter is not None]
     return [*codes, *(code for code in profile.taught if code not in codes)]
@@ -111,9 +111,9 @@ def fault_text(state: DriveState) -> str:
 
 
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
-    """Read all that `status` shows, and mark what does not come within `STATUS_WITHIN`.
+    """Read all that `status` shows, and mark values that do not arrive within `STATUS_WITHIN`.
 
-    Raises the line's errors if nothing of it comes.
+    Raises the line's errors if no value arrives.
     """
     from tui.bus.errors import ExchangeError
     from tui.drive.channel import switch_texts
@@ -146,7 +146,7 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     finally:
         fleet.forget()
     timeout = timeout_now(session)
-    if is_late and timeout.known:  # the drive told it before, or after all
+    if is_late and timeout.known:  # it was known before, or arrived late
         watch = timeout.watch
     elif is_late:
         unread.append(rules.timeout if rules is not None else "")

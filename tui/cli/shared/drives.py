@@ -82,7 +82,7 @@ async def _each_drive(
 def failed(target: Target, text: str, status: int, line_name: str = "") -> ErrorDocument:
     """Report what is wrong with one of several drives; the same as a document.
 
-    `line_name` is what its line is called where there are several.
+    `line_name` is the name of its line if there are several.
     """
     from ..documents.document import ErrorDocument
 

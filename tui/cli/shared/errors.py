@@ -75,7 +75,7 @@ def plain_errors(*, as_json: bool) -> Iterator[None]:
 
 
 def status_of(error: Exception) -> int | None:
-    """The exit status of a known error, or None for one that nobody foresaw."""
+    """The exit status of a known error; None for an unexpected one."""
     from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
     from tui.drive.errors import (
         DriveError,
@@ -110,7 +110,7 @@ def status_of(error: Exception) -> int | None:
 
 
 def _tell_lost_output(*, acts: bool) -> None:
-    """Say that the output went nowhere; Failure where it is all that the command was for."""
+    """Report a lost output. Raises Failure if the output is the result of the command."""
     from .standard_streams import output_lost
 
     if lost := output_lost():
@@ -121,7 +121,7 @@ def _tell_lost_output(*, acts: bool) -> None:
 
 
 def failure_of(error: Exception) -> Failure:
-    """A known error with its exit status; raises one that nobody foresaw."""
+    """A known error with its exit status. Raises an unexpected error again."""
     if isinstance(error, click.ClickException):
         return Failure(error.format_message(), error.exit_code)
     status = status_of(error)
@@ -137,7 +137,7 @@ def end_with(status: int) -> None:
 
 
 def note_journal(journal: Journal) -> None:
-    """Let the end of this command know of the writes in a journal."""
+    """Include the writes of a journal in the final message of this command."""
     if (context := click.get_current_context(silent=True)) is not None:
         context.meta.setdefault(_JOURNALS, []).append(journal)
 
@@ -153,7 +153,7 @@ def _writes_text() -> str:
 
 
 def _with_writes(error: ClickError) -> ClickError:
-    """The same end, with a status that promises no less than is true if something was written."""
+    """The same end, with status 6 instead of 2 or 5 if something was written."""
     if error.exit_code not in NOTHING_SENT or not (text := _writes_text()):
         return error
     if isinstance(error, click.ClickException):
@@ -169,7 +169,7 @@ def reported(command: Callable[P, R], *, acts: bool = False) -> Callable[P, R]:
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             result = command(*args, **kwargs)
-            sys.stdout.flush()  # here, where a closed pipe can still be told from an error
+            sys.stdout.flush()  # a closed pipe is still distinguishable from an error here
             _tell_lost_output(acts=acts)
             return result
         except click.Abort:
@@ -179,7 +179,7 @@ def reported(command: Callable[P, R], *, acts: bool = False) -> Callable[P, R]:
                 raise truly from error
             raise
         except BrokenPipeError:
-            # the reader of our output is gone: nothing is left to be said to it
+            # the reader of the output has exited, so no message can reach it
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise click.exceptions.Exit(DONE) from None
         except Exception as error:

@@ -68,7 +68,7 @@ class FaultFinding:
 async def find_out(
     console: DriveConsole, state: DriveState, readings: Mapping[str, Reading]
 ) -> FaultFinding | None:
-    """Read what the drive's fault points at, else its first alarm; None where it has neither.
+    """Read the parameters to check for the fault, else for the first alarm; None without either.
 
     Raises the line's errors.
     """
@@ -99,7 +99,7 @@ class _AdviceFields(TypedDict):
 
 
 def fault_field(state: DriveState, found: FaultFinding | None) -> FaultField | None:
-    """The fault that a drive is in, with what it points at; None if it is in no fault."""
+    """The drive's fault with causes and checks; None without a fault."""
     from ..documents.parts import FaultField
 
     fault = state.fault
@@ -115,7 +115,7 @@ def fault_field(state: DriveState, found: FaultFinding | None) -> FaultField | N
 
 
 def alarm_field(found: FaultFinding | None) -> AlarmField | None:
-    """The first alarm of a drive without a fault, with what it points at; None without one."""
+    """The first alarm of a drive without a fault, with causes and checks; None without one."""
     from ..documents.parts import AlarmField
 
     if found is None or not found.alarm:

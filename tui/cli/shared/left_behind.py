@@ -23,7 +23,7 @@ class LeftBehindFields(TypedDict):
 
 
 class LeftBehind(NamedTuple):
-    """A start on record, and what it means now."""
+    """A recorded start, and its meaning now."""
 
     record: StartRecord
     exited: bool

@@ -1,7 +1,7 @@
-"""LINE on the command line: written out, by the name that the settings give it, or left out.
+"""LINE on the command line: written out, a name from the settings file, or omitted.
 
-Where it is left out, the variable DRIVEPANEL_LINE says which is meant. A name brings along the
-address and the profile of its drive; -d and -p go before them.
+If it is omitted, the variable DRIVEPANEL_LINE is used. A name includes the address and the profile
+of its drive; -d and -p override them.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class LineArgument(click.Argument):
         super().__init__(*names, is_eager=True, envvar=LINE_VARIABLE, **attrs)
 
     def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> Any:
-        """The LINE, or what the environment says where it was left out."""
+        """The LINE, or that of the environment if it is omitted."""
         if isinstance(opts, MutableMapping) and self._is_left_out(ctx, opts):
             self._shift(ctx, opts)
         return super().consume_value(ctx, opts)
@@ -79,7 +79,7 @@ class LineArgument(click.Argument):
         )
 
     def _shift(self, ctx: click.Context, opts: MutableMapping[str, Any]) -> None:
-        """Give each word to the argument behind the one that has it."""
+        """Shift each word to the next argument."""
         words: list[str] = [opts.pop(self.name or "")]
         others = self._others(ctx)
         for other in others:
@@ -118,7 +118,7 @@ def _resolved(ctx: click.Context, text: str) -> str:
 def named_line_of(text: str, *, stops: bool = False) -> NamedLine | None:
     """The line of a name, or None for a text that is none. Raises SettingsError as a usage error.
 
-    For a stop what is wrong in the file is said, and gone around where that can be.
+    A stop reports an error in the file, and works around it if possible.
     """
     from tui.session.connect import named_lines
 
@@ -154,7 +154,7 @@ def _profile_here(ctx: click.Context, named: NamedLine) -> str | None:
 
 
 def _usable(named: NamedLine) -> str | None:
-    """Its profile, unless it cannot be used: then the drive itself is asked what stops it."""
+    """Its profile; None if it is broken, so that the drive's identity decides."""
     from tui.drive.errors import DriveError
     from tui.drive.profile import library
 
@@ -197,7 +197,7 @@ share_group_option = click.option(
 def takes_line_as(
     kind: type[LineArgument], metavar: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """LINE, the option that accepts one that is not as it was, and with whom it is shared."""
+    """LINE, with the options to accept a changed line and to share it with a group."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         argument = click.argument(
@@ -230,7 +230,7 @@ def mind_the_line(opened: OpenLine) -> None:
 
 
 def tell_changes(opened: OpenLine, before: tuple[str, ...]) -> None:
-    """Say what is not as it was, but for what was said `before`; a refusal contains it."""
+    """Report changes of the line that are not in `before`; a refusal includes them."""
     ctx = click.get_current_context(silent=True)
     if opened.known is None or (ctx is not None and ctx.params.get("arm")):
         return

@@ -49,7 +49,7 @@ class HeardLines:
         self._taken: dict[int, str] = {}
 
     def exchange(self, reported: ToldExchange, wall: float) -> None:
-        """Print one exchange, and before it what its drive is taken for where that is new."""
+        """Print one exchange, preceded by the assumed profile of its drive if it is new."""
         from tui.session.listening.summary import family_text
         from tui.session.listening.telling import exchange_text
 

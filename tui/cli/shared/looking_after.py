@@ -21,12 +21,12 @@ GUARD_LOOK_INTERVAL = 0.05
 
 
 def guard_motors(opened: OpenLine, name: str = "") -> Callable[[], None]:
-    """From now on stop the motors of a program that is gone, as far as this one owns the line.
+    """Stop the motors of programs that exit, while this one owns the line.
 
-    Says why this program holds the line in place of a keeper, if it does.
+    Reports why this program holds the line instead of a keeper, if it does.
 
-    `name` is what the line is called where a command has several. Returns what waits until those
-    motors are stopped, before the line is closed.
+    `name` is the name of the line if a command has several. Call the returned function before the
+    line is closed: it waits until those motors are stopped.
     """
     # imported now: the package may be replaced by an upgrade before this program holds the line
     from tui.bus.line_events import LineEvent, NoticeReceived
@@ -68,10 +68,10 @@ T = TypeVar("T")
 
 
 async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    """Do the work; in any case, report what drives do when polling stops.
+    """Do the work; in any case, report the reactions of drives when polling stops.
 
-    Raises Exit with 128 and the number of a signal that ended it; one that comes once the work is
-    done ends only what is said of the drives.
+    Raises Exit with 128 plus the number of a signal that ended it. A signal after the work ends
+    only these reports.
     """
     from tui.session.signals import BY_SIGNAL
 
@@ -91,6 +91,6 @@ async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any
             try:
                 await asyncio.gather(*(say_farewells(line) for line in lines))
             except asyncio.CancelledError:
-                # what the work came to, or why it failed, is told all the same
+                # the result of the work, or its error, is reported anyway
                 if not came:
                     raise

@@ -253,15 +253,15 @@ def usual_settings(profile_id: str | None) -> UsualSettings | None:
     try:
         link = library.load(profile_id).data.link
     except DriveError:
-        return None  # told by whoever needs the profile; a stop does without
+        return None  # reported by code that needs the profile; a stop needs none
     return UsualSettings(link.baud, link.format)
 
 
 async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
-    """The wanted drive with its profile: the named one, else that of its identity.
+    """A session with the drive, by the profile of -p, else by that of its identity.
 
-    Raises UsageError with what to type if the drive does not identify itself, Contradiction if it
-    reports another identity than the profile named.
+    Raises UsageError with advice if the drive does not identify itself, Contradiction if its
+    identity contradicts the profile.
     """
     from tui.drive.profile import library
     from tui.session.connect.contradiction import own_words
@@ -290,7 +290,7 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
 
 
 async def _check_byte_order(session: DriveSession) -> None:
-    """See how the words of a drive arrive that is there; what is wrong ends its first read."""
+    """Check the byte order of a drive that answers; a swapped order fails its first read."""
     from tui.bus.api import Priority
     from tui.bus.errors import LineError
     from tui.session.read.order_check import check_byte_order
@@ -302,7 +302,7 @@ async def _check_byte_order(session: DriveSession) -> None:
 
 
 def _believe_the_person(session: DriveSession, target: Target) -> None:
-    """Go by a profile that the drive contradicts, if that was asked for; else raise."""
+    """Use a profile that the drive contradicts if --force-profile is given; else raise."""
     from tui.session.connect.contradiction import Contradiction
 
     reported = session.known_identity.profile
@@ -322,7 +322,7 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
 
 
 def _recall(session: DriveSession) -> None:
-    """Go by what was taught of the drive; that it cannot be read is said and hinders nothing."""
+    """Use the learned scales of the drive; if they cannot be read, report it and continue."""
     from tui.session.teaching.teacher import Teacher
 
     teacher = Teacher(session)

@@ -92,8 +92,8 @@ def drive_fields(line: str, session: DriveSession) -> DriveFields:
 def value_field(reading: Reading) -> ValueField:
     """One value; `raw` and `value` are null where there is none.
 
-    The value of a name or a bit word is its raw number. `unsure` is there where no document says
-    what so high a raw value means.
+    The value of a name or a bit word is its raw number. `unsure` is set if no document explains
+    so high a raw value.
     """
     from msgspec import UNSET
 
@@ -202,7 +202,7 @@ def readings_table(
 
 
 def _fitting(widths: Sequence[int], width: int) -> list[int]:
-    """The columns that fit beside a name that can be read; notations go first."""
+    """Columns that fit next to a readable name; notations are omitted first."""
     shown = list(range(len(widths)))
     for column in LEFT_OUT:
         name = min(widths[NAME_COLUMN], READABLE_NAME)
@@ -230,7 +230,7 @@ def _cells(reading: Reading) -> tuple[str, ...]:
 
 
 def _remark(reading: Reading) -> str:
-    """Return the remark beside a value: its rating's unit, or what is wrong."""
+    """The remark on a value: the unit of its rating, or why it is not good."""
     if reading.raw is None:
         return "no value"
     if reading.quality != "good":

@@ -28,12 +28,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class PolledDrive:
-    """A drive that a command asks, and what it does afterwards."""
+    """A drive that a command polls, and its reaction when polling stops."""
 
     session: DriveSession
     line_text: str
     goes_on: bool
-    """True if the drive is there afterwards: a simulated one ends with its line."""
+    """False for a simulated drive, which ends with its line."""
 
     async def learn(self) -> None:
         """Read the drive's timeout, unless it is known; no answer fails nothing."""
@@ -58,7 +58,7 @@ class PolledDrive:
             session.timeout = await asyncio.wait_for(reading, within)
 
     async def tell(self) -> None:
-        """Say on standard error that its timeout runs, and what follows."""
+        """Report on standard error a timeout that runs, and the reaction."""
         from tui.session.monitor.timeout import timeout_now
 
         session = self.session
@@ -121,14 +121,14 @@ def timeout_field(found: Timeout) -> TimeoutField | None:
 
 
 def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> PolledDrive:
-    """Have it told at the end what a drive does then."""
+    """Report the drive's reaction to the end of polling when the command ends."""
     found = PolledDrive(session, line_text, goes_on=opened.simulation is None)
     opened.farewells[session.device] = found
     return found
 
 
 async def say_farewells(opened: OpenLine) -> None:
-    """Say what each drive does that was asked, the line being open yet."""
+    """Report the reaction of each polled drive, while the line is open."""
     for device, farewell in list(opened.farewells.items()):
         if device in opened.line.pace.others:
             log.info("device %s is polled by another program on the line", device)

@@ -13,18 +13,18 @@ from tui.drive.plain import plain
 
 
 def say(text: str = "", *, err: bool = False, indent: int = 0, to_copy: bool = False) -> None:
-    """Print lines on standard output, or on standard error; on a terminal broken at words.
+    """Print lines on standard output or standard error, wrapped at words on a terminal.
 
-    What does not fit goes on `indent` characters from the left. What is `to_copy` is not broken.
+    Continuation lines are indented by `indent` characters. Text `to_copy` is not wrapped.
     """
     click.echo(_laid_out(text, err=err, indent=indent, to_copy=to_copy), err=err)
 
 
 def say_beside(text: str, *, err: bool = False, as_it_is: bool = False) -> None:
-    """Print lines from a thread beside the main one; what nobody takes is lost.
+    """Print lines from a second thread; output that no reader accepts is lost.
 
-    Past Python's own buffers: a thread that waits there for its reader holds their lock, and the
-    program that ends meanwhile is aborted. Text that `as_it_is` goes out is for machines.
+    Bypasses Python's buffers: a thread that waits there holds their lock, and Python aborts a
+    program that ends in that time. Text `as_it_is` is for other programs.
     """
     stream = sys.stderr if err else sys.stdout
     reported = text if as_it_is else _laid_out(text, err=err)
@@ -66,9 +66,9 @@ def _broken(line: str, width: int, indent: int) -> str:
 
 
 def say_over(text: str, *, last: bool, before: int = 0) -> None:
-    """Print one line on standard error in place of the one before; the last one stays.
+    """Replace the last line on standard error; the `last` one stays.
 
-    `before` is how long that was, where it may be longer.
+    `before` is the length of the replaced line in characters.
     """
     click.echo(f"\r{printable(text, sys.stderr.encoding):<{before}}", err=True, nl=last)
 

@@ -144,9 +144,9 @@ async def take_set(session: DriveSession, *, settings_only: bool = False) -> Par
 
 
 async def read_out(upload: Upload) -> None:
-    """Read what is left of an upload; a line that is lost for a moment does not end it.
+    """Read the rest of an upload; a lost line is awaited for `OUTAGE` seconds.
 
-    Raises the line's errors where it does not come back.
+    Raises the line's errors if it does not return.
     """
     from tui.bus.api import LineStatus
     from tui.bus.errors import LineLost
@@ -164,7 +164,7 @@ async def read_out(upload: Upload) -> None:
 
 
 def counter(what: str) -> Callable[[int, int], None] | None:
-    """Shows progress in one line of a terminal; None where nobody would see it."""
+    """Shows progress in one line of a terminal; None without a terminal."""
     if not sys.stderr.isatty():
         return None
 
@@ -208,7 +208,7 @@ class ResultTelling:
             self.messages.complain(f"The same of {len(more)} more: {', '.join(more)}.")
 
     def interrupted(self) -> Failure:
-        """The end by Ctrl-C, with what was written and what is not known."""
+        """The failure after Ctrl-C, with the written settings and the unknown ones."""
         written = [code for code, result in self.results.items() if result.done]
         if not self.results:
             text = "Ended by Ctrl-C. The first setting may have been written: read it."
@@ -265,7 +265,7 @@ def status_of_results(results: Iterable[Result]) -> int:
         EditOutcome.NOT_SENT: LINE_TROUBLE,
     }
     statuses = {
-        # a stop is no trouble on the line: what was meant is not to be tried again by itself
+        # a stop is not a line error: a script must not repeat the write automatically
         REFUSED_HERE if r.voided else table[r.outcome]
         for r in results
         if r.outcome in table

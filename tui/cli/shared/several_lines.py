@@ -194,7 +194,7 @@ def _line_of(wish: LineWish, *, read_only: bool) -> Iterator[OpenLine]:
 
 
 async def connected(opened: OpenLine, name: str) -> None:
-    """Wait until a line is there. Raises LineLost with why it is not, after a while."""
+    """Wait until a line is connected. Raises LineLost with the reason after CONNECT_WITHIN."""
     from tui.bus.api import LineStatus
     from tui.bus.errors import LineLost
 

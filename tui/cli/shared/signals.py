@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 CLEANED_UP = 3.0
-"""Seconds that the screen has to close; a terminal that is gone may keep it from that."""
+"""Seconds that the screen has to close; a closed terminal may prevent it."""
 A_MOMENT = 0.2
 """Seconds that a thread has to end, and until the screen is closed again: it may open late."""
 SUSPENDED = (

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 STATE_COMES_WITHIN = 0.4
-"""Seconds in which the keeper of a line has sent what it knows of a drive."""
+"""Seconds in which the keeper of a line has sent the state of a drive."""
 ANSWERS_LATE = (
     "It answers, but after its timeout. Add ,timeout=SECONDS to LINE, for example ,timeout=2; the"
     " longest is 30 s."
@@ -21,7 +21,7 @@ ANSWERS_LATE = (
 
 
 def wait_for_state(line: ModbusLine) -> None:
-    """Give the keeper of a line the time to send what it has seen."""
+    """Wait until the keeper of a line has sent its state."""
     if line.facts.voice is not None:
         time.sleep(STATE_COMES_WITHIN)
 

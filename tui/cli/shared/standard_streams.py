@@ -1,7 +1,7 @@
 """Standard output and error that never end what a command does: closed ones, and full disks.
 
-What is printed last of a stop must not make the stop look failed. That nobody gets the output is
-kept, and told at the command's end.
+An error in the last output of a stop must not make the stop look failed. Lost output is recorded,
+and reported at the end of the command.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, TextIO
 class ForgivingFile(io.FileIO):
     """A stream's file that takes what the disk does not, and keeps why.
 
-    With `pipes` a reader that went away is still told, by BrokenPipeError.
+    With `pipes` a reader that has exited still raises BrokenPipeError.
     """
 
     def __init__(self, number: int, *, pipes: bool) -> None:

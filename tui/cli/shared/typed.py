@@ -1,4 +1,4 @@
-"""When the command was typed: a stop that was given since is the last word about its drive."""
+"""Time at which a command was typed: a later stop overrides it."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 ONE_COMMAND = object()
-"""The `obj` of a context whose process is there for this command alone."""
+"""The `obj` of a context whose process runs this command only."""
 _TYPED = "drivepanel.typed"
 
 
 def note_typed(context: click.Context) -> None:
-    """A command was typed just now; with its process where that has no other task."""
+    """Record that a command was typed now."""
     context.meta[_TYPED] = time.monotonic()
 
 
 def typed_at(context: click.Context) -> float | None:
-    """When a command was typed (monotonic); None where that is not known."""
+    """Time at which a command was typed (monotonic); None if it is not known."""
     if context.obj is ONE_COMMAND:
         return process_began()
     found: float | None = context.meta.get(_TYPED)
@@ -32,9 +32,9 @@ def typed_at(context: click.Context) -> float | None:
 
 
 def process_began() -> float:
-    """When this process was begun (monotonic); now where that is not told.
+    """Start of this process (monotonic); the current time if it is not known.
 
-    A program that a busy machine loads for seconds was typed before all that.
+    A busy computer may load the program for seconds after it was typed.
     """
     from tui.session.starts.processes import Processes
 
@@ -49,9 +49,9 @@ def process_began() -> float:
 
 
 def refuse_if_stopped(session: DriveSession) -> None:
-    """Raise Failure where the drive was stopped after this command was typed.
+    """Raise Failure if the drive was stopped after this command was typed.
 
-    Such a stop came before the command was on the line, and could void nothing of it.
+    Such a stop could cancel nothing, because the command had not reached the line yet.
     """
     context, device = click.get_current_context(silent=True), session.device
     stops = session.line.facts.stops

@@ -40,7 +40,7 @@ class WatchedDrive:
     """All that is reported about it."""
     line_text: str
     line_name: str
-    """The line as it was typed: the name of the settings file where that has one."""
+    """The line as typed: its name in the settings file if it has one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ class TableOutput:
         self._latest: dict[WatchedDrive, Snapshot | None] = dict.fromkeys(watched)
 
     def take(self, watched_drive: WatchedDrive, snapshot: Snapshot) -> None:
-        """Show one cycle in place of the one before."""
+        """Replace the shown cycle of this drive."""
         from rich.console import Group
 
         from tui.session.reading import with_text
