@@ -132,7 +132,7 @@ async def test_write_is_read_back(end: Open) -> None:
 
 async def test_an_exception_is_reported_with_its_code_and_meaning(end: Open) -> None:
     made = end()
-    with pytest.raises(DeviceException, match="an address is not known") as read:
+    with pytest.raises(DeviceException, match="the device has no such address") as read:
         await made.line.read(THERE, 108, 4)
     with pytest.raises(DeviceException) as write:
         await made.line.write(THERE, 300, [1])
@@ -177,7 +177,7 @@ async def test_a_device_is_sent_what_describe_allows(end: Open) -> None:
     made.line.describe(THERE, CAUTIOUS)
     with pytest.raises(RequestRefused, match="function 6"):
         await made.line.write(THERE, 100, [5])
-    with pytest.raises(RequestRefused, match="takes 1"):
+    with pytest.raises(RequestRefused, match="accepts 1"):
         await made.line.read(THERE, 100, 2)
     only_16 = Limits(frozenset({3, 16}), max_read=9, max_write=9, max_read_23=0, max_write_23=0)
     made.line.describe(THERE, only_16)

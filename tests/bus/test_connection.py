@@ -124,7 +124,7 @@ def test_open_with_wait_raises_what_is_wrong(tmp_path: Path) -> None:
     with TcpPeer(honest) as peer:
         port = peer.port
     line = Line(TcpLink("127.0.0.1", port))
-    with pytest.raises(LineLost, match="nothing listens there"):
+    with pytest.raises(LineLost, match="no program listens on that port"):
         line.open(wait=0.3)
 
 

@@ -25,7 +25,7 @@ async def test_only_a_stop_asks_a_device_that_is_left_alone(open_line: OpenLine)
         assert not peer.requests
         assert (await line.read(1, 5, priority=Priority.STOP)).words == (5,)
         assert (await line.read(2, 6)).words == (6,)
-        line.facts.unhush(1)
+        line.facts.resume_polling(1)
         assert (await asyncio.wait_for(line.read(1, 7), 10.0)).words == (7,)
 
 

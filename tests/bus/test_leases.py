@@ -95,7 +95,7 @@ async def test_it_ends_with_its_time_unless_it_is_renewed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         _, program = pair(share, peer)
         program.facts.leases.arm(1, -LEASE_RENEWED_EVERY - 0.01, CARE)
-        assert await refusal(program) == "Not sent: drive 1 is not armed any more."
+        assert await refusal(program) == "Not sent: drive 1 is not armed now."
         program.facts.leases.stay_armed(1, 60.0)
         await program.write(1, 1, [RUN])
         program.facts.leases.arm(1, None, CARE)

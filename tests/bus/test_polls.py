@@ -268,7 +268,7 @@ async def test_a_plan_beyond_the_limits_of_its_device_is_refused(share: Share) -
         subscriber = Subscriber(watch, wanted)
         eventually(lambda: subscriber.error is not None)
         assert isinstance(subscriber.error, RequestRefused)
-        assert str(subscriber.error) == "2 words cannot be read at once; the device takes 1."
+        assert str(subscriber.error) == "2 words cannot be read at once; the device accepts 1."
         assert not peer.requests
 
 

@@ -300,7 +300,7 @@ async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Shar
             connection.sendall(hello() + ask(kind="WriteOne", fields=write, requested=old))
             reported = await asyncio.to_thread(answer_of_kind, connection, Failed)
             assert reported.form.kind == "RequestRefused"
-            assert "stood still for 5 s" in reported.form.text
+            assert "was suspended for 5 s" in reported.form.text
             # a stop is never too late
             stop = ask(number=2, kind="WriteOne", fields=write, requested=old, priority=0)
             connection.sendall(stop)

@@ -306,7 +306,7 @@ async def test_a_command_that_waited_for_a_frozen_owner_is_too_old_to_be_sent(
             reading = asyncio.create_task(other.read(1, 7))
             await asyncio.sleep(2.3)
         for run in runs:
-            assert "stood still for" in await refused(run)
+            assert "was suspended for" in await refused(run)
         assert (await reading).words == (7,)
         assert written(peer) == []
 

@@ -128,7 +128,7 @@ def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
     runner.process.send_signal(signal.SIGCONT)
     output, _ = runner.process.communicate(timeout=PATIENCE)
     # it hears of the stop on its return, or how many there were if it was taken for gone
-    by = ("drivepanel stop, stop", "a stop while this program stood still")
+    by = ("drivepanel stop, stop", "a stop while this program was suspended")
     assert any(f"was stopped by {text}" in output for text in by)
     assert runner.process.returncode == 6
     assert stopped_by_commands(simulation)
@@ -163,7 +163,7 @@ def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
         output, _ = runner.process.communicate(timeout=PATIENCE)
         assert runner.process.returncode == 6
         by = {"keeper": "keeper", "inside": "watch"}[holder]
-        assert f"It was stopped by a stop while this program stood still, {by} (pid" in output
+        assert f"It was stopped by a stop while this program was suspended, {by} (pid" in output
         assert simulation.drive(1).raw("CMD") == before
         assert recorder.process.stdout is not None
         for _ in range(3):

@@ -42,7 +42,7 @@ class PortMissing(LineError):
     def __init__(self, path: str, ports: Sequence[str] = ()) -> None:
         self.path = path
         self.ports = tuple(ports)
-        there = f"Ports here: {', '.join(ports)}." if ports else "No serial port is here."
+        there = f"Ports found: {', '.join(ports)}." if ports else "No serial port was found."
         super().__init__(f"{path} does not exist. {there} Check the adapter and the name.")
 
 

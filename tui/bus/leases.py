@@ -132,7 +132,7 @@ class WriteLeases:
         if lease.stamp != self._stops.stamp(device):
             return f"Not sent: drive {device} was stopped after it was armed."
         if lease.until is not None and time.monotonic() > lease.until:
-            return f"Not sent: drive {device} is not armed any more."
+            return f"Not sent: drive {device} is not armed now."
         if not lease.care:
             return f"Not sent: the holder of the line does not know how to stop drive {device}."
         return ""

@@ -22,15 +22,15 @@ from .requests import (
 )
 
 STANDARD_EXCEPTIONS: Mapping[int, str] = {
-    1: "the function is not known to the device",
-    2: "an address is not known to the device, or not allowed now",
+    1: "the device does not support the function",
+    2: "the device has no such address, or does not allow it now",
     3: "a value or a length is not allowed",
-    4: "the device could not do it in its present state",
-    5: "the device needs longer",
+    4: "the device cannot do it in its present state",
+    5: "the device needs more time",
     6: "the device is busy",
     7: "the device refuses",
     8: "a memory fault of the device",
-    10: "the gateway has no way to the device",
+    10: "the gateway has no path to the device",
     11: "the device behind the gateway did not answer",
 }
 
@@ -113,7 +113,7 @@ def send_refusal(
         if request.function not in limits.broadcast_functions:
             return f"Function {request.function} cannot be broadcast to these devices."
     elif request.function not in limits.functions:
-        return f"Device {request.device} does not know function {request.function}."
+        return f"Device {request.device} does not support function {request.function}."
     return _too_long(request, limits)
 
 
@@ -142,9 +142,9 @@ def _bad_span(address: int, count: int, most: int) -> str:
     if not 0 <= address <= 0xFFFF:
         return f"Register {address} does not exist; registers are 0 to 65535."
     if not 1 <= count <= most:
-        return f"{count} words cannot be asked for; a request holds 1 to {most}."
+        return f"{count} words cannot be requested; a request has 1 to {most}."
     if address + count > 0x10000:
-        return f"{count} words from register {address} on go past register 65535."
+        return f"{count} words from register {address} on end after register 65535."
     return ""
 
 
@@ -190,8 +190,8 @@ def _bad_block(
             return ""
         return (
             f"{count} words from register {address} on cannot be {verb} at once: the device "
-            "takes single words and its own blocks."
+            "accepts single words and its own blocks."
         )
     if count > most:
-        return f"{count} words cannot be {verb} at once; the device takes {most}."
+        return f"{count} words cannot be {verb} at once; the device accepts {most}."
     return ""

@@ -146,7 +146,7 @@ class SharedState:
         self.note_pause(device, self.me.id, why)
         self._tell(PollPause(device, why[:MOST_NOTICE]))
 
-    def unhush(self, device: int) -> None:
+    def resume_polling(self, device: int) -> None:
         """Resume the requests to a device."""
         self.note_pause(device, self.me.id, "")
         self._tell(PollPause(device, ""))

@@ -133,7 +133,7 @@ def _check_span(address: int, count: int, most: int) -> None:
     if not 1 <= count <= most:
         raise Unanswerable(ILLEGAL_VALUE, f"{count} words")
     if address + count > 0x10000:
-        raise Unanswerable(ILLEGAL_ADDRESS, "past register 65535")
+        raise Unanswerable(ILLEGAL_ADDRESS, "beyond register 65535")
 
 
 # Answers

@@ -136,7 +136,7 @@ class TcpGateway:
         try:
             await self._converse(talk, reader)
         except (OSError, EOFError, TimeoutError) as error:
-            log.info("Modbus TCP client %s has gone: %s", client.peer, error or "idle")
+            log.info("Modbus TCP client %s has disconnected: %s", client.peer, error or "idle")
         except asyncio.CancelledError:
             # closing the gateway is no error of this connection
             return

@@ -61,9 +61,9 @@ async def connect_tcp(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
     except TimeoutError:
         reason = "it does not answer. Check the address and the network."
     except ConnectionRefusedError:
-        reason = "nothing listens there. Check the port, and that the device is on."
+        reason = "no program listens on that port. Check the port, and that the device is on."
     except socket.gaierror:
-        reason = "the host is not known. Check its name."
+        reason = "the host name is unknown. Check its spelling."
     except (OSError, UnicodeError) as error:
         reason = f"{getattr(error, 'strerror', None) or error}."
     raise LineLost(f"{label(link)} cannot be reached: {reason}")

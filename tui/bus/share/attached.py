@@ -70,7 +70,7 @@ class Client:
         if transport.is_closing():
             return
         if self.unread > MOST_UNREAD:
-            log.warning("%s reads nothing any more and is let go", self.program.text)
+            log.warning("%s no longer reads and is disconnected", self.program.text)
             transport.abort()
             return
         self.writer.write(packed(message))
@@ -184,4 +184,4 @@ class Client:
 
 def was_suspended(seconds: float) -> str:
     """Why a command is not sent, for a person."""
-    return f"Not sent: the program that owns the line stood still for {seconds:.0f} s."
+    return f"Not sent: the program that owns the line was suspended for {seconds:.0f} s."

@@ -69,7 +69,7 @@ def send_plain_stop(address: Path, devices: Iterable[int]) -> None:
     with reached(address, GIVEN_WITHIN) as connection:
         connection.sendall(b"%s %s\n" % (STOP_HEAD, " ".join(map(str, devices)).encode()))
         if connection.recv(len(GIVEN)) != GIVEN:
-            raise OSError(f"{address} does not take a stop")
+            raise OSError(f"{address} did not accept the stop")
 
 
 def stop_devices(line: bytes, known: Collection[int]) -> tuple[int, ...]:
@@ -177,5 +177,5 @@ def line_past(owner: Owner) -> tuple[tuple[Frame, ...], tuple[LineNote, ...]]:
                 received = True
                 connection.settimeout(max(0.01, end - monotonic()))
     if not received:
-        raise OSError("it is of an older version, which keeps no past")
+        raise OSError("it has an older version, which keeps no frames")
     return tuple(frames), tuple(notes)

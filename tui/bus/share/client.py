@@ -57,8 +57,8 @@ log = logging.getLogger(__name__)
 
 LEAVE_WITHIN = 1.0
 """Seconds that a program which leaves waits for the port to be closed."""
-STOP_UNHEARD = ("a stop while the line had no owner", "a stop while this program stood still")
-STOOD_STILL = "This program stood still and was taken for gone: it commands nothing any more."
+STOP_UNHEARD = ("a stop while the line had no owner", "a stop while this program was suspended")
+STOOD_STILL = "This program was suspended and counted as exited: it no longer commands any drive."
 
 
 class NewsHeard:

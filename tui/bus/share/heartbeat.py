@@ -106,7 +106,7 @@ class HeartbeatSender:
         now = self._inside.clock()
         for client in self._clients():
             if client.is_silent(now, LOOKS_IN_VAIN):
-                log.warning("%s gives no sign of life and is let go", client.program.text)
+                log.warning("%s sends no heartbeat and is disconnected", client.program.text)
                 client.drop()
 
     async def _hear_stops(self) -> None:

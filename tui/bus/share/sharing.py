@@ -191,7 +191,7 @@ class Sharing:
         finally:
             self._client = None
             self._attached = self._attached or client.taken_in
-        log.info("%s does not own the line any more", owner.program.text)
+        log.info("%s no longer owns the line", owner.program.text)
         self._keeper_lives()  # collects its exit status, if this program has started it
         self._keeper_lives, self._starts_until = bool, 0.0
 

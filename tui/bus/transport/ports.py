@@ -159,7 +159,7 @@ def open_serial(path: str, baud: int, format: str, *, alone: bool = True) -> ser
     port = _open(path, baud, format, alone=alone)
     if not _has_parity(port):
         port.close()
-        raise PortRefused(path, f"it does not take parity {format[1]}.")
+        raise PortRefused(path, f"it does not support parity {format[1]}.")
     return port
 
 
@@ -217,7 +217,7 @@ def port_error(
     if _is_no_port(path):
         return PortRefused(path, "it is not a serial port. `drivepanel ports` lists those.")
     if number is None or number == errno.EINVAL:
-        return PortRefused(path, f"it does not take {baud} baud {format_}.")
+        return PortRefused(path, f"it does not support {baud} baud {format_}.")
     return PortRefused(path, f"{os.strerror(number)}.")
 
 

@@ -38,9 +38,9 @@ class ListeningPort:
             return b""
         except OSError as error:
             reason = error.strerror or str(error)
-            raise LineLost(f"{self.path} went away ({reason}).") from error
+            raise LineLost(f"{self.path} disappeared ({reason}).") from error
         if not data:
-            raise LineLost(f"{self.path} went away.")
+            raise LineLost(f"{self.path} disappeared.")
         return data
 
     def close(self) -> None:
@@ -89,7 +89,7 @@ def _set_up(descriptor: int, path: str, baud: int, format_: str) -> None:
 
     speed = getattr(termios, f"B{baud}", None)
     if speed is None:
-        raise PortRefused(path, f"it does not take {baud} baud.")
+        raise PortRefused(path, f"it does not support {baud} baud.")
     parity = "N" if is_pseudo_terminal(path) else format_[1]
     control = termios.CREAD | termios.CLOCAL | termios.CS8
     if parity != "N":
@@ -101,7 +101,7 @@ def _set_up(descriptor: int, path: str, baud: int, format_: str) -> None:
     settings = [termios.IGNBRK, 0, control, 0, speed, speed, characters]
     termios.tcsetattr(descriptor, termios.TCSANOW, settings)
     if parity != "N" and not termios.tcgetattr(descriptor)[2] & termios.PARENB:
-        raise PortRefused(path, f"it does not take parity {parity}.")
+        raise PortRefused(path, f"it does not support parity {parity}.")
     if sys.platform.startswith("linux"):
         _hand_over_at_once(descriptor)
 

@@ -72,13 +72,13 @@ class PosixSerial:
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
-            self._end(f"the port went away ({error.strerror or error})")
+            self._end(f"the port disappeared ({error.strerror or error})")
             return
         now = time.monotonic()
         if data:
             self._receiver.received(data, now)
         else:
-            self._end("the port went away")
+            self._end("the port disappeared")
 
     def _end(self, reason: str) -> None:
         receiver = self._receiver
@@ -113,7 +113,7 @@ class PosixSerial:
             async with asyncio.timeout(SEND_TIMEOUT):
                 await ready
         except TimeoutError:
-            raise OSError("the port takes no bytes") from None
+            raise OSError("the port accepts no bytes") from None
         finally:
             if self._fd is not None:
                 loop.remove_writer(self._fd)

@@ -46,7 +46,7 @@ class ThreadedSerial:
                 except (OSError, TypeError) as error:
                     # pyserial raises TypeError when the port is closed under a read
                     if not self._closing.is_set():
-                        reason = f"the port went away ({error})"
+                        reason = f"the port disappeared ({error})"
                         loop.call_soon_threadsafe(receiver.lost, reason)
                     return
                 if data:

@@ -37,7 +37,7 @@ def accept_change(sight: DiagnosticEvidence) -> Iterator[str]:
 def plug_in(sight: DiagnosticEvidence) -> Iterator[str]:
     """A port that is not there."""
     ports = sight.trouble.ports if isinstance(sight.trouble, PortMissing) else ()
-    yield f"Ports here: {', '.join(ports)}." if ports else "No serial port is here."
+    yield f"Ports found: {', '.join(ports)}." if ports else "No serial port was found."
     if sight.adapter.was:
         yield f"It was {sight.adapter.was}: that one is not plugged in."
     yield "Plug the adapter in; dmesg shows if the system has detected it."

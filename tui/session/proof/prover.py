@@ -105,7 +105,7 @@ class Prover:
             await self._check_same(rules, readings)
             return result
         finally:
-            facts.unhush(session.device)
+            facts.resume_polling(session.device)
             session.request_full_read()
 
     async def _settings(self, rules: CommunicationFault) -> dict[str, Reading]:
