@@ -1,1 +1,1 @@
-"""Reading: plans put into requests, read once more where a reply was lost, whole uploads."""
+"""Reading parameters: planned requests, retries after a lost reply, uploads of a whole drive."""

@@ -1,4 +1,4 @@
-"""Reading words of which a drive may lack some, where a missing one meets silence."""
+"""Reading words that a drive may lack, for families that do not answer a missing word."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ NO_SUCH_WORD = "no answer, while the drive answers otherwise: perhaps it has no 
 
 
 async def read_apart(reader: Reader, codes: Iterable[str]) -> dict[str, Reading]:
-    """Readings by code, as a person asked for them; those that meet silence are bad ones.
+    """Read parameters that a person chose; one without an answer gets a bad reading.
 
-    They are asked for together, and one by one where that brings no answer but the drive is there.
-    Raises the line's errors, NoAnswer where the drive answers nothing.
+    Reads them together, or one at a time if that gets no answer but the drive is present.
+    Raises the line's errors, and NoAnswer if the drive answers nothing at all.
     """
     wanted = list(dict.fromkeys(codes))
     try:

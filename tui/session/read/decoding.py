@@ -1,4 +1,4 @@
-"""Raw values as a person reads them: value, unit, and the base of a percentage."""
+"""Decoding of raw values: value, unit, and the rating that a percentage refers to."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..shown import Rating
 
 @dataclass(slots=True)
 class Decoding:
-    """Decodes raw values by what is known of a drive at one moment."""
+    """Decodes raw values with the scales and ratings known at its creation."""
 
     session: DriveSession
     _raws: Mapping[str, int] = field(init=False)
@@ -28,7 +28,7 @@ class Decoding:
         self._lacking = self.session.image.lacking
 
     def decode(self, reading: Reading) -> Reading:
-        """A reading with its value, as a person reads it."""
+        """Return the reading with its value and unit; unchanged if it has no raw value."""
         if reading.raw is None:
             return reading
         value = self._value(reading.parameter, reading.raw)
@@ -38,7 +38,10 @@ class Decoding:
         return shown(self.session.profile, parameter, raw, self._raws, self._lacking)
 
     def _physical(self, parameter: Parameter, value: Value) -> Value | None:
-        """A percentage in the unit of its rating: the person's, else the drive's own."""
+        """Convert a percentage to the unit of its rating.
+
+        A rating that a person entered takes precedence over the drive's own.
+        """
         if parameter.unit != "%" or value.number is None:
             return None
         rating = self.session.ratings.get(parameter.code)
@@ -53,5 +56,5 @@ class Decoding:
 
 
 def sources_of(parameter: Parameter) -> list[str]:
-    """Parameters without which this one's value, or the rating that it is a part of, is unknown."""
+    """Return the codes of the parameters that set this one's scale, unit or rating."""
     return [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]

@@ -1,4 +1,4 @@
-"""Read plans of one drive, made again when their costs have changed."""
+"""Cached read plans of one drive, replaced when its turnaround changes."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from ..drive import DriveSession
 
 TURNAROUND_STEP = 0.001
 PLANS_KEPT = 64
-"""Read plans that are remembered; sets of codes and turnarounds change without end."""
+"""Most plans in the cache: sets of codes and turnarounds keep changing."""
 
 
 class KeptPlans:
-    """Plans by the codes, the slots, what the drive refuses and how fast it answers."""
+    """Read plans by codes, slots, refused codes and the drive's turnaround."""
 
     def __init__(self, session: DriveSession) -> None:
         self._session = session
         self._kept: dict[tuple[Hashable, ...], ReadPlan] = {}
         self._turnaround = 0.0
-        """Seconds that plans count with, while the measured turnaround is about that."""
+        """Turnaround in seconds that the plans assume; follows the measured one in steps."""
 
     def __len__(self) -> int:
         return len(self._kept)
 
     def clear(self) -> None:
-        """Make all of them again."""
+        """Discard all plans."""
         self._kept.clear()
 
     def plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:
-        """The plan for reading these codes, with the slots of blocks that may be used."""
+        """Return the plan for reading these codes; it may use the given slots of blocks."""
         refused, turnaround = frozenset(self._session.image.refused), self._measured()
         key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
         if key not in self._kept:
@@ -43,7 +43,7 @@ class KeptPlans:
         return self._kept[key]
 
     def _measured(self) -> float:
-        """The drive's measured turnaround in steps, so that plans do not change for nothing."""
+        """The measured turnaround in steps, so that small changes do not discard plans."""
         measured = self._session.line.device_state(self._session.device).usual_turnaround
         if measured is None:
             return USUAL_TURNAROUND
@@ -59,12 +59,12 @@ class KeptPlans:
 
 
 def planned_read(request: ReadRequest) -> PlannedRead:
-    """A request as the process that holds the line repeats it."""
+    """Convert a request for the keeper, which repeats it."""
     return PlannedRead(request.address, request.count, 4 if request.function == 4 else 3)
 
 
 def planned_reads(*plans: ReadPlan) -> tuple[PlannedRead, ...]:
-    """The requests of read plans in the order in which they are sent."""
+    """Return the requests of read plans in the order in which they are sent, without repeats."""
     found: list[ReadRequest] = []
     for plan in plans:
         found += [*plan.requests, *(check.request for check in plan.checks)]

@@ -1,4 +1,4 @@
-"""Reading the settings that show in which order the bytes of a drive's words arrive."""
+"""Reading the settings that reveal the byte order of a drive's words."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from .presence import look_for_drive, meets_silence
 from .reader import Reader
 
 CHECK_WITHIN = 3.0
-"""Seconds that the settings may take: five reads of a slow line."""
+"""Longest time of the check in seconds: five reads on a slow line."""
 
 
 async def check_byte_order(reader: Reader, priority: Priority) -> None:
-    """Read them once, and again while not all values agree, or after the line was lost.
+    """Read these settings if the byte order is not certain yet, or after the line was lost.
 
-    Raises BytesSwapped, and the line's errors. A drive that meets unknown words with silence may
-    lack these: then nothing is known, and they are not read again. What takes longer than
-    CHECK_WITHIN is left for the next time.
+    Raises BytesSwapped, and the line's errors. If the drive does not answer them although it is
+    present, it may lack these words; the byte order then stays unknown. After CHECK_WITHIN the
+    check stops, and the next call repeats it.
     """
     session = reader.session
     order = session.byte_order

@@ -1,5 +1,7 @@
-"""The read that each drive of a family answers: it shows that the drive is there, and keeps it
-from its communication timeout."""
+"""The read that every drive of a family answers.
+
+It shows that the drive is present, and keeps its communication timeout from expiring.
+"""
 
 from __future__ import annotations
 
@@ -30,10 +32,10 @@ class PresenceRead:
 
 
 def presence_read(profile: Profile) -> PresenceRead | None:
-    """The request that is answered by whichever drive of the family; None where none is known.
+    """Return the read that every drive of the family answers; None if none is known.
 
-    For a drive that ignores words it lacks, two neighbors of the monitoring set: their reply is
-    longer than one that may yet come for such a word, and is not mistaken for it.
+    If the family does not answer reads of missing words, it covers two words of the monitoring
+    set. A late reply to a one-word read has another length, so it cannot be taken for this reply.
     """
     pair = _neighbors(profile) if meets_silence(profile) else None
     if pair is not None:
@@ -44,7 +46,7 @@ def presence_read(profile: Profile) -> PresenceRead | None:
 
 
 def alive_read(session: DriveSession, timeout: float) -> KeepAlive | None:
-    """The read that keeps a drive from a timeout of so many seconds; None if none is known."""
+    """Return the keep-alive read for a timeout in seconds; None if no read is known."""
     ask = presence_read(session.profile)
     if ask is None:
         return None
@@ -52,10 +54,10 @@ def alive_read(session: DriveSession, timeout: float) -> KeepAlive | None:
 
 
 async def look_for_drive(session: DriveSession, met: NoAnswer) -> None:
-    """Ask for what each drive of the family has, after a silence that was `met` elsewhere.
+    """Check whether the drive is present, after another read met no answer (`met`).
 
-    A drive that answers counts as silent no more, and is polled on. Raises the line's errors, and
-    what was met where nothing is known to ask for.
+    If it answers, the line keeps polling it. Raises the line's errors, and `met` if the family
+    has no such read.
     """
     ask = presence_read(session.profile)
     if ask is None:
@@ -76,7 +78,7 @@ def meets_silence(profile: Profile) -> bool:
 
 
 def _neighbors(profile: Profile) -> Parameter | None:
-    """The first of two words of the monitoring set, side by side, that documents confirm."""
+    """Return the first of two adjacent, documented words of the monitoring set; None if none."""
     codes = [value.parameter for value in profile.data.monitoring.values]
     words = {
         parameter.address: parameter

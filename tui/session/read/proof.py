@@ -1,8 +1,8 @@
-"""Evidence from a block's or scanner's words on the parameter of each place.
+"""Evidence from the words of a block or scanner about the parameter in each place.
 
-What an indirect block brings since its drive's last reset cannot be read. It is identified by its
-words: a place holds a parameter when nothing else that the block can return has fitted, and this
-one has. Facts once known about a chosen parameter stay true until the drive is reset.
+An indirect block takes over its slots at the drive's reset, and the slots in force cannot be read.
+The words identify them: a place holds a parameter if its words match that parameter and no other
+that the block can return. A parameter once identified stays valid until the drive is reset.
 """
 
 from __future__ import annotations
@@ -19,36 +19,35 @@ from ..reading import Reading
 from .verdict import SlotMatch
 
 SURE = 3
-"""Comparisons that must speak for a parameter, and against each other one."""
+"""Comparisons that must match one parameter and exclude each other one."""
 BEYOND = 3
-"""So many times as far as it was seen to tremble, a word may be off and still be its own."""
+"""Factor: a word may differ by this many times the seen jitter, and still match."""
 LEAST = 3
-"""Raw units by which any value may tremble unseen."""
+"""Jitter in raw units that is assumed for every value, even if none was seen."""
 
 
 @dataclass(slots=True)
 class SlotEvidence:
-    """Evidence about one block; pure, and worthless after the drive's reset."""
+    """Evidence about one block. Pure; invalid after the drive's reset."""
 
     profile: Profile
     block: Block
     _sure: dict[str, str] = field(default_factory=dict)
-    """The code that a slot surely brings."""
+    """Identified parameter code by slot."""
     _off: defaultdict[tuple[str, str], list[int]] = field(default_factory=lambda: defaultdict(list))
-    """By how much each word was off the direct readings around it, by slot and code."""
+    """Distance of each word from the direct readings around it, by slot and code (raw units)."""
     _seen: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     """The raw values of each parameter, read directly."""
 
     def begin(self) -> None:
-        """Forget what led to no proof; how a value varied long ago shows nothing about the
-        present."""
+        """Discard unfinished evidence; old variation does not describe the present jitter."""
         self._off.clear()
         self._seen.clear()
 
     def note(
         self, words: Sequence[int], before: Mapping[str, Reading], after: Mapping[str, Reading]
     ) -> None:
-        """Take the block's words with direct readings of some of what it could bring."""
+        """Compare the block's words with direct readings taken before and after them."""
         for code in before:
             parameter = self.profile[code]
             first, second = before[code].raw, after[code].raw
@@ -60,8 +59,10 @@ class SlotEvidence:
                 self._off[slot, code].append(_off(parameter, raw, first, second))
 
     def verdict(self, slot: str, code: str) -> SlotMatch:
-        """Return the match of a slot's words with a parameter: one that differs did so each
-        time."""
+        """Return the match of a slot's words with a parameter.
+
+        DIFFERS requires that all words so far differed.
+        """
         offs, seen = self._off[slot, code], self._seen[code]
         if not offs:
             return SlotMatch.UNREAD
@@ -74,30 +75,29 @@ class SlotEvidence:
         return self._off[slot, code][-1:] == [0]
 
     def conclude(self, chosen: Mapping[str, int]) -> None:
-        """Keep what is sure by now of these slots and their raw values."""
+        """Store the places that the evidence identifies, for these slots and raw values."""
         for slot, raw in chosen.items():
             if self.holds(slot, raw):
                 self._sure[slot] = self._code(raw)
 
     def brings(self, slot: str) -> str:
-        """The code of what a place surely brings; empty while that is not known."""
+        """Return the parameter code identified for a place; empty if none yet."""
         if slot in self._sure:
             return self._sure[slot]
         left = [code for code in self.codes if not self._excluded(slot, code)]
         return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""
 
     def holds(self, slot: str, raw: int) -> bool:
-        """Return True if a place surely brings what its slot's raw value means."""
+        """Return True if a place certainly returns the parameter that its slot selects."""
         code = self._code(raw)
         return bool(code) and self.brings(slot) == code
 
     def excludes(self, slot: str, raw: int) -> bool:
-        """Return True if a place surely returns another parameter than its slot's raw value
-        selects."""
+        """Return True if a place certainly returns another parameter than its slot selects."""
         return not self.holds(slot, raw) and self._excluded(slot, self._code(raw))
 
     def open_codes(self, chosen: Mapping[str, int]) -> list[str]:
-        """The parameters to be compared yet until every place of `chosen` is sure."""
+        """Return the parameters still to compare to identify every place of `chosen`."""
         targets = {s: self._code(raw) for s, raw in chosen.items() if s not in self._sure}
         return [
             code
@@ -110,7 +110,7 @@ class SlotEvidence:
 
     @property
     def codes(self) -> list[str]:
-        """Everything that the block can bring."""
+        """Return the codes of all parameters that the block can return."""
         return list(dict.fromkeys(choice.parameter for choice in self.block.choices))
 
     def _confirmed(self, slot: str, code: str) -> bool:
@@ -120,7 +120,7 @@ class SlotEvidence:
         return self._against(slot, code) >= SURE
 
     def _against(self, slot: str, code: str) -> int:
-        """Return the number of words that were further off than the parameter varies."""
+        """Return how many words differ by more than the parameter's jitter."""
         may_be = LEAST + BEYOND * _tremble(self._seen[code])
         return sum(off > may_be for off in self._off[slot, code])
 
@@ -129,24 +129,23 @@ class SlotEvidence:
 
 
 def _off(parameter: Parameter, raw: int, first: int, second: int) -> int:
-    """Return the distance between a raw value and the parameter before and after it, in raw
-    units."""
+    """Return the distance of a raw value from the range of both direct readings (raw units)."""
     if parameter.bits:
         return FAR if (raw ^ first) & (raw ^ second) & 0xFFFF else 0
     low, high = sorted((first, second))
-    # as far again as it went between them: it may have turned meanwhile
+    # widened by its own span: the value may have turned between the readings
     span = high - low
     return max(0, low - span - raw, raw - high - span)
 
 
 def _tremble(raws: Sequence[int]) -> int:
-    """By how much a value left the straight way between its neighbors, in raw units, rounded up.
+    """Return the jitter of a value: its distance from the line between its neighbors.
 
-    A value that goes evenly up or down does not tremble.
+    In raw units, rounded up. A value that rises or falls evenly has none.
     """
     bends = [abs(a + c - 2 * b) for a, b, c in zip(raws, raws[1:], raws[2:], strict=False)]
     return (max(bends, default=0) + 1) // 2
 
 
 FAR = 1 << 20
-"""Further than any raw value is from another one."""
+"""Larger than any distance between two raw values."""

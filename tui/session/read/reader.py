@@ -1,4 +1,4 @@
-"""Reading parameters of one drive: plan, exchange, decode; a refused word hurts no other."""
+"""Reading parameters of one drive: plan, exchange, decode. A refusal affects no other word."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from .presence import look_for_drive, meets_silence
 from .slots import Slots
 
 ASK_AGAIN = 30.0
-"""Seconds after which a poll asks again for a parameter that the drive refused."""
+"""Seconds after which a poll reads a refused parameter again."""
 
 
 @dataclass(slots=True)
 class Reader:
     """Reads parameters of one drive into its image.
 
-    Raises the line's errors for all but a drive's refusal, which makes only the refused
-    parameter bad; BytesSwapped while the bytes of its words arrive swapped.
+    Raises the line's errors, and BytesSwapped while the bytes of the drive's words arrive swapped.
+    A refusal raises nothing: only the reading of the refused parameter is bad.
     """
 
     session: DriveSession
     using: str = ""
     """Name of the block or scanner that the last poll read, if it read one."""
     max_age: float = 0.0
-    """Age in seconds up to which a poll uses what was read for another program."""
+    """Age in seconds up to which a poll uses values that another program has read."""
     _polled: PolledTurn | None = None
     """Replies that the keeper has read for the current poll."""
     _met: set[str] = field(default_factory=set)
@@ -91,7 +91,7 @@ class Reader:
         return {code: decoding.decode(found[code]) for code in wanted}
 
     def _note_state(self, codes: Iterable[str]) -> None:
-        """Notify the session when the motor was seen at rest."""
+        """Report the read state to the session, which notes when the motor was at standstill."""
         status = {chart.status for chart in self.profile.data.charts}
         image = self.session.image
         for code in status.intersection(codes):
@@ -99,12 +99,12 @@ class Reader:
                 self.session.note_state(read_chart(self.profile, image.raws).motion, held.time)
 
     def seconds(self, codes: Iterable[str]) -> float:
-        """Return the seconds that reading these takes on the wire by plan, without retries."""
+        """Return the planned time on the wire of reading these, in seconds, without retries."""
         sure, unsure = self._by_trust(frozenset(codes).difference(self.session.image.refused))
         return self._plans.plan(sure, self.in_force).seconds + self._plans.plan(unsure).seconds
 
     def groups(self, codes: Iterable[str]) -> list[tuple[str, ...]]:
-        """The codes that come in one request each."""
+        """Return the codes, grouped by the request that reads them."""
         wanted = frozenset(codes).difference(self.session.image.refused)
         trusts = self._by_trust(wanted)
         requests = [request for trust in trusts for request in self._plans.plan(trust).requests]
@@ -116,7 +116,7 @@ class Reader:
         return planned_reads(self._plans.plan(sure, self.in_force), self._plans.plan(unsure))
 
     def forget(self) -> None:
-        """Read scales and refused parameters again: another drive may answer now."""
+        """Discard scales, refusals and slots: another drive may answer now."""
         self.session.image.distrust()
         self.session.byte_order.forget()
         self._plans.clear()
@@ -124,24 +124,24 @@ class Reader:
         self._slots.forget()
 
     def distrust(self) -> None:
-        """Read directly what a block brings only until the drive's next reset."""
+        """Stop using the slots of indirect blocks: the drive may have been reset."""
         self._slots.distrust()
 
     @property
     def in_force(self) -> dict[str, int]:
-        """Raw values by slot that each place of a block or scanner surely holds now."""
+        """Return the raw value of each slot of a block or scanner that is certainly in force."""
         return self._slots.in_force()
 
     async def learn_slots(self) -> None:
-        """Find out what the drive's block or scanner stands for; polls use it from then on.
+        """Read the slots of the drive's block or scanner, so that polls can use it.
 
-        To be called again now and then: others may change it. Raises the line's errors.
+        Call it regularly, because other programs may change them. Raises the line's errors.
         """
         await self._slots.learn(self._poll)
 
     async def compare_slots(self) -> None:
-        """Go on to prove what an indirect block brings, by a few requests. Raises line errors."""
-        # before and behind the block is what was read then, not for somebody else meanwhile
+        """Identify more places of an indirect block, with a few reads. Raises the line's errors."""
+        # the readings before and after the block must be reads of this comparison
         shared, self.max_age = self.max_age, 0.0
         try:
             await self._slots.compare(self._poll)
@@ -149,7 +149,7 @@ class Reader:
             self.max_age = shared
 
     def compare_soon(self) -> None:
-        """The drive does something else now: what looked alike in its block may no longer."""
+        """Compare the block soon: the drive's state changed, so equal values may differ now."""
         self._slots.compare_soon()
 
     async def _poll(self, codes: Iterable[str]) -> Mapping[str, Reading]:
@@ -164,14 +164,13 @@ class Reader:
             await self._take(due, priority)
 
     def _is_known(self, code: str, oldest: float) -> bool:
-        """Return True if a word that others' values depend on was read, or refused, since a
-        time."""
+        """Return True if a word that scales others was read or refused since `oldest`."""
         image = self.session.image
         held = image.get(code) if code in image.trusted else image.refused.get(code)
         return held is not None and held.time >= oldest
 
     async def _take(self, codes: frozenset[str], priority: Priority) -> dict[str, Reading]:
-        """Read into the image; the readings have no value yet."""
+        """Read into the image; the readings are not decoded yet."""
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
         image = self.session.image
         sure, unsure = self._by_trust(codes.difference(image.refused, found))
@@ -185,18 +184,18 @@ class Reader:
         return found
 
     async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Reading]:
-        """Values of a plan; those of a block whose slots have changed meanwhile are left out."""
+        """Carry out a plan; omit a block's values if its slots changed in the meantime."""
         found: dict[str, Reading] = {}
         if priority >= Priority.POLL:
             used = (self._block_of(request) for request in plan.requests)
             self.using = next((block.name for block in used if block), "")
         for request in plan.requests:
-            # what a block brought before its slots were read may be of other slots
+            # words of a block from before its slots were read may belong to other slots
             since = self._slots.learned if self._block_of(request) else -math.inf
             found.update(await self._exchange(request, priority, since))
             self._slots.heard()
         for check in plan.checks:
-            # and slots that were read before the block say nothing of what it brought
+            # slots read before the block may have changed before the block was read
             since = max((found[c].time for c in check.governs if c in found), default=-math.inf)
             raws = await self._exchange(check.request, priority, since)
             if {code: raw.raw for code, raw in raws.items()} != check.slots:
@@ -206,7 +205,7 @@ class Reader:
         return found
 
     def _by_trust(self, codes: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
-        """Confirmed words apart from the others, where a wrong address meets silence."""
+        """Separate documented words from the others, if the family ignores missing words."""
         if not meets_silence(self.profile):
             return codes, frozenset()
         sure = frozenset(c for c in codes if c in self._met or is_verified(self.profile[c]))
@@ -215,7 +214,7 @@ class Reader:
     async def _exchange_unsure(
         self, request: ReadRequest, priority: Priority
     ) -> dict[str, Reading]:
-        """A read of words that the drive may not have: its silence there is no dead drive."""
+        """Read words that the drive may lack: no answer does not mean that the drive is lost."""
         try:
             found = await self._exchange(request, priority)
             self._met.update(found)
@@ -228,7 +227,7 @@ class Reader:
             return {p.code: Reading.bad(p, now, text, silent=True) for p in parameters}
 
     def _still_refused(self, codes: frozenset[str]) -> dict[str, Reading]:
-        """Refusals young enough that a poll need not ask again."""
+        """Return the refusals younger than ASK_AGAIN seconds, which a poll does not repeat."""
         oldest = self.session.clock.monotonic() - ASK_AGAIN
         refused = self.session.image.refused
         return {c: r for c, r in refused.items() if c in codes and (r.silent or r.time > oldest)}
@@ -236,10 +235,10 @@ class Reader:
     async def _exchange(
         self, request: ReadRequest, priority: Priority, since: float = -math.inf
     ) -> dict[str, Reading]:
-        """The raw values of one planned request, read since a time.
+        """Read the raw values of one planned request; a shared reply must be newer than `since`.
 
-        Where the drive refuses a longer read, or answers a word with the one that stands for
-        "no value", the parameter is asked for alone: only then is the answer certain.
+        If the drive refuses a longer read, or returns the word for "no value", each affected
+        parameter is read separately: only then is the answer certain.
         """
         block = self._block_of(request)
         several = len(request.places) > 1 or block is not None
@@ -268,25 +267,25 @@ class Reader:
         return found
 
     def _longest(self, request: ReadRequest, priority: Priority, since: float) -> float:
-        """The greatest age in seconds of what is taken in place of a read: nothing known before."""
+        """Return the greatest age in seconds of a shared reply that may replace this read."""
         if priority < Priority.POLL or not self.max_age:
             return 0.0
         known = self._known_since(request, since)
         return max(0.0, min(self.max_age, self.session.clock.monotonic() - known))
 
     def _polled_reply(self, request: ReadRequest, priority: Priority, since: float) -> Reply | None:
-        """Return the reply already read for this poll: nothing older. Raises the line's errors."""
+        """Return the keeper's reply for this poll; None if it has none. Raises line errors."""
         if self._polled is None or priority < Priority.POLL:
             return None
         return self._polled.take(planned_read(request), self._known_since(request, since))
 
     def _known_since(self, request: ReadRequest, since: float) -> float:
-        """When what a request reads was last read or written, or `since` if that is later."""
+        """Return when the words of a request were last read or written, or `since` if later."""
         image = self.session.image
         return max((since, *(image.changed(place.code) for place in request.places)))
 
     def _block_of(self, request: ReadRequest) -> Block | None:
-        """The block or scanner that a request reads; None where it asks parameters directly."""
+        """Return the block or scanner that a request reads; None if it reads parameters."""
         first = request.places[0]
         if self.profile[first.code].address == request.address + first.offset:
             return None

@@ -1,4 +1,4 @@
-"""Reading raw values for work that must not stop at one lost reply, with the drive's state."""
+"""Reading raw values with retries, for work that one lost reply must not stop."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from .reader import Reader
 READ_TRIES = 3
 """Number of attempts of a read if its reply is lost or damaged."""
 LONGEST_REST = 3.0
-"""Seconds that are waited at most for a drive that the line leaves alone for a while."""
+"""Longest wait in seconds for a drive whose polling the line pauses."""
 
 
 PLANNED_AT_ONCE = 60
-"""Number of parameters planned together: planning more would hold up the line's loop."""
+"""Number of parameters planned together: planning more would block the line's loop."""
 
 
 def neighbors(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
-    """The codes by address, parted where no read could go over the gap, and where they get many."""
+    """Group the codes by address: split at gaps too wide for one read, and at PLANNED_AT_ONCE."""
     function = profile.function(3)
     longest = (function.max_read if function else None) or 1
     parts: list[list[str]] = []
@@ -43,12 +43,12 @@ def neighbors(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
 
 @dataclass(slots=True)
 class RetryingReader:
-    """Reads of one drive into its image by a reader of its own, so that no other is disturbed."""
+    """Reads one drive into its image, with its own Reader so that polls are not affected."""
 
     session: DriveSession
     priority: Priority = Priority.OPERATOR_READ
     headline: str = "not known"
-    """The drive's state in words, as last read."""
+    """The drive's last read state, as text."""
     reader: Reader = field(init=False)
 
     def __post_init__(self) -> None:
@@ -56,12 +56,12 @@ class RetryingReader:
 
     @property
     def raws(self) -> Mapping[str, int]:
-        """All raw values known of the drive."""
+        """All known raw values of the drive, by code."""
         return self.session.image.raws
 
     @property
     def lacking(self) -> frozenset[str]:
-        """Codes that the drive itself said it does not have."""
+        """Codes that the drive reported as missing."""
         return self.session.image.lacking
 
     def why_absent(self, code: str) -> str:
@@ -70,7 +70,7 @@ class RetryingReader:
         return refused.error if refused is not None else ""
 
     async def ask(self, codes: Iterable[str]) -> dict[str, Reading]:
-        """Read, again where a reply was lost; raises the line's errors when that does not help."""
+        """Read with up to READ_TRIES attempts; raises the error of the last attempt."""
         wanted = list(dict.fromkeys(codes))
         for tried in range(1, READ_TRIES + 1):
             try:
@@ -80,7 +80,7 @@ class RetryingReader:
             except (NoAnswer, ChecksumFault, WrongReply) as error:
                 if tried == READ_TRIES:
                     raise
-                # only behind everything else a drive that fell silent is left alone for a while
+                # the line pauses a drive without answers only for polls and background reads
                 if self.priority >= Priority.POLL and isinstance(error, NoAnswer):
                     await self.session.clock.sleep(min(error.retry_in or 0.0, LONGEST_REST))
             else:
@@ -88,19 +88,19 @@ class RetryingReader:
         raise AssertionError  # the last try returns or raises
 
     async def ask_many(self, codes: Iterable[str]) -> dict[str, int]:
-        """The raw values of any number of parameters, planned a part at a time."""
+        """Return the raw values of any number of parameters; plans them in parts."""
         found: dict[str, int] = {}
         for part in neighbors(self.session.profile, dict.fromkeys(codes)):
             found |= await self.ask_raws(part)
         return found
 
     async def ask_raws(self, codes: Iterable[str]) -> dict[str, int]:
-        """The raw values of those that the drive reports."""
+        """Return the raw values by code, without those that the drive refuses."""
         readings = await self.ask(codes)
         return {code: reading.raw for code, reading in readings.items() if reading.raw is not None}
 
     async def ask_state(self) -> StateKind:
-        """The kind of the drive's present state, for callers that need a motor at rest."""
+        """Read the drive's state, for work that needs the motor at standstill."""
         profile = self.session.profile
         codes = [*watched_codes(profile), profile.data.faults.parameter]
         state = drive_state(profile, await self.ask(code for code in codes if code))

@@ -1,17 +1,17 @@
-"""Which of the seldom values are read in a cycle; what failed comes again, in smaller parts."""
+"""Rotation of slow values over the cycles; failed reads are retried in smaller parts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
 Groups = Callable[[Iterable[str]], Sequence[tuple[str, ...]]]
-"""Codes in groups that come in one request each."""
+"""Groups codes by the request that reads them."""
 
 
 class Rotation:
-    """Deals out the seldom values of one drive: a part of their requests in each cycle.
+    """Spreads the slow values of one drive over several cycles.
 
-    `parts` is the number of cycles in which all of them have had their turn.
+    `parts` is the number of cycles that read each of them once.
     """
 
     def __init__(self, parts: int) -> None:
@@ -20,14 +20,14 @@ class Rotation:
         self._owed: tuple[str, ...] = ()
         self._turn: tuple[str, ...] = ()
         self._most: int | None = None
-        """Requests for what is owed in one cycle; None while all are made at once."""
+        """Most requests in one cycle for overdue values; None for no limit."""
 
     def add(self, codes: Iterable[str]) -> None:
-        """Owe these values; they come before the others have their turn."""
+        """Mark values as overdue: they are read before the others."""
         self._owed = tuple(dict.fromkeys((*codes, *self._owed)))
 
     def turn(self, codes: Iterable[str], groups: Groups) -> tuple[str, ...]:
-        """The values to be read in this cycle: some of those owed, else the next of `codes`."""
+        """Return the values of this cycle: overdue ones first, else the next part of `codes`."""
         if self._owed:
             some = () if self._most is None else groups(self._owed)[: self._most]
             self._turn = _joined(some) or self._owed
@@ -38,29 +38,29 @@ class Rotation:
 
     @property
     def owes(self) -> bool:
-        """True while values are owed."""
+        """True while values are overdue."""
         return bool(self._owed)
 
     def turns(self, codes: Iterable[str], groups: Groups) -> tuple[tuple[str, ...], ...]:
-        """The values of each of the cycles in which all of them have their turn."""
+        """Split the values into parts, one for each cycle."""
         found = groups(codes)
         return tuple(_joined(found[part :: self._parts]) for part in range(self._parts))
 
     def set_turn(self, codes: tuple[str, ...]) -> tuple[str, ...]:
-        """These values have their turn, unless some are owed."""
+        """Set the values of the current cycle, as chosen by the keeper; return them."""
         self._turn = codes
         return codes
 
     def came(self) -> None:
-        """The values of this turn were read; of what is owed yet comes twice as much."""
+        """Note that this turn was read; the limit for the overdue rest doubles."""
         self._owed = tuple(code for code in self._owed if code not in self._turn)
         if self._most is not None:
             self._most = self._most * 2 if self._owed else None
 
     def failed(self, groups: Groups) -> None:
-        """This turn failed: its values are owed, and asked for with half as many requests.
+        """Note that this turn failed: its values are overdue, with half as many requests.
 
-        A cycle of many requests is more likely to lose one than a cycle of few.
+        Fewer requests in a cycle make the loss of one less likely.
         """
         self._owed = tuple(dict.fromkeys((*self._turn, *self._owed)))
         self._most = max(1, len(groups(self._turn)) // 2)

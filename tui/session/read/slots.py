@@ -1,9 +1,9 @@
 """Contents of a drive's indirect block or scanner, as far as they are certain.
 
-A scanner's slots count as soon as they are written: they are read, and read again after each use
-(the read plan sees to that). An indirect block's slots apply from the drive's next reset on, so
-their present contents may not be what the block returns: the block is compared, a few parameters at
-a time, with direct reads of every possible parameter.
+A scanner's slots take effect when they are written, so the read plan reads them again after each
+use. An indirect block's slots take effect at the drive's next reset, so the block may return other
+parameters than its slots select. Comparisons with direct reads, a few parameters at a time,
+identify them.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from ..reading import Reading
 from .proof import SURE, SlotEvidence
 
 COMPARED_AT_ONCE = 2
-"""Parameters compared between two cycles, so that no cycle waits long."""
+"""Most parameters compared between two cycles, to keep the delay of a cycle short."""
 ROUNDS = SURE + 1
-"""Comparisons of each parameter, until they rest."""
+"""Comparisons of each parameter before a pause."""
 TRY_AGAIN = 15.0
-"""Seconds after which a block that is not sure yet is compared again."""
+"""Seconds after which an uncertain block is compared again."""
 CALM = 1.0
-"""Seconds without doubt about a reset before anything is proved."""
+"""Seconds to wait after a possible reset before a block is compared."""
 
 ReadCodes = Callable[[Iterable[str]], Awaitable[Mapping[str, Reading]]]
 
 
 @dataclass(slots=True)
 class _Comparison:
-    """One indirect block: what is chosen for it, what is proved, what is to be compared yet."""
+    """Comparison of one indirect block: its selected slots, the evidence, and what is left."""
 
     block: Block
     proof: SlotEvidence
     chosen: dict[str, int] = field(default_factory=dict)
-    """The slots that hold one of the block's choices, as last read."""
+    """Last read raw values by slot, for slots that select one of the block's choices."""
     todo: deque[str] = field(default_factory=deque)
     next_time: float = 0.0
 
     def choose(self, slots: Mapping[str, int], now: float) -> None:
-        """Take the slots as they were read, and begin to compare where that is due."""
+        """Take the slots that were read; begin a comparison if they changed or it is due."""
         known = {choice.raw for choice in self.block.choices}
         chosen = {s: slots[s] for s in self.block.slots if slots.get(s) in known}
         if chosen == self.chosen and (self.todo or now < self.next_time):
@@ -58,12 +58,12 @@ class _Comparison:
 
     @property
     def length(self) -> int:
-        """Words up to the last place that something was chosen for; 0 where that is too few."""
+        """Words up to the last selected place; 0 if the block cannot be read that short."""
         last = max((self.block.slots.index(slot) for slot in self.chosen), default=-1)
         return last + 1 if last + 1 >= self.block.min_words else 0
 
     def take(self) -> list[str]:
-        """The parameters to compare now."""
+        """Remove and return the next parameters to compare."""
         still_open = self.proof.open_codes(self.chosen)
         codes: list[str] = []
         while self.todo and len(codes) < COMPARED_AT_ONCE:
@@ -72,13 +72,13 @@ class _Comparison:
         return codes
 
     def in_force(self) -> dict[str, int]:
-        """Raw values by slot of the places that are sure."""
+        """Return the raw values by slot of the identified places."""
         return {slot: raw for slot, raw in self.chosen.items() if self.proof.holds(slot, raw)}
 
 
 @dataclass(slots=True)
 class Slots:
-    """The slots of one drive's read blocks; `ask` reads parameters at the priority of polls."""
+    """Slots of one drive's read blocks. `ask` arguments read parameters at poll priority."""
 
     line: ModbusLine
     device: int
@@ -88,36 +88,36 @@ class Slots:
     """When the slots of a scanner were read last (session's clock)."""
     _known: dict[str, int] = field(default_factory=dict)
     _comparisons: dict[str, _Comparison] = field(default_factory=dict)
-    """By the id of the block; forgotten whenever the drive may have been reset."""
+    """By the block's id; cleared when the drive may have been reset."""
     _in_force: dict[str, int] = field(default_factory=dict)
     """Slots that comparisons have confirmed."""
     _heard: float = 0.0
     _doubted: float = 0.0
 
     def in_force(self) -> dict[str, int]:
-        """Raw values by slot that each place surely holds now."""
+        """Return the raw values by slot that are certainly in force."""
         awake = self.clock.monotonic() - self._heard <= ASLEEP
         return self._known | self._in_force if awake else dict(self._known)
 
     def heard(self) -> None:
-        """The drive has answered: it was not switched off since it did so before, or long ago."""
+        """Note an answer; after a gap above ASLEEP the drive may have been switched off."""
         now = self.clock.monotonic()
         if now - self._heard > ASLEEP:
             self._drop_proofs()
         self._heard = now
 
     def distrust(self) -> None:
-        """The drive may be reset now: what counts from then on is not what was proved."""
+        """Discard the comparisons: the drive may be reset now, and then uses other slots."""
         self._drop_proofs()
         self._doubted = self.clock.monotonic()
 
     def forget(self) -> None:
-        """Nothing is sure any more: the drive was silent, or another one answers now."""
+        """Discard everything: the drive did not answer, or another one answers now."""
         self._known.clear()
         self._drop_proofs()
 
     def compare_soon(self) -> None:
-        """Compare again: parameters that looked alike may differ now."""
+        """Compare again soon: parameters with equal values may differ now."""
         for comparison in self._comparisons.values():
             comparison.next_time = 0.0
 
@@ -137,7 +137,7 @@ class Slots:
         self._conclude()
 
     async def compare(self, ask: ReadCodes) -> None:
-        """Compare a few parameters with what the block brings, where that is not sure yet."""
+        """Compare a few parameters with the block's words, for places not identified yet."""
         for comparison in list(self._comparisons.values()):
             codes = comparison.take() if comparison.length else []
             if not codes:
@@ -163,6 +163,6 @@ class Slots:
         self._in_force = found
 
     def _drop_proofs(self) -> None:
-        # a comparison under way goes on with evidence that nobody looks at any more
+        # a comparison in progress continues, but its evidence is no longer used
         self._comparisons.clear()
         self._in_force = {}

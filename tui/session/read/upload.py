@@ -1,4 +1,4 @@
-"""Reading all parameters of a drive behind everything else on the line, for a parameter set."""
+"""Upload of all parameters of a drive into a parameter set, at background priority."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from ..drive import DriveSession
 from .retrying_reader import RetryingReader, neighbors
 
 ReadProgress = Callable[[int, int], None]
-"""Called with how many parameters were asked for, and how many there are."""
+"""Called with the number of parameters read or refused so far, and the total."""
 
 
 def readable_codes(profile: Profile) -> list[str]:
-    """Codes of every parameter that can be read, in the profile's order."""
+    """Return the codes of all readable parameters, in the profile's order."""
     return [p.code for p in profile.parameters if p.access != "w"]
 
 
 def setting_codes(profile: Profile) -> list[str]:
-    """Codes of every setting, and of what scales and models follow, in the profile's order."""
+    """Return the codes of all settings, scale sources and ratings, in the profile's order."""
     wanted = set(scale_sources(profile)) | set(rating_codes(profile))
     return [
         p.code
@@ -38,7 +38,7 @@ def setting_codes(profile: Profile) -> list[str]:
 
 @dataclass(slots=True)
 class Upload:
-    """Reads parameters once each; after an error of the line `run` goes on where it was."""
+    """Reads each parameter once; after a line error, `run` continues with the rest."""
 
     session: DriveSession
     codes: list[str] = field(default_factory=list)
@@ -48,7 +48,7 @@ class Upload:
     raws: dict[str, int] = field(default_factory=dict)
     """Values read so far."""
     absent: dict[str, str] = field(default_factory=dict)
-    """Codes without a value, and the refusal or error instead."""
+    """Refusal or error by code, for parameters without a value."""
     retrying: RetryingReader = field(init=False)
 
     def __post_init__(self) -> None:
@@ -57,18 +57,18 @@ class Upload:
 
     @property
     def left(self) -> list[str]:
-        """Codes that were not asked for yet."""
+        """Codes neither read nor refused yet."""
         return [c for c in self.codes if c not in self.raws and c not in self.absent]
 
     @property
     def done(self) -> bool:
-        """True if every parameter was asked for."""
+        """True if every parameter was read or refused."""
         return not self.left
 
     async def run(self) -> None:
-        """Read what is left, by the requests of the read plan, scale sources first.
+        """Read the parameters left, scale sources first.
 
-        Raises the line's errors; what was read stays, and another call reads the rest.
+        Raises the line's errors; values read so far stay, and another call reads the rest.
         """
         profile = self.session.profile
         sources = scale_sources(profile)
@@ -76,7 +76,7 @@ class Upload:
         for codes in (first, *neighbors(profile, self.left)):
             for group in self.retrying.reader.groups(codes):
                 await self._ask(group)
-            # what the drive refuses is in no group
+            # refused codes are in no group
             await self._ask(codes)
 
     async def _ask(self, codes: Iterable[str]) -> None:
@@ -105,7 +105,7 @@ class Upload:
 
 
 def head_of(session: DriveSession) -> SetHead:
-    """Return the origin of a parameter set of this drive, read now."""
+    """Create the head of a parameter set of this drive, with the current time."""
     profile, identity = session.profile, session.identity
     message = {}
     if identity is not None:

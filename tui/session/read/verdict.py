@@ -1,4 +1,4 @@
-"""Match of a word that came through a block with the parameter read directly."""
+"""Match of a block's word with the parameter read directly."""
 
 from __future__ import annotations
 
