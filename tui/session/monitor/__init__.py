@@ -1,1 +1,1 @@
-"""Watching a drive: the running monitor, feeding timeouts, the record of a trip."""
+"""Monitoring of drives: cyclic polls, communication timeouts, faults and trip records."""

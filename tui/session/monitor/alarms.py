@@ -1,4 +1,4 @@
-"""The faults of every drive of a line: which came first, and which nobody has looked at yet."""
+"""The present faults of all drives of a line, in their order, and which of them were viewed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ..events import EventLog
 
 @dataclass(frozen=True, slots=True)
 class FaultOnset:
-    """The first sight of the fault that a drive is in; `wall` in seconds since 1970."""
+    """When a drive's present fault was first read; `wall` in seconds since 1970."""
 
     wall: float
     tripped: bool
-    """True if the drive was seen without this fault right before: then it is the trip's time."""
+    """True if the read before showed no such fault: `wall` is then the time of the trip."""
     code: str = ""
 
 
@@ -25,11 +25,11 @@ class FaultOnsets:
 
     def __init__(self) -> None:
         self._free: frozenset[int] = frozenset()
-        """Drives that were seen without a fault last."""
+        """Drives without a fault at their last read."""
         self.by_device: Mapping[int, FaultOnset] = {}
 
     def note(self, device: int, state: DriveState, wall: float) -> None:
-        """Take a state that was read just now; an unknown one changes nothing."""
+        """Note a state that was just read; an unknown state changes nothing."""
         if state.kind == "unknown":
             return
         onset = self.by_device.get(device)
@@ -43,7 +43,7 @@ class FaultOnsets:
         if onset is not None and (onset.code == code or not code):
             return
         if onset is not None and not onset.code:
-            now = replace(onset, code=code)  # its code comes a moment after the state
+            now = replace(onset, code=code)  # the code may be read a cycle after the state
         else:
             now = FaultOnset(wall, onset is not None or device in self._free, code)
         self._free -= {device}
@@ -52,30 +52,30 @@ class FaultOnsets:
 
 @dataclass(frozen=True, slots=True)
 class PresentFault:
-    """The one record of a fault that a drive is in; `wall` in seconds since 1970."""
+    """A fault that a drive is in; `wall` in seconds since 1970."""
 
     device: int
     code: str
-    """As the drive's keypad writes it; empty where its code was not read."""
+    """As the drive's keypad shows it; empty if the fault code was not read."""
     name: str
     wall: float
-    """The time of the trip if `tripped`, else of the first sight."""
+    """Time of the trip if `tripped`, else of the first read that showed the fault."""
     tripped: bool = False
-    """True if the trip itself was seen; else the drive was in this fault when first seen."""
+    """True if the trip was observed; False if the first read already showed the fault."""
     seen: bool = False
-    """True if a person has looked at it."""
+    """True if a person has viewed it."""
 
     @property
     def when(self) -> str:
-        """The time of day, named for what it is."""
+        """The time of day with its meaning: `tripped ...` or `seen since ...`."""
         at = time.strftime("%H:%M:%S", time.localtime(self.wall))
         return f"tripped {at}" if self.tripped else f"seen since {at}"
 
 
 class LineAlarms:
-    """Follows the faults of the drives of one line, in the order in which they came.
+    """Tracks the faults of the drives of one line, in the order in which they occurred.
 
-    Belongs to one loop. Changes are reported to the log of events, and by `record` to the journal.
+    For one loop only. Adds each change to the event log, and passes it to `record` for the journal.
     """
 
     def __init__(
@@ -87,28 +87,27 @@ class LineAlarms:
         self._record = record
         self._active: dict[int, PresentFault] = {}
         self._recorded: dict[int, float] = {}
-        """By device, the time of the last onset that is in the journal."""
+        """Time of the last onset in the journal, by device."""
 
     @property
     def active(self) -> tuple[PresentFault, ...]:
-        """The present faults, the first one first."""
+        """The present faults, oldest first."""
         return tuple(self._active.values())
 
     @property
     def unseen(self) -> bool:
-        """True if there is a fault that nobody has looked at."""
+        """True if there is a fault that no person has viewed."""
         return any(not fault.seen for fault in self._active.values())
 
     def take(self, states: Mapping[int, DriveState], onsets: Mapping[int, FaultOnset]) -> bool:
-        """Take the newest state of each drive, and the onset of its fault; True if one is new.
+        """Update with the latest state and fault onset of each drive; return True for a new fault.
 
-        A drive whose state is not known now keeps what was known; one that is no longer there has
-        no fault any more.
+        A drive in an unknown state keeps its fault; a drive missing from `states` loses it.
         """
         for device in self._active.keys() - states.keys():
             del self._active[device]
         new = [self._take_one(device, state, onsets) for device, state in states.items()]
-        return any(new)  # each is looked at, whatever the one before brought
+        return any(new)  # from a list: every drive must be updated, also after a new fault
 
     def _take_one(self, device: int, state: DriveState, onsets: Mapping[int, FaultOnset]) -> bool:
         was = self._active.get(device)
@@ -126,18 +125,18 @@ class LineAlarms:
         if was is not None and (was.code == code or not code):
             return False
         if was is not None and not was.code:
-            # its code comes a moment after the state
+            # the code may be read a cycle after the state
             self._active[device] = replace(was, code=code, name=name)
             self._events.add("fault", f"the fault is {_called(self._active[device])}.", device)
             return False
         first = next(iter(self._active.values()), None)
         onset = onsets.get(device)
         if onset is None or (code and onset.code not in ("", code)):
-            return False  # the line's loop has not noted it yet: at the next look
+            return False  # the line's loop has not noted the onset yet; the next call will find it
         now = PresentFault(device, code, name, onset.wall, onset.tripped)
         self._active[device] = now
         if was is None and self._recorded.get(device) == onset.wall:
-            return False  # the same trip of a drive that was not seen for a while
+            return False  # the same trip, of a drive that was lost in the meantime
         self._recorded[device] = onset.wall
         what = "tripped" if now.tripped else "in fault when first seen"
         text = f"{what}: {_called(now)}{_behind(first, now)}."
@@ -146,7 +145,7 @@ class LineAlarms:
         return True
 
     def acknowledge(self, device: int) -> None:
-        """A person has looked at the fault of a drive."""
+        """Note that a person has viewed the fault of a drive."""
         fault = self._active.get(device)
         if fault is not None and not fault.seen:
             self._active[device] = replace(fault, seen=True)
@@ -157,7 +156,7 @@ def _called(fault: PresentFault) -> str:
 
 
 def _behind(first: PresentFault | None, now: PresentFault) -> str:
-    """A clause for a fault that is not the first of its line."""
+    """Return a clause that names the earlier fault of the line; empty if there is none."""
     if first is None or first.device == now.device or not now.tripped:
         return ""
     if not first.tripped:

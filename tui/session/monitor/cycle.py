@@ -1,4 +1,4 @@
-"""A cycle of a watched drive for a recorder: good is what was read in that very cycle."""
+"""A monitor's cycle for a recorder: only values read in that cycle count as good."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .snapshot import Snapshot
 
 
 def as_read(profile: Profile, codes: Sequence[str], snapshot: Snapshot, since: float) -> Snapshot:
-    """The cycle with all codes in their order; what was not read after `since` is stale.
+    """Return the cycle with exactly these codes; values not read after `since` are stale.
 
-    `since` is when the cycle before ended (monotonic). What was never read is bad, and says why.
-    Its state follows from the present ones.
+    `since` is the end of the previous cycle (monotonic). A code that was never read gets a bad
+    reading with the reason. The state follows from the good readings only.
     """
     readings: dict[str, Reading] = {}
     last = with_text(snapshot.readings)

@@ -1,6 +1,6 @@
-"""The last seconds before a trip: the values as they were seen, and what was written from here.
+"""Record of a trip: the values and this program's writes in the seconds before it.
 
-Frozen when the drive goes into a fault, and kept until the next trip.
+It is taken when the drive trips, and kept until the next trip.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SECONDS_KEPT = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The values of one cycle; `wall` is time.time()."""
+    """Values of one cycle: `time` is monotonic, `wall` in seconds since 1970."""
 
     time: float
     wall: float
@@ -40,11 +40,11 @@ class FaultRecord:
     """A trip and the seconds before it."""
 
     time: float
-    """When it was seen (monotonic)."""
+    """When the fault was first read (monotonic)."""
     wall: float
     fault: FaultCode | None
     codes: tuple[str, ...]
-    """Codes of the values in `moments`, in their order."""
+    """Codes of the values in each moment, in the order of its texts."""
     headings: tuple[str, ...]
     moments: tuple[Moment, ...]
     writes: tuple[Entry, ...]
@@ -53,19 +53,19 @@ class FaultRecord:
 
 @dataclass(slots=True)
 class Recorder:
-    """Listens to the monitor of one drive; `take` is called in the line's thread."""
+    """Records the trips of one drive from its monitor's snapshots."""
 
     session: DriveSession
     journal: Journal
     latest: FaultRecord | None = None
-    """The last trip that was seen happen."""
+    """Last trip that occurred while the drive was monitored."""
     seen: bool = True
-    """True if a person has looked at it."""
+    """True if a person has viewed it."""
     _moments: deque[tuple[Snapshot, float]] = field(default_factory=deque)
     _kind: str = "unknown"
 
     def take(self, snapshot: Snapshot) -> None:
-        """Keep a snapshot; freeze the record where it is the first one of a fault."""
+        """Keep a snapshot; the first one of a fault creates the record. In the line's thread."""
         if snapshot.error or snapshot.state.kind == "unknown":
             return
         self._moments.append((snapshot, snapshot.time))
@@ -76,7 +76,7 @@ class Recorder:
             self.latest = self._freeze(snapshot)
             self.seen = False
         elif self._kind == "fault" and self.latest is not None and self.latest.fault is None:
-            # the word of the fault may be read a cycle after the state
+            # the fault code may be read a cycle after the state
             self.latest = replace(self.latest, fault=snapshot.state.fault)
 
     def _freeze(self, now: Snapshot) -> FaultRecord:
@@ -98,7 +98,7 @@ class Recorder:
         return FaultRecord(now.time, now.wall, now.state.fault, codes, headings, moments, writes)
 
     def acknowledge(self) -> None:
-        """A person has seen it."""
+        """Note that a person has viewed the record."""
         self.seen = True
 
 
@@ -125,10 +125,10 @@ def record_text(
     stored: Sequence[tuple[str, str, str]],
     values: Mapping[str, str] | None = None,
 ) -> str:
-    """A record as Markdown: the fault, what it points at, what the drive stored, values, writes.
+    """Format a record as Markdown: fault, likely causes, the drive's stored data, values, writes.
 
-    `stored` is code, name and value of what the drive itself keeps of its last fault, `values`
-    what parameters held when they were looked at, by code.
+    `stored` lists code, name and value of the drive's own data about its last fault. `values` maps
+    codes to the texts of parameters that the causes mention.
     """
     fault = record.fault
     name = (
@@ -168,7 +168,7 @@ def record_text(
 def _pointed_at(
     session: DriveSession, fault: FaultCode | None, values: Mapping[str, str]
 ) -> list[str]:
-    """Return the causes of the fault, if any are known."""
+    """Return the likely causes of the fault as Markdown lines; empty if none are known."""
     help_ = session.profile.guide.fault(fault.raw if fault else None)
     if help_ is None:
         return []

@@ -1,4 +1,4 @@
-"""Troubles that the last minute of a line shows: few good replies, foreign frames, strays."""
+"""Line problems in the last minute: too few good replies, foreign frames, stray replies."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Literal, NamedTuple
 from tui.bus.api import LastMinute, LineCounters
 
 LEAST_REPLIES = 20
-"""Fewer replies in the last minute are too few to judge by."""
+"""Least replies in the last minute for a judgment."""
 POOR, HEALTHY = 0.98, 0.99
-"""A share of good replies below which there is trouble, and from which it is over."""
+"""Share of good replies below which a trouble begins, and from which it ends."""
 SEVERAL_FRAMES = 3
-"""Foreign frames, or strays, from which there is trouble; it is over when a minute has none."""
+"""Foreign frames or strays in a minute that make a trouble; it ends after a minute with none."""
 HEALTHY_AGAIN = "The line is healthy again: {} % of the replies were good in the last minute."
 
 TroubleKind = Literal["poor", "foreign", "strays"]
@@ -23,22 +23,22 @@ class LineTrouble(NamedTuple):
 
     kind: TroubleKind
     signs: tuple[str, ...]
-    """A few words for it: the longest first."""
+    """Short texts for the status bar, longest first."""
     text: str
-    """Event, meaning, and first step."""
+    """What happened, what it means, and the first step."""
 
 
 class LineHealth:
-    """Judges a line by its last minute, again and again; in one thread only."""
+    """Judges a line by its last minute, repeatedly. For one thread only."""
 
     def __init__(self) -> None:
         self.troubles: tuple[LineTrouble, ...] = ()
-        """The troubles at the last look."""
+        """Troubles found by the last call of `look`."""
         self._poor: frozenset[int | None] = frozenset()
-        """Drives with few good replies, None for the line."""
+        """Drives with too few good replies; None stands for the whole line."""
 
     def look(self, counted: LineCounters) -> list[tuple[str, str]]:
-        """Judge by these counts; returns new messages, each after the kind of its event."""
+        """Judge these counts; return the new messages as pairs of event kind and text."""
         line, drives = (
             counted.minute,
             {d: counters.minute for d, counters in counted.devices.items()},
@@ -53,7 +53,7 @@ class LineHealth:
         return [("alarm", trouble.text) for trouble in self.troubles if trouble.kind not in before]
 
     def forget(self) -> None:
-        """Judge again: the line is lost."""
+        """Discard all troubles, because the line is lost."""
         self.troubles, self._poor = (), frozenset()
 
     def _found(
@@ -68,7 +68,7 @@ class LineHealth:
 
 
 def percent(share: float | None) -> str:
-    """A share in whole per cent, in three cells; 100 only where it is."""
+    """Format a share as whole percent in three characters, rounded down."""
     return " --" if share is None else f"{int(100 * share):>3}"
 
 
@@ -84,10 +84,10 @@ def _is_poor(minute: LastMinute, was_poor: bool) -> bool:
 def _few_good(
     line: LastMinute, drives: dict[int, LastMinute], poor: frozenset[int | None]
 ) -> LineTrouble:
-    """The line has few good replies, or the worst of its drives alone."""
+    """Describe too few good replies, of the line or of its worst drive."""
     shares = {device: minute.share for device, minute in drives.items() if minute.share is not None}
     if None in poor:
-        # by what it missed: of a few replies, one lost is much
+        # by the number of bad replies: in a small total, one lost reply is a large share
         worst = max(shares, key=lambda item: drives[item].replies - drives[item].good, default=0)
     else:
         worst = min((number for number in poor if number), key=lambda item: shares[item])

@@ -1,8 +1,8 @@
-"""Looking after every drive found on a line, watched or not.
+"""Keep-alive reads and state checks for every drive found on a line, monitored or not.
 
-Some drives watch the line and trip when it falls silent (communication timeout). The holder of the
-line reads them as long as this program is on it, at least three times in each timeout, before polls
-and before an operator's own requests. Other requests show the state of the drives in a list.
+Some drives trip if communication stops (communication timeout). While this program is attached,
+the keeper reads them at least three times in each timeout, before polls and an operator's requests.
+Further reads show the state of the drives in a list.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ GLANCE_QUANTITIES: tuple[Quantity, ...] = (
     "motor_current",
 )
 MAY_TURN = frozenset({"running", "unknown"})
-"""Kinds of state in which a motor that was commanded from here is not left alone unasked."""
+"""Kinds of state in which a motor that this program commanded may turn."""
 GLANCE = 3.0
-"""Seconds between two looks at a drive that no monitor watches."""
+"""Seconds between two checks of a drive without a running monitor."""
 GLANCE_EACH = 0.15
-"""Seconds of that for each drive of the line."""
+"""Least seconds for each drive of the line, if there are many."""
 LEARN_AGAIN = 20.0
-"""Seconds after which a drive's timeout and reaction are read again: they may be changed."""
+"""Seconds after which a drive's timeout and reaction are read again: someone may change them."""
 SHORTEST = 0.02
 
 
@@ -63,23 +63,23 @@ class _Kept:
 
 
 class LineWatch:
-    """Asks each kept drive often enough, in workers of the line's loop."""
+    """Keeps drives alive and checks their states, in workers of the line's loop."""
 
     def __init__(self, line: ModbusLine) -> None:
         self._line = line
         self._kept: dict[int, _Kept] = {}
         self._changing = threading.RLock()
-        """Held while a drive comes or goes, and while it is kept alive."""
+        """Held while a drive is added or removed, and while its keep-alive read changes."""
         self._looks: dict[int, Look] = {}
         self.onsets = FaultOnsets()
 
     @property
     def looks(self) -> Mapping[int, Look]:
-        """The last look at each drive, by device."""
+        """The last check of each drive, by device."""
         return dict(self._looks)
 
     def watch(self, device: int) -> TimeoutWatch | None:
-        """A drive's watch over the line, once it is known and not off."""
+        """Return a drive's communication timeout; None if it is unknown or off."""
         kept = self._kept.get(device)
         return self._watch(kept) if kept else None
 
@@ -95,7 +95,7 @@ class LineWatch:
         return state is not None and state.motion == "running" and not state.local
 
     def left_alone(self) -> dict[int, TimeoutWatch]:
-        """Drives that react to their communication timeout when polling stops, at rest too."""
+        """Return the drives that react when polling stops, by device; a trip counts at rest too."""
         found = {device: self.watch(device) for device in self._kept}
         return {
             device: watch
@@ -104,7 +104,7 @@ class LineWatch:
         }
 
     def unread(self) -> list[DriveSession]:
-        """Drives whose timeout was not read yet: what they do left alone is not known."""
+        """Return the drives whose timeout was not read yet."""
         return [
             kept.session
             for kept in self._kept.values()
@@ -112,7 +112,7 @@ class LineWatch:
         ]
 
     def under_command(self) -> list[DriveSession]:
-        """Drives that this program commanded and whose motors are not surely at standstill."""
+        """Return the drives that this program commanded and whose motors may still turn."""
         return [
             kept.session
             for kept in self._kept.values()
@@ -120,7 +120,7 @@ class LineWatch:
         ]
 
     def runs(self, device: int) -> bool:
-        """Return True if a motor runs, as far as anybody saw it last."""
+        """Return True if a motor ran in its last known state."""
         state, _ = self._last_seen(self._kept[device])
         return state is not None and state.motion == "running"
 
@@ -132,7 +132,7 @@ class LineWatch:
         return None if kind == "unknown" else kind in ENABLED_KINDS
 
     def _may_turn(self, kept: _Kept) -> bool:
-        """Return True if a motor runs, or may: not seen since the last order, or not understood."""
+        """Return True if a motor runs, or its state is unknown or older than the last command."""
         state, seen = self._last_seen(kept)
         ordered = kept.session.commanded_at
         if state is None or (ordered is not None and seen <= ordered):
@@ -140,7 +140,7 @@ class LineWatch:
         return state.motion in MAY_TURN
 
     def _last_seen(self, kept: _Kept) -> tuple[DriveState | None, float]:
-        """The newest state of a drive, by its own monitor or by a look; and when that was."""
+        """Return a drive's latest state, from its monitor or a check, and its time (monotonic)."""
         look, latest = self._looks.get(kept.session.device), kept.monitor.latest
         state, seen = (look.state, look.time) if look else (None, 0.0)
         if latest is not None and latest.time > seen and not latest.error:
@@ -149,16 +149,16 @@ class LineWatch:
 
     @property
     def states(self) -> dict[int, DriveState]:
-        """The newest state of each drive that was seen at all, by device."""
+        """The latest known state of each drive, by device."""
         seen = {device: self._last_seen(kept)[0] for device, kept in self._kept.items()}
         for device, look in self._looks.items():
             if seen.get(device) is None and look.before is not None:
-                # a drive that is not heard for a moment is not one without its fault
+                # a drive that is lost for a moment still has its fault
                 seen[device] = look.before.state
         return {device: state for device, state in seen.items() if state is not None}
 
     def warnings(self) -> list[TimeoutWarning]:
-        """Drives that are about to act on their timeout, or have, for want of an answer."""
+        """Return the drives whose silence is near or beyond their communication timeout."""
         found = []
         for device, kept in self._kept.items():
             watch = self._watch(kept)
@@ -174,14 +174,14 @@ class LineWatch:
         return kept.session.clock.line_time(heard) if heard else kept.since
 
     def keep(self, session: DriveSession, monitor: Monitor) -> None:
-        """Look after a drive from now on; its monitor, while it runs, spares the looks."""
+        """Keep a drive alive, and check its state whenever its monitor is not running."""
         device = session.device
         kept = _Kept(session, monitor, Reader(session), session.clock.monotonic())
         with self._changing:
             if device in self._kept:
                 self._let_go(self._kept[device])
             self._kept = {**self._kept, device: kept}
-            # until it is learnt, too: words that the drive does not have may take seconds
+            # before the timeout is known, too: reads of missing words may take seconds
             self._keep_alive(kept, UNKNOWN_TIMEOUT)
         kept.workers = (
             self._line.spawn(lambda: self._again(kept, self._learn), f"learner {device}"),
@@ -189,7 +189,7 @@ class LineWatch:
         )
 
     def stop(self) -> None:
-        """Let every drive go."""
+        """Stop all checks and keep-alive reads."""
         with self._changing:
             for kept in self._kept.values():
                 self._let_go(kept)
@@ -202,7 +202,7 @@ class LineWatch:
         self._line.facts.keep_alives.let_go(kept.session.device)
 
     def _keep_alive(self, kept: _Kept, timeout: float | None) -> None:
-        """Have a drive kept from its timeout; None if it has none."""
+        """Set the keep-alive read for a timeout in seconds; None removes it."""
         read = alive_read(kept.session, timeout) if timeout is not None else None
         if read is None:
             self._line.facts.keep_alives.let_go(kept.session.device)
@@ -210,7 +210,7 @@ class LineWatch:
             self._line.facts.keep_alives.keep(read)
 
     async def _again(self, kept: _Kept, step: Callable[[_Kept], Awaitable[float]]) -> None:
-        """Do a step for good; it says how many seconds later it is due again."""
+        """Repeat a step forever; it returns the seconds until the next call."""
         while True:
             try:
                 rest = await step(kept)
@@ -219,7 +219,7 @@ class LineWatch:
                     kept.session.byte_order.forget()
                 rest = self._after_failure(kept)
             except Exception:
-                # what goes wrong with one drive must not leave the others alone
+                # an error with one drive must not end the checks of the others
                 log.exception("looking after device %s failed", kept.session.device)
                 rest = GLANCE
             await kept.session.clock.sleep(max(SHORTEST, rest))
@@ -230,7 +230,7 @@ class LineWatch:
         return min(1.0, timeout / READS_PER_TIMEOUT / 2)
 
     async def _glance(self, kept: _Kept) -> float:
-        """Look at a drive's state, unless its monitor does."""
+        """Read a drive's state, unless its monitor is running; return seconds to the next call."""
         if kept.monitor.running:
             return GLANCE / 10
         profile, device = kept.session.profile, kept.session.device
@@ -241,7 +241,7 @@ class LineWatch:
             reported = channel_codes(profile)
             codes += [code for code in reported if profile[code].access == "r"]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
-            # settings are read with the timeout: another channel is set up at rest only
+            # settings are read with the timeout only: they change at standstill only
             settings = {
                 c: reading for c in reported if (reading := kept.session.image.get(c)) is not None
             }
@@ -260,14 +260,14 @@ class LineWatch:
 
     @property
     def glance_period(self) -> float:
-        """Seconds between two looks at a drive.
+        """Seconds between two checks of a drive.
 
-        Longer where many drives share the line, so that looks leave it to the others.
+        Longer if many drives share the line, so that the checks do not load it.
         """
         return max(GLANCE, GLANCE_EACH * len(self._kept))
 
     async def _learn(self, kept: _Kept) -> float:
-        """Read the drive's timeout and its reaction; before that, how its words arrive."""
+        """Check the byte order, then read the drive's timeout and its reaction."""
         await check_byte_order(kept.reader, Priority.POLL)
         found = await read_timeout(kept.reader, Priority.POLL, deciding_codes(kept.session.profile))
         kept.session.timeout = found
@@ -280,7 +280,7 @@ class LineWatch:
 
 
 def _glance_codes(profile: Profile) -> list[str]:
-    """Return the codes that a list of drives shows beside a motor's state."""
+    """Return the codes of the values that a list of drives shows with the state."""
     found = (profile.quantity(quantity) for quantity in GLANCE_QUANTITIES)
     return [parameter.code for parameter in found if parameter is not None]
 

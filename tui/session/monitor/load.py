@@ -1,4 +1,4 @@
-"""Share of its rated current that a motor draws, from values of its drive."""
+"""Motor current as a share of the rated current, from values of the drive."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..shown import Shown
 
 
 def _limit(profile: Profile) -> str:
-    """The end of the current's bar: a number, or the code of the parameter that holds it."""
+    """Return the upper limit of the current: a number, or the code of its parameter."""
     current = profile.quantity("motor_current")
     values = profile.data.monitoring.values
     return next((v.high for v in values if current and v.parameter == current.code), "")
 
 
 def unread_limit(session: DriveSession) -> list[str]:
-    """The parameter that holds the rated current, while it was neither read nor refused."""
+    """Return the code of the rated current if it was neither read nor refused yet."""
     code, image = _limit(session.profile), session.image
     if session.profile.get(code) is None or code in image.raws or code in image.refused:
         return []
@@ -26,7 +26,7 @@ def unread_limit(session: DriveSession) -> list[str]:
 
 
 def share_of_limit(session: DriveSession, current: Shown | None) -> float | None:
-    """The motor current over its limit, 1 where they are the same; None where one is not known."""
+    """Return the motor current divided by its limit; None if one of them is not known."""
     limit = _limit_number(session)
     if current is None or not limit:
         return None

@@ -1,4 +1,4 @@
-"""Looks at a drive that no monitor watches."""
+"""Check of a drive without a running monitor."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ..shown import Shown
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Result of the last check of a drive."""
+    """Result of one check of a drive; `time` is monotonic."""
 
     state: DriveState | None
     error: str
     time: float
     timeout: float | None
-    """The drive's communication timeout in seconds, if it is one that runs already."""
+    """The drive's communication timeout in seconds; None unless it is active."""
     readings: Mapping[str, Shown] = field(default_factory=dict)
     """Values read with the state: output frequency, its reference, motor current."""
     before: Look | None = None
-    """The last look that brought something, where this one brought nothing."""
+    """The last successful check, if this one failed."""
     contact: Contact = "answers"
-    """Result of the requests of this look."""
+    """Result of the requests of this check."""
 
 
 def last_that_brought(look: Look | None) -> Look | None:
-    """The look itself if it brought something, else the last one before that did."""
+    """Return the check itself if it succeeded, else the last successful one before it."""
     return look.before if look is not None and look.error else look

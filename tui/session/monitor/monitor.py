@@ -1,7 +1,7 @@
-"""Watching one drive from the line's own loop, whatever the screen does.
+"""Cyclic polls of one drive in the line's own loop, independent of the screens.
 
-The monitor keeps the latest snapshot; a screen takes it when it likes. Nothing is queued for
-a screen, so a terminal that is not read costs the drive nothing.
+The monitor keeps only the latest snapshot, and a screen reads it when it draws. Nothing is queued
+for a screen, so a blocked terminal does not delay the polls.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 SHORTEST_PERIOD = 0.05
 CONTACT_MADE: Contact = "answers"
 RESET_NEAR = frozenset({"fault", "starting", "unknown"})
-"""Kinds of state in or after which a drive is reset, maybe without falling silent."""
+"""Kinds of state in or after which a drive may be reset, even without a lost reply."""
 FORGOTTEN_AFTER = 3
 """Failed cycles in a row after which another drive may answer."""
 RESTART_AFTER = 1.0
@@ -48,7 +48,7 @@ Listener = Callable[[Snapshot], None]
 
 
 class NotAsked(DriveError):
-    """A drive was left alone on purpose, and why."""
+    """A drive is not polled on purpose; the text gives the reason."""
 
 
 class Monitor:
@@ -60,19 +60,22 @@ class Monitor:
         self.device = session.device
         self.profile = session.profile
         self.period = 0.5
-        """Target cycle time in seconds; read again at each."""
+        """Target cycle time in seconds; a change applies from the next cycle on."""
         self.held_back: Callable[[], str] = lambda: ""
-        """Asked before each cycle, in the line's thread: why the drive must not be asked now."""
+        """Returns why the drive must not be polled now; empty to poll it.
+
+        Called before each cycle, in the line's thread.
+        """
         self.freely: Callable[[], bool] = lambda: True
-        """True if a cycle may be read before `held_back` is asked about it."""
+        """Returns True if the keeper may read cycles without a call of `held_back` for each."""
         self.reader = Reader(session)
         self._steady = SteadyCycles(session, self.reader)
         self.restarts = 0
-        """Number of times that watching failed by an internal error and was restarted."""
+        """Number of restarts after an internal error."""
         self._latest: Snapshot | None = None
         self._using = ""
         self._kind = "unknown"
-        """Kind of the state that was last read."""
+        """Kind of the last state read."""
         self._all_due = True
         self._stirs = 0
         self._learn_due = True
@@ -83,7 +86,7 @@ class Monitor:
 
     @property
     def latest(self) -> Snapshot | None:
-        """The last snapshot, or None before the first cycle ended."""
+        """The last snapshot; None until the first cycle ends."""
         return self._latest
 
     @property
@@ -93,11 +96,14 @@ class Monitor:
 
     @property
     def running(self) -> bool:
-        """True if the worker is at work."""
+        """True from `start` to `stop`, unless the line has ended the worker."""
         return self._worker is not None and not self._worker.done()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call a function with every snapshot, in the line's thread; returns the way out."""
+        """Call a function with every snapshot, in the line's thread.
+
+        Returns a function that ends this.
+        """
         self._listeners = (*self._listeners, listener)
 
         def leave() -> None:
@@ -114,10 +120,10 @@ class Monitor:
         *,
         extra: Sequence[str] = (),
     ) -> None:
-        """Watch these codes, by default the profile's monitoring set.
+        """Poll these codes (default: the profile's monitoring set).
 
-        `extra` are read as seldom as the slow values: histories, inputs, hours. `period` is the
-        target cycle time in seconds.
+        `extra` codes are read at the slow rate: histories, inputs, hours. `period` is the target
+        cycle time in seconds.
         """
         self.stop()
         self._notes.ask()
@@ -133,14 +139,14 @@ class Monitor:
         )
 
     def stop(self) -> None:
-        """Stop watching; an exchange in flight ends without help."""
+        """Stop polling; does not wait for an exchange in progress."""
         if self._worker is not None:
             self._worker.cancel()
             self._worker = None
         self._notes.end()
 
     async def _keep_watching(self, rates: Rates) -> None:
-        """Watch for good: an unforeseen error is reported, and watching restarts."""
+        """Poll until cancelled; report an internal error and restart after it."""
         while True:
             try:
                 await self._watch(rates)
@@ -152,7 +158,7 @@ class Monitor:
                 await self.session.clock.sleep(RESTART_AFTER)
 
     def _tell_failure(self, text: str) -> None:
-        """The values of before, as old as they are, with why there are no new ones."""
+        """Publish the last values with their age, and the reason why there are no new ones."""
         if (latest := self._latest) is None:
             return
         clock = self.session.clock
@@ -162,7 +168,7 @@ class Monitor:
         self._hand_out(snapshot)
 
     def _hand_out(self, snapshot: Snapshot) -> None:
-        """Give a snapshot to every listener; one that fails hurts no other."""
+        """Pass a snapshot to every listener; an error in one does not affect the others."""
         for listener in self._listeners:
             try:
                 listener(snapshot)
@@ -208,7 +214,7 @@ class Monitor:
                     failures = 0
                     due.came()
                     begun.append(started)
-                # by now other monitors have told their wishes
+                # other monitors may have claimed their share of the line during the cycle
                 period = self._period(rates)
                 self._publish(cycle, readings, rates, _span(begun, period), error, contact)
                 if not error:
@@ -223,7 +229,7 @@ class Monitor:
             self.line.pace.release(self)
 
     async def _goes_on(self, rates: Rates, due: Rotation, at: float) -> bool:
-        """Wait for the next cycle from the line's holder; False if it is to be read from here."""
+        """Wait for the keeper's next cycle; return False if this program must read it."""
         if due.owes or not self.freely():
             return False
         seldom = (*rates.seldom, *self.session.followed)
@@ -231,19 +237,19 @@ class Monitor:
         return await self._steady.next(plan, due, at)
 
     def _period(self, rates: Rates) -> float:
-        """The target cycle time, longer where the line cannot keep it for all."""
+        """Return the target cycle time in seconds; longer if the line cannot keep it for all."""
         cost = self.reader.seconds(rates.fast)
         cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
         return self.line.pace.claim(self, self.device, cost, max(self.period, SHORTEST_PERIOD))
 
     def _may_be_another(self, fault: Exception, failures: int) -> bool:
-        """Return True if after a failed cycle what was learned of the drive may be wrong."""
+        """Return True if another drive may answer, or this one was reset, after a failed cycle."""
         if failures >= FORGOTTEN_AFTER or isinstance(fault, LineLost | LineClosed):
             return True
         return self._kind in RESET_NEAR
 
     async def _learn(self, cycle: int) -> None:
-        """See now and then what the drive's block brings; what fails is asked again next time."""
+        """Learn or compare the slots of the drive's block; the next cycle retries a failure."""
         with suppress(LineError, DriveError):
             if self._learn_due or cycle % SLOW_FACTOR == 0:
                 self._learn_due = True
@@ -255,7 +261,7 @@ class Monitor:
     async def _cycle(
         self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
     ) -> dict[str, Reading]:
-        """All readings of one cycle; the state's details as soon as it changes."""
+        """Read the values of one cycle, and the details of the state if it has changed."""
         codes, received = (*rates.fast, *turn), self._steady.received
         found = await self.reader.read(codes, priority=Priority.POLL, polled=received)
         self._using = self.reader.using
@@ -307,7 +313,7 @@ class Monitor:
 
 
 def _span(begun: Sequence[float], period: float) -> float:
-    """Seconds from one cycle to the next, as they were."""
+    """Return the measured seconds from one cycle to the next; `period` at least."""
     if len(begun) < 2:
         return period
     return max(period, (begun[-1] - begun[0]) / (len(begun) - 1))

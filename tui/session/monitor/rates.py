@@ -1,4 +1,4 @@
-"""Read rate of each value of a profile's monitoring set."""
+"""Read rates of the values of a profile's monitoring set."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from tui.drive.profile.profile import Profile
 from ..reading import Reading
 
 SLOW_FACTOR = 10
-"""Cycles of the fast values to one of the slow ones."""
+"""Number of cycles in which each slow value is read once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """Codes by how often they are read."""
+    """Codes grouped by read rate: `fast` ones are read in every cycle."""
 
     fast: tuple[str, ...]
     changing: tuple[str, ...] = ()
-    """Details of the state: read when it changes, in every cycle of a fault or an alarm, and
-    with the slow ones."""
+    """Details of the state. Read when it changes, in every cycle of a fault or an alarm, and at
+    the slow rate."""
     slow: tuple[str, ...] = ()
     key: tuple[str, ...] = ()
-    """Those of the fast ones that show the state."""
+    """The fast codes that show the state."""
 
     @property
     def seldom(self) -> tuple[str, ...]:
@@ -32,7 +32,7 @@ class Rates:
 
 
 def bad_readings(profile: Profile, rates: Rates, now: float, why: str) -> dict[str, Reading]:
-    """None of these values is to be shown, and why."""
+    """Return a bad reading with this reason for every code, so that no value is shown."""
     return {code: Reading.bad(profile[code], now, why) for code in (*rates.fast, *rates.seldom)}
 
 
@@ -47,7 +47,7 @@ def rates_of(profile: Profile) -> Rates:
     }
     if code := fault_code(profile):
         reported[code] = (
-            "fast"  # it tells the state, and one that was reset must not stand beside it
+            "fast"  # the state must not appear with a fault that was reset in the meantime
         )
     fast, change, slow = (
         tuple(code for code in codes if reported[code] == rate)
@@ -58,7 +58,7 @@ def rates_of(profile: Profile) -> Rates:
 
 
 def monitoring_codes(profile: Profile) -> list[str]:
-    """Codes of a profile's monitoring set with the words that show its state and fault."""
+    """Return the codes of a profile's monitoring set, and of the words for state and fault."""
     codes = [value.parameter for value in profile.data.monitoring.values]
     codes += watched_codes(profile)
     if profile.data.faults.parameter:

@@ -13,48 +13,47 @@ from ..shown import Shown
 from .rates import SLOW_FACTOR
 
 TOO_SLOW = 1.2
-"""A cycle takes too long from so many times the wished one."""
+"""A cycle is too slow if it takes more than this many times the target cycle time."""
 
 
 def stale_after(cycle: float, *, often: bool = True) -> float:
-    """Seconds after which a value is no longer the present one, for a cycle of so many seconds.
+    """Return the age in seconds from which a value is stale, for a cycle time in seconds.
 
-    What is not read in every cycle has as many times longer.
+    Values of the slow rate (`often` false) have SLOW_FACTOR times longer.
     """
     return STALE_CYCLES * cycle * (1 if often else SLOW_FACTOR)
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """All values of one cycle, or the last ones with the error of a cycle that failed."""
+    """Values of one cycle; after a failed cycle, the last values with its error."""
 
     cycle: int
     time: float
-    """When it was taken (monotonic)."""
+    """End of the cycle (monotonic)."""
     wall: float
-    """The same as time.time()."""
+    """End of the cycle in seconds since 1970."""
     readings: Mapping[str, Shown]
     state: DriveState
     rate: float
-    """Cycles a second as they were; 0 while nothing answers."""
+    """Measured cycles per second; 0 after a failed cycle."""
     error: str
-    """Why this cycle brought nothing, or empty."""
+    """Why this cycle failed; empty if it succeeded."""
     line: LineState
     block: str = ""
-    """The block or scanner that brought some of the values."""
+    """Name of the block or scanner that returned some of the values; empty if none."""
     period: float = 0.5
-    """Seconds from one cycle to the next, as they were."""
+    """Measured cycle time in seconds."""
     wished: float = 0.5
-    """Seconds from one cycle to the next, as they should be."""
+    """Target cycle time in seconds."""
     contact: Contact = "answers"
     """Result of the requests of this cycle."""
 
     @property
     def too_slow(self) -> bool:
-        """True if the line does not keep the wished cycle time."""
+        """True if the line does not keep the target cycle time."""
         return self.period > TOO_SLOW * self.wished
 
     def is_stale(self, now: float) -> bool:
-        """Return True if no cycle has ended for so long that nothing here is the present any
-        more."""
+        """Return True if the last cycle ended so long ago that none of its values is current."""
         return now - self.time > max(stale_after(self.period), STALE_LEAST)

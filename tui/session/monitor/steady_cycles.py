@@ -21,19 +21,19 @@ from ..read.rotation import Rotation
 from ..reading import Reading
 
 PATIENCE, PATIENCE_CYCLES = 5.0, 3
-"""Seconds, and cycles, without a cycle from the keeper after which this program reads the drive."""
+"""Seconds, and cycles, to wait for the keeper's next cycle before this program reads the drive."""
 
 LONGEST_STEADY = 10.0
-"""Longest period in seconds of cycles that the keeper reads. For longer ones a message a request
-costs nothing, and this program can skip each at the last moment."""
+"""Longest period in seconds of cycles that the keeper reads. For longer periods, one message per
+request costs little, and this program can skip a cycle at the last moment."""
 
 Turns = tuple[tuple[str, ...], ...]
-"""The slow values of each cycle, until each has been read once."""
+"""Slow values by cycle; all turns together read each of them once."""
 
 
 @dataclass(frozen=True, slots=True)
 class SteadyPlan:
-    """Reads of steady cycles."""
+    """Codes to read in steady cycles; `period` in seconds."""
 
     fast: tuple[str, ...]
     seldom: tuple[str, ...]
@@ -43,7 +43,7 @@ class SteadyPlan:
 class SteadyCycles:
     """Has the keeper read a drive while the cycles stay the same.
 
-    A program that holds its line itself reads the drive itself. Used in the line's loop only.
+    Without a keeper, the program reads the drive itself. For the line's loop only.
     """
 
     def __init__(self, session: DriveSession, reader: Reader) -> None:
@@ -55,7 +55,7 @@ class SteadyCycles:
         self._turns: Turns = ()
         self._reads: Sequence[PlannedTurn] = ()
         self._shift = self._next = 0
-        """The first turn of the subscription, and the turn after the last one received."""
+        """First turn of the subscription, and the turn after the last one received."""
         self._subscription: Subscription | None = None
         self._unfit = False
         """True if the keeper cannot carry out this plan."""
@@ -63,7 +63,7 @@ class SteadyCycles:
         """The cycle received from the keeper; None if this program reads the cycle."""
 
     def turn(self, due: Rotation, seldom: tuple[str, ...]) -> tuple[str, ...]:
-        """The slow values of the current cycle."""
+        """Return the slow values of the current cycle."""
         if self.received is None or due.owes:
             return due.turn(seldom, self._reader.groups)
         index = (self.received.turn + self._shift) % len(self._turns)
@@ -84,7 +84,7 @@ class SteadyCycles:
         return max((self._clock.line_time(self.received.ended), *times))
 
     async def next(self, plan: SteadyPlan, due: Rotation, at: float) -> bool:
-        """Wait for a cycle of the keeper; False if this program must read the next one."""
+        """Wait for the keeper's next cycle; return False if this program must read it."""
         last, self.received = self.received, None
         if (carrier := self._line.pace.carrier) is None:
             self.end()
@@ -103,7 +103,7 @@ class SteadyCycles:
         return self.received is not None
 
     def _follow(self, carrier: PollCarrier, plan: SteadyPlan, turns: Turns, at: float) -> None:
-        """Have the keeper carry out this plan, if it does not yet."""
+        """Subscribe to this plan at the keeper, unless it carries it out already."""
         reads = [self._reader.planned((*plan.fast, *turn)) for turn in turns]
         shift = self._next % len(turns)
         subscription, before = self._subscription, self._plan
@@ -125,7 +125,7 @@ class SteadyCycles:
             self._unfit = True  # a read of this program reports the reason
 
     def end(self) -> None:
-        """End the subscription."""
+        """End the subscription, if there is one."""
         self.received = None
         if self._subscription is not None:
             self._subscription.end()

@@ -1,4 +1,4 @@
-"""A drive's communication timeout: how long it waits for the line, and what it does then."""
+"""A drive's communication timeout: its length, its reaction, and whether it is active."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..timeout_report import Timeout, TimeoutWatch
 
 @dataclass(frozen=True, slots=True)
 class TimeoutWarning:
-    """A drive that was not heard for a good part of its timeout; times in seconds."""
+    """Drive without a reply for a large part of its timeout; times in seconds."""
 
     device: int
     profile: Profile
@@ -28,12 +28,12 @@ class TimeoutWarning:
 
     @property
     def left(self) -> float:
-        """Seconds until the drive acts; below zero it has."""
+        """Seconds until the drive reacts; negative if it has reacted."""
         return self.watch.timeout - self.silent
 
 
 def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
-    """Return the reaction of one family's drives when polling stops, in a sentence."""
+    """Return a sentence with the reaction of drives of one family when polling stops."""
     it = "it" if len(sessions) == 1 else "each"
     if watch is None:
         return f"{names_of(sessions)}: without communication {it} goes on: it has no timeout."
@@ -49,16 +49,16 @@ def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
 
 
 def names_of(sessions: Sequence[DriveSession]) -> str:
-    """Drives of one family as a person calls them: by device, and the family."""
+    """Return the device addresses and the family name of drives of one family."""
     word = "Device" if len(sessions) == 1 else "Devices"
     devices = ", ".join(str(session.device) for session in sessions)
     return f"{word} {devices}, {sessions[0].profile.name}"
 
 
 async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str] = ()) -> Timeout:
-    """Read a drive's communication watch; raises the line's errors.
+    """Read a drive's communication timeout and reaction; `besides` are codes to read with them.
 
-    Codes named `besides` are read with it.
+    Raises the line's errors.
     """
     session = reader.session
     rules = session.profile.data.communication_fault
@@ -86,9 +86,10 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
 async def timeouts_of_ports(
     reader: Reader, rules: CommunicationFault, priority: Priority
 ) -> list[Reading]:
-    """The timeout of each port of a drive; a port that it does not have may meet silence.
+    """Read the timeout of each port of a drive; the drive may not answer for a port it lacks.
 
-    Raises the line's errors, NoAnswer only if the drive does not report its state either.
+    Raises the line's errors; NoAnswer only if the drive does not answer at all, or if its family
+    answers every read and no timeout was read.
     """
     found: list[Reading] = []
     silent: NoAnswer | None = None
@@ -101,7 +102,7 @@ async def timeouts_of_ports(
                 raise
             await look_for_drive(reader.session, error)
             silent, now = error, reader.session.clock.monotonic()
-            # polls ask once more, later on: one lost reply is no missing word
+            # `silent` only after the second time: one lost reply does not mean a missing word
             again = code in image.refused
             image.take({code: Reading.bad(reader.profile[code], now, str(error), silent=again)})
     if silent is not None and not found and not meets_silence(reader.profile):
@@ -110,7 +111,7 @@ async def timeouts_of_ports(
 
 
 def _related_words(session: DriveSession, rules: CommunicationFault) -> list[str]:
-    """Codes of the words that show the reaction, and whether the watch has begun."""
+    """Return the codes of the words that show the reaction, and whether the timeout is active."""
     codes = [rules.reaction] if rules.reaction else []
     if rules.needs_write and not session.reported_by_line:
         codes += [chart.command for chart in session.profile.data.charts if chart.command]
@@ -118,7 +119,7 @@ def _related_words(session: DriveSession, rules: CommunicationFault) -> list[str
 
 
 def timeout_now(session: DriveSession) -> Timeout:
-    """Return a drive's known timeout, and whether it runs by now."""
+    """Return a drive's known timeout; its watch is active if it has begun since the last read."""
     found = session.timeout or Timeout(known=False)
     if found.watch is not None and found.watch.acts and has_begun(session):
         return replace(found, watch=replace(found.watch, active=True))
@@ -126,10 +127,10 @@ def timeout_now(session: DriveSession) -> Timeout:
 
 
 def has_begun(session: DriveSession) -> bool:
-    """Return True if a drive watches the line now, as far as is known.
+    """Return True if a drive's communication timeout has begun, as far as known.
 
-    Some do so once a command or reference was written to them by any master: the command word that
-    the drive holds shows it, and this program's own writes.
+    In some families it begins when any master writes a command or reference. The command word in
+    the drive shows such a write, and this program knows its own.
     """
     rules = session.profile.data.communication_fault
     if rules is None or not rules.needs_write or session.reported_by_line:
@@ -139,7 +140,7 @@ def has_begun(session: DriveSession) -> bool:
 
 
 def timeout_seconds(reading: Reading, off: int | None) -> float | None:
-    """The timeout in seconds; None where it is off or could not be read."""
+    """Return the timeout in seconds; None if it is off or could not be read."""
     number = reading.number
     if reading.raw is None or reading.raw == off or not number:
         return None

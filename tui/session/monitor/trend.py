@@ -1,4 +1,4 @@
-"""The last minutes of some values, for a trend."""
+"""Trend of one drive: the last minutes of some of its values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DIRECTED = frozenset({"output_frequency", "frequency_reference"})
 
 @dataclass(frozen=True, slots=True)
 class TrendPoint:
-    """Values of TREND_QUANTITIES at a time; None where there was none to be trusted."""
+    """Values of TREND_QUANTITIES at a time (monotonic); None for a value that was not read."""
 
     time: float
     values: tuple[float | None, ...]
@@ -42,12 +42,12 @@ class Trend:
 
     @property
     def points(self) -> tuple[TrendPoint, ...]:
-        """The trend of the last minutes, oldest first."""
+        """The points of the last TREND_SECONDS, oldest first."""
         return tuple(self._points)
 
     @property
     def kind(self) -> str:
-        """Kind of its values: trends of the same kind belong together."""
+        """Profile, codes and units: points of trends of the same kind can be joined."""
         parts = [f"trend {self._profile.id}"]
         for code in self._codes:
             parameter = self._profile[code] if code else None
@@ -55,14 +55,14 @@ class Trend:
         return ", ".join(parts)
 
     def join(self, earlier: Iterable[TrendPoint]) -> None:
-        """Add points of another program, at their times."""
+        """Insert points of another program by time."""
         points = {point.time: point for point in (*earlier, *self._points)}
         last = max(points, default=0.0)
         times = sorted(point for point in points if point >= last - TREND_SECONDS)
         self._points = deque(points[time] for time in times)
 
     def add(self, snapshot: Snapshot) -> TrendPoint:
-        """Add a cycle; one that failed leaves a gap in the trend, never a repeated value."""
+        """Add a cycle; a failed cycle leaves a gap, never a repeated value."""
         readings = with_text(snapshot.readings)
         values = tuple(
             trend_value(readings[code], snapshot.state)
@@ -78,7 +78,7 @@ class Trend:
 
 
 def trend_value(reading: Reading, state: DriveState) -> float | None:
-    """A value of the trend, with the sign of its direction where it has one."""
+    """Return a value of the trend; a frequency has the sign of its direction."""
     number, parameter = reading.number, reading.parameter
     if number is None or parameter.quantity not in DIRECTED:
         return number

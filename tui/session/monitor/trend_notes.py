@@ -1,4 +1,4 @@
-"""The trend of a drive, left for the next program on the line."""
+"""Trend of a drive, shared with other programs on the line and kept for the next one."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from tui.bus.shared_state import SharedState
 from .trend import TREND_QUANTITIES, Trend, TrendPoint
 
 NOTED_EVERY = 2.0
-"""Seconds of the trend in one note, about: so many are lost with a program that is killed."""
+"""Seconds of the trend in one note, approximately: a killed program loses as many."""
 MOST_NOTED = 100
 """Points in one note."""
 
 
 class TrendNotes:
-    """Leaves the points of one trend, and takes those that other programs have left.
+    """Shares the points of one trend as notes on the line, and adds those of other programs.
 
-    Times are those of the machine's monotonic clock, which all its programs share.
+    Times are on the computer's monotonic clock, which all its programs share.
     """
 
     def __init__(self, facts: SharedState, device: int, trend: Trend) -> None:
@@ -33,12 +33,12 @@ class TrendNotes:
         self._kind = trend.kind[:LONGEST_KIND]
         self._points: list[TrendPoint] = []
         self._others: list[TrendPoint] = []
-        """Points of other programs that are not in the trend yet."""
+        """Points received from other programs, not in the trend yet."""
         self._requested = False
         self._end: Callable[[], None] | None = None
 
     def ask(self) -> None:
-        """Ask for the trend of other programs; once is enough."""
+        """Request the trend from other programs; only the first call sends a request."""
         if self._end is None:
             self._end = self._events.subscribe(self._hear)
         if not self._requested:
@@ -46,13 +46,13 @@ class TrendNotes:
             self._notes.ask(self._device, self._kind)
 
     def end(self) -> None:
-        """Hear nothing more, until it is asked again."""
+        """Stop receiving notes until the next call of `ask`."""
         if self._end is not None:
             self._end()
             self._end = None
 
     def add(self, point: TrendPoint) -> None:
-        """Leave a point, together with those around it."""
+        """Add a point to the next note, which is sent when it has enough points."""
         if self._others:
             self._trend.join(self._others)
             self._others = []
@@ -72,6 +72,6 @@ class TrendNotes:
 
 
 def _is_whole(point: TrendPoint) -> bool:
-    """True if a trend can be drawn of it."""
+    """True if the point has all values, and no infinite or undefined one."""
     numbers = [point.time, *(value for value in point.values if value is not None)]
     return len(point.values) == len(TREND_QUANTITIES) and all(map(math.isfinite, numbers))

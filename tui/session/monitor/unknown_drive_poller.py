@@ -1,6 +1,6 @@
-"""Drives that answered and of which nothing is known: kept alive, as any may watch the line.
+"""Keep-alive reads for drives that answered but match no profile.
 
-Their reaction to lost polling is in no profile, so the strictest is assumed.
+Their communication timeout is not known, so a short one is assumed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..read.presence import UNKNOWN_TIMEOUT
 
 
 class UnknownDrivePoller:
-    """Each is read by the question that finds drives; whatever it answers, it was asked."""
+    """Keeps unknown drives alive with the read that finds drives; a refusal is enough too."""
 
     def __init__(self, line: ModbusLine) -> None:
         self._line = line
@@ -28,21 +28,21 @@ class UnknownDrivePoller:
         self._workers: dict[int, LineWorker] = {}
 
     def keep(self, device: int) -> None:
-        """Keep a drive alive from now on."""
+        """Keep a drive alive until `let_go` or `stop`."""
         self.let_go(device)
         work = partial(self._begin, device)
-        with suppress(LineClosed):  # nobody is asked any more
+        with suppress(LineClosed):  # a closed line sends no keep-alive reads
             self._workers[device] = self._line.spawn(work, f"stranger {device}")
 
     def let_go(self, device: int) -> None:
-        """Its profile is known: somebody else looks after it."""
+        """Stop keeping a drive alive, for example because its profile is known now."""
         with self._changing:
             if (worker := self._workers.pop(device, None)) is not None:
                 worker.cancel()
                 self._line.facts.keep_alives.let_go(device)
 
     def stop(self) -> None:
-        """Let all of them go."""
+        """Stop keeping all of them alive."""
         for device in tuple(self._workers):
             self.let_go(device)
 
