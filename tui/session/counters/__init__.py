@@ -1,1 +1,1 @@
-"""Exchanges with a drive, counted by this program and by the drive."""
+"""Comparison of this program's frame counts with those of a drive."""

@@ -1,8 +1,8 @@
-"""A drive's counts compared with the requests to it: roll-over, saturation, differences in words.
+"""Comparison of a drive's counters with the requests to it: roll-over, saturation, differences.
 
-Pure. Counts are taken at two looks and subtracted. While other frames go over the line, how many
-were sent by the moment at which the drive looked at its counter is known within bounds only; a
-difference is reported as far as it is certain.
+Pure. The growth between two readings is compared. While other frames are on the line, the number
+of frames sent before the drive read its own counter is known only within bounds. Only certain
+differences are reported.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from tui.bus.api import DeviceCounters, LineCounters
 
 MODULO = 0x10000
 MOST = 0xFFFF
-"""Value at which a count of checksum errors stays."""
+"""Value at which a counter of checksum errors saturates."""
 STRANGE = 0x8000
-"""Frames more than this program sent, from which on a count that fell was restarted."""
+"""A counter that fell has rolled over, or was reset. A roll-over that needs this many more frames
+than this program sent counts as a reset."""
 
 COUNTED_ANEW = (
     "The drive has restarted counting: it was switched off, or its counters were reset. It is"
@@ -32,7 +33,7 @@ DifferenceKind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """A number that is between two others, both possible."""
+    """Range of a number; both limits are possible."""
 
     low: int
     high: int
@@ -44,41 +45,41 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class DriveCount:
-    """One pair of the drive's counters, and our counts at that time."""
+    """One pair of the drive's counters, and this program's counts at that time."""
 
     frames: int
-    """Frames to its address, right and damaged ones, modulo 65536."""
+    """Frames to its address, damaged ones included, modulo 65536."""
     damaged: int
-    """Those with a wrong checksum, up to 65535."""
+    """Frames with a wrong checksum; stays at 65535."""
     sent: Bounds
-    """Frames that were sent to it from here, the one that asked among them."""
+    """Frames that this program sent to the drive, the read of this counter included."""
     answered: Bounds
-    """Those that were answered."""
+    """Number of `sent` frames that were answered."""
 
     @property
     def saturated(self) -> bool:
-        """True if it has stopped counting checksum errors."""
+        """True if the counter of checksum errors has stopped at its maximum."""
         return self.damaged >= MOST
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A pair of a drive's counters over several looks, the roll-overs between them undone."""
+    """Growth of a pair of a drive's counters over several readings, corrected for roll-overs."""
 
     first: DriveCount
     last: DriveCount
     frames: int = 0
-    """Frames that it counted since the first look."""
+    """Frames that the drive counted since the first reading."""
     damaged: int = 0
     anew: bool = False
-    """True if it restarted counting just before the first reading."""
+    """True if the drive's counters were reset just before the first reading."""
 
     def with_look(self, now: DriveCount) -> Comparison:
-        """With one look more; restarted if either side restarts counting."""
+        """Add a reading; begin again if the counters of either side were reset."""
         sent = now.sent.since(self.last.sent)
         frames = frames_since(self.last.frames, now.frames, sent)
         if now.sent.high < self.last.sent.low:
-            return Comparison(now, now)  # another program owns the line, and counts for itself
+            return Comparison(now, now)  # another program owns the line now, with its own counts
         if frames is None or now.damaged < self.last.damaged:
             return Comparison(now, now, anew=True)
         damaged = self.damaged + now.damaged - self.last.damaged
@@ -86,17 +87,17 @@ class Comparison:
 
     @property
     def sent(self) -> Bounds:
-        """Frames that were sent from here since the first look."""
+        """Frames that this program sent since the first reading."""
         return self.last.sent.since(self.first.sent)
 
     @property
     def answered(self) -> Bounds:
-        """Those that were answered."""
+        """Number of these frames that were answered."""
         return self.last.answered.since(self.first.answered)
 
     @property
     def counts_this_line(self) -> bool | None:
-        """True if it counts the frames of this line; None where that is not known yet."""
+        """True if the drive counts the frames of this line; None if not known yet."""
         if not self.answered.low:
             return None
         return self.frames >= self.answered.low
@@ -104,7 +105,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Something that the counters show, in a sentence; `count` frames at least."""
+    """Difference between the counters, as a sentence; concerns at least `count` frames."""
 
     kind: DifferenceKind
     count: int
@@ -112,9 +113,9 @@ class Difference:
 
 
 def frames_since(before: int, now: int, sent: Bounds) -> int | None:
-    """Frames between two counts modulo 65536; None if the drive restarted counting.
+    """Return the growth of a counter modulo 65536; None if the counter was reset.
 
-    Of the numbers that the counts allow, the one nearest to what was sent from here.
+    If several numbers of roll-overs are possible, the result nearest to `sent` applies.
     """
     found = (now - before) % MODULO
     turns = round((sent.low - found) / MODULO)
@@ -151,7 +152,7 @@ def _differences(found: Comparison) -> Iterator[Difference]:
             f"{_frames(damaged)} reached the drive damaged: noise on the way to it. Look at the"
             " shield, the termination, the polarization, the motor cable beside it.",
         )
-    # of foreign frames nobody knows whether they were answered
+    # foreign frames may have been answered or not, so they do not count
     missed = min(frames, found.sent.low) - damaged - found.answered.high
     if missed > 0:
         yield Difference(
@@ -170,8 +171,10 @@ def _differences(found: Comparison) -> Iterator[Difference]:
 
 
 def own_differences(ours: DeviceCounters) -> list[Difference]:
-    """Return the findings of our own counts for a drive without counters, or one that does not
-    answer."""
+    """Return the differences that this program's counts alone show.
+
+    For drives without counters, and drives that do not answer.
+    """
     found = []
     if ours.checksum:
         text = (
@@ -193,7 +196,7 @@ def _frames(count: int) -> str:
 
 
 def device_since(now: DeviceCounters, before: DeviceCounters) -> DeviceCounters:
-    """Return our counts since then; all of them if another program has begun to count."""
+    """Return the growth of this program's counts; all of `now` if another program counts now."""
     if now.requests < before.requests or now.replies < before.replies:
         return now
     plain = {
@@ -212,6 +215,6 @@ def _grown(now: Mapping[int, int], before: Mapping[int, int]) -> dict[int, int]:
 
 
 def load_of(now: LineCounters, before: LineCounters, seconds: float) -> float | None:
-    """The share of the time in which the line was busy, 0 to 1; None where it is not known."""
+    """Return the share of the time in which the line was busy, 0 to 1; None if not known."""
     busy = now.busy_seconds - before.busy_seconds
     return min(1.0, busy / seconds) if seconds > 0 and busy >= 0 else None

@@ -1,4 +1,4 @@
-"""Frames on a line that answer no program's request, and their likely origin."""
+"""Stray frames: frames that answer no program's request, and their likely origin."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ LIKELY = "late or repeated replies, a second drive at the address, or another ma
 def stray_difference(
     count: int, frames: Sequence[Frame], since: float, device: int, *, tcp: bool
 ) -> list[Difference]:
-    """The difference that so many strays make; none without them.
+    """Return a difference for this number of strays, or an empty list for 0.
 
-    The frames since a time of the line's clock show what they are, as far as they are kept.
+    The recorded frames after `since` (line's clock) show their kinds, if they are still recorded.
     """
     if count <= 0:
         return []

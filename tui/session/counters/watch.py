@@ -1,4 +1,4 @@
-"""The counters of one drive, ours beside its own: looked at again and again, reset on asking."""
+"""Counters of one drive: this program's and the drive's own, read repeatedly and compared."""
 
 from __future__ import annotations
 
@@ -32,36 +32,36 @@ DIAGNOSTICS = 8
 ECHO, RESET, DAMAGED, FRAMES = 0x00, 0x0A, 0x0C, 0x0E
 """Sub-functions of function 8."""
 ECHOED = 0xA55A
-"""The word that is sent and must come back: as many ones as zeros."""
+"""Word of an echo test: it has as many ones as zeros."""
 THIS_PORT = "function 8"
 TOLD_BY_THEN = 0.5
-"""Seconds in which the owner of the line has told its counts to this program."""
+"""Seconds after which the keeper has sent its latest counts to this program."""
 
 
 PairAsked = Callable[[], Awaitable[tuple[int, int] | None]]
-"""Reads a pair of counters; None where the drive refuses them."""
+"""Reads a pair of counters; returns None if the drive refuses them."""
 
 
 @dataclass(frozen=True, slots=True)
 class CountersNow:
-    """Present counts, for a person."""
+    """Current counts for display. "Ours" are those of the process that holds the line."""
 
     total: DeviceCounters
     """Ours, since the line was opened."""
     since: DeviceCounters
-    """Ours, since the counters were looked at first or reset."""
+    """Ours, since the first reading or the last reset."""
     seconds: float
-    """Seconds since that."""
+    """Seconds covered by `since`."""
     line_load: float | None
-    """The share of that time in which the line was busy, 0 to 1."""
+    """Share of that time in which the line was busy, 0 to 1; None if not known."""
     device_load: float | None
-    """The same with this drive alone."""
+    """Share of that time in which the line was busy with this drive."""
     counted_by: str
-    """Program with our counts: the owner of the line; empty if it is this one."""
+    """Text of the program that counts, the owner of the line; empty if it is this one."""
     drive: tuple[tuple[str, Comparison], ...]
-    """The drive's own, by the name of what counts."""
+    """Comparisons with the drive's own counters, with the name of each pair."""
     trouble: str
-    """Why the drive's own were not read; empty where they were, or where it has none."""
+    """Why reading the drive's own counters failed; empty if it did not."""
     differences: tuple[Difference, ...] = ()
     line_minute: LastMinute = field(default_factory=LastMinute)
 
@@ -72,14 +72,14 @@ class CountersNow:
 
     @property
     def compared(self) -> Comparison | None:
-        """The counters of the drive that count the frames of this line; None where none does."""
+        """Comparison with the counters of this line's port; None if the drive has none."""
         return dict(self.drive).get(THIS_PORT) or next(
             (comparison for _, comparison in self.drive if comparison.counts_this_line), None
         )
 
     @property
     def agreeing(self) -> str:
-        """That nothing differs, in a sentence."""
+        """Sentence to show if there are no differences."""
         comparison = self.compared
         if comparison is None:
             rest = "" if self.drive else " The drive reports no counters of its own."
@@ -91,15 +91,15 @@ class CountersNow:
 
 @dataclass(slots=True, eq=False)
 class CounterWatch:
-    """Looks at both sides; what is ours is reset for this watch alone. In one loop only."""
+    """Reads both sides. A reset of ours applies to this watch only. For one loop only."""
 
     session: DriveSession
     trouble: str = ""
     _line: LineCounters = field(init=False)
-    """The line when it was begun."""
+    """Counts of the line at the last reset."""
     _begun: float = field(init=False)
     _since: float = field(init=False)
-    """Time of the last frame before, on the line's clock."""
+    """Time of the last frame before the reset, on the line's clock."""
     _looked: bool = False
     _drive: dict[str, Comparison] = field(default_factory=dict)
 
@@ -113,7 +113,7 @@ class CounterWatch:
 
     @property
     def can_reset_drive(self) -> bool:
-        """True if the drive's own counters can be reset from here."""
+        """True if this program can reset the drive's own counters."""
         return self._has(RESET) and not self.session.line.read_only
 
     def _has(self, subfunction: int) -> bool:
@@ -126,13 +126,13 @@ class CounterWatch:
 
     @property
     def counted_by(self) -> str:
-        """The program that owns the line, and so counts; empty where it is this one."""
+        """Text of the program that owns the line and counts; empty if it is this one."""
         facts = self.session.line.facts
         owner = facts.programs[0] if facts.programs else facts.me
         return "" if owner.id == facts.me.id else owner.text
 
     def reset_ours(self) -> None:
-        """Count from now on; the line's own counts, which others look at, stay."""
+        """Restart our counts for this watch; the line's counts, which others use, continue."""
         self._line = self.session.line.counters
         self._since = last_time(self.session.line.trace)
         self._begun = self.session.clock.monotonic()
@@ -144,8 +144,8 @@ class CounterWatch:
     async def reset_drive(self, journal: Journal) -> None:
         """Set the drive's counters to 0 (sub-function 0A). Raises the line's errors.
 
-        By the manual that resets what monitors the exchanges, and nothing else. It is put into the
-        journal, as is whatever came of it.
+        By the manual, it resets the communication counters and nothing else. The journal gets an
+        entry with the result, even if the request fails.
         """
         if why := self.session.contradiction:
             raise RequestRefused(f"Not reset: {why}")
@@ -164,10 +164,10 @@ class CounterWatch:
         await self.look()
 
     async def look(self) -> None:
-        """Read the drive's own; what keeps that from being done is in `trouble`."""
+        """Read the drive's own counters; an error of the line is stored in `trouble`."""
         self.trouble = ""
         if not self._looked:
-            # both sides begin together
+            # both sides must begin at the same time
             self._looked = True
             self.reset_ours()
         try:
@@ -185,7 +185,7 @@ class CounterWatch:
         async def pair() -> tuple[int, int]:
             return await line.diagnose(device, FRAMES), damaged
 
-        # what was sent is counted around the one request that brings the count of frames
+        # the bounds of the frames sent are taken around this one request
         await self._take(THIS_PORT, pair)
 
     async def _port_counts(self, port: PortCounters) -> tuple[int, int] | None:
@@ -194,7 +194,7 @@ class CounterWatch:
         return None if frames is None or damaged is None else (frames, damaged)
 
     async def _take(self, name: str, ask: PairAsked) -> None:
-        """Read a pair, and how much was sent and answered by then."""
+        """Read a pair of counters with the bounds of the frames sent and answered by then."""
         before = self._ours
         found = await ask()
         if self.counted_by:
@@ -211,9 +211,9 @@ class CounterWatch:
         self._drive[name] = known.with_look(now) if known else Comparison(now, now)
 
     async def echo(self, times: int) -> int:
-        """Send frames that change nothing; how many were answered.
+        """Send test frames that change nothing; return how many were answered.
 
-        Echoes of function 8, or reads of the word that shows the state if the drive has none.
+        They are echoes of function 8, or reads of the status word if the drive has no echo.
         """
         answered = 0
         for _ in range(times):
@@ -267,7 +267,7 @@ class CounterWatch:
 
 
 def _reset_entry(session: DriveSession, answer: str) -> Entry:
-    """The entry of a reset: no register was written, and what was counted is not read before."""
+    """Create the journal entry of a reset; it has no register and no old value."""
     return Entry(
         now_text(), session.line_text, session.device, session.profile.id,
         f"function {DIAGNOSTICS}, {RESET:02X}", 0, None, "", 0, "0", answer, None,
@@ -276,7 +276,7 @@ def _reset_entry(session: DriveSession, answer: str) -> Entry:
 
 
 def _differences_since(mine: Comparison | None, since: DeviceCounters) -> tuple[Difference, ...]:
-    """By the counters of this port; by ours alone where there are none."""
+    """Return the differences by the counters of this port, else by our counts alone."""
     reported = differences(mine) if mine is not None else []
     if any(difference.kind == "not-answered" for difference in reported):
         return tuple(reported)

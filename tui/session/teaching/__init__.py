@@ -1,1 +1,1 @@
-"""Taught facts about one drive: kept with it, and used from then on."""
+"""Learned scales of one drive: stored by drive, and used with its profile."""

@@ -1,6 +1,6 @@
-"""The file with what was taught of one drive: the looks themselves, as the scale follows from them.
+"""File with the display readings that were taught for one drive; its scales follow from them.
 
-One file a drive, by line, address, profile and what the drive says of itself, in the state folder.
+The state folder has one file per drive, named by line, address, profile and reported identity.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..connect.identify import DriveIdentity
 
 LONGEST = 200_000
-"""Bytes of a file that may be one of these."""
+"""Most bytes of such a file; a longer one is not read."""
 _CODE = re.compile(r"[\x21-\x7e]{1,24}")
 
 
@@ -41,7 +41,7 @@ class TaughtNotKept(DriveError):
 
 @dataclass(frozen=True, slots=True)
 class TaughtLooks:
-    """Looks by code of parameter, and the parameter that was confirmed to take the reference."""
+    """Display readings by parameter code, and the parameter confirmed to take the reference."""
 
     looks: Mapping[str, tuple[DisplayLook, ...]] = field(default_factory=dict)
     reference: str = ""
@@ -49,7 +49,7 @@ class TaughtLooks:
 
 @dataclass(frozen=True, slots=True)
 class TaughtDrive:
-    """Which drive is meant."""
+    """Key of the file: the drive that the readings belong to."""
 
     line: str
     device: int
@@ -61,7 +61,7 @@ class TaughtDrive:
     def of(
         cls, line_text: str, device: int, profile: str, identity: DriveIdentity | None
     ) -> TaughtDrive:
-        """The drive at an address of a line, however that is typed."""
+        """Return the key for a device on a line; equivalent spellings of the line are the same."""
         stated = (identity.vendor, identity.reference, identity.name) if identity else ()
         return cls(line_key(line_text), device, profile, " ".join(part for part in stated if part))
 
@@ -77,7 +77,10 @@ class TaughtDrive:
         return _digest(repr((self.line, self.device, self.profile)))
 
     def found(self) -> Path | None:
-        """The file that is its own; what either side left unsaid counts as the same."""
+        """Return the drive's file; None if there is none.
+
+        If either the drive or the only file for its address has no identity, they match.
+        """
         if self.file.exists():
             return self.file
         others = sorted(_folder().glob(f"*-{self._place}-*.json"))
@@ -101,7 +104,7 @@ def load_taught(drive: TaughtDrive) -> TaughtLooks:
 
 
 def keep_taught(drive: TaughtDrive, kept: TaughtLooks) -> None:
-    """Put it on the disk, whole or not at all; a file that cannot be read is set aside.
+    """Write the file completely or not at all; keep an unreadable file under another name.
 
     Raises TaughtNotKept.
     """
@@ -127,7 +130,7 @@ def keep_taught(drive: TaughtDrive, kept: TaughtLooks) -> None:
 
 
 def _set_aside_if_damaged(drive: TaughtDrive, path: Path) -> None:
-    """Move a file that cannot be read out of the way of the new one; none is written over."""
+    """Rename an unreadable file, so that the new one does not overwrite it."""
     try:
         load_taught(drive)
     except TaughtUnreadable:
@@ -186,7 +189,7 @@ def _look(code: str, reported: object) -> DisplayLook:
 
 
 def _reason(error: Exception) -> str:
-    """Return the error in a line."""
+    """Return the error in one line without a final full stop."""
     if isinstance(error, OSError):
         return error.strerror or str(error)
     return str(error).splitlines()[0].rstrip(".")[:120] if str(error) else type(error).__name__

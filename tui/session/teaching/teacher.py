@@ -1,4 +1,4 @@
-"""Teaching one drive: a look is read from it, kept with it, and its profile follows at once."""
+"""Teaching the scales of one drive: read, store, and use them in its profile immediately."""
 
 from __future__ import annotations
 
@@ -28,39 +28,39 @@ log = logging.getLogger(__name__)
 
 
 class Teacher:
-    """Taught scales of one drive; only `look` polls the drive, the others wait for the disk."""
+    """Learned scales of one drive. Only `look` reads the drive; other methods block on files."""
 
     def __init__(self, session: DriveSession) -> None:
         self.session = session
         self.trouble = ""
-        """Why what was taught before is not used, or is not kept; empty while all is well."""
+        """Why stored readings are not used or new ones not stored; empty if there is no error."""
         self._known = TaughtLooks()
         self._unkept = False
-        """True if the disk has less than what is known here."""
+        """True if the file lacks some of the readings, because writing it failed."""
         self._lock = threading.Lock()
 
     @property
     def family(self) -> Profile:
-        """The drive's profile without what was taught."""
+        """The drive's profile without learned scales."""
         return self.session.family
 
     @property
     def scales(self) -> Mapping[str, TaughtScale]:
-        """Present scales, by code."""
+        """Current learned scales, by code."""
         return self.session.profile.taught
 
     @property
     def reference(self) -> str:
-        """The parameter that takes the reference, confirmed by a person; empty where none does."""
+        """Code of the parameter that a person confirmed to take the reference; empty if none."""
         code = self._known.reference
         return code if code and not why_no_reference(self.family, code, self.scales) else ""
 
     def looks(self, code: str) -> tuple[DisplayLook, ...]:
-        """The looks at a parameter that are kept."""
+        """Return the stored display readings of a parameter."""
         return self._known.looks.get(code, ())
 
     def recall(self) -> None:
-        """Use what was taught before; unreadable files are reported in `trouble`. Reads a file."""
+        """Load the stored readings and use them; reports an unreadable file in `trouble`."""
         with self._lock:
             try:
                 self._known, self.trouble = load_taught(self._drive()), ""
@@ -70,9 +70,10 @@ class Teacher:
             self._use()
 
     async def look(self, code: str, text: str, unit: str = "") -> Lesson:
-        """Read a word now, beside what the drive's display shows, as typed; keep the result.
+        """Read a parameter, and store its word with the value that the drive's display shows.
 
-        Raises ValueRefused where nothing can be taught or was typed, and the line's errors.
+        `text` is that value as typed. Raises ValueRefused if the parameter cannot be taught or read
+        or the text is not a value, and the line's errors.
         """
         if why := why_not_taught(self.family, code):
             raise ValueRefused(why)
@@ -83,7 +84,7 @@ class Teacher:
         return await asyncio.to_thread(self.take, code, reading.raw, *shown)
 
     def take(self, code: str, raw: int, shown: Decimal, unit: str) -> Lesson:
-        """One look more at a parameter; keeps the result."""
+        """Add a display reading of a parameter, and store it."""
         with self._lock:
             before = self._latest().looks.get(code, ())
             lesson = learn(code, before, DisplayLook(raw & 0xFFFF, shown, unit))
@@ -91,7 +92,7 @@ class Teacher:
         return lesson
 
     def forget(self, code: str) -> bool:
-        """Teach a parameter no longer; whether anything was kept of it."""
+        """Delete the readings of a parameter; return False if there were none."""
         with self._lock:
             if not self._latest().looks.get(code):
                 return False
@@ -99,9 +100,9 @@ class Teacher:
             return True
 
     def confirm_reference(self, code: str) -> str:
-        """Give the reference by a parameter from now on, as a person confirms; says what follows.
+        """Use a parameter for the reference, as a person confirmed; return a sentence about it.
 
-        Raises ValueRefused where it cannot take one.
+        Raises ValueRefused if the parameter cannot take the reference.
         """
         with self._lock:
             self._latest()
@@ -111,13 +112,13 @@ class Teacher:
         return f"{code} takes the reference, in {self.scales[code].unit}."
 
     def drop_reference(self) -> None:
-        """Give no reference by a taught parameter any more."""
+        """Stop using a taught parameter for the reference."""
         with self._lock:
             self._latest()
             self._change({}, "")
 
     def proposal(self) -> str:
-        """A parameter that could take the reference, once a person confirms it; else empty."""
+        """Return a parameter that could take the reference if a person confirms it; else empty."""
         if self.reference:
             return ""
         ways = self.family.data.teachable_references
@@ -126,7 +127,7 @@ class Teacher:
         return next(fit, "")
 
     def _latest(self) -> TaughtLooks:
-        """Return the stored readings: another program may have added some."""
+        """Return the readings from the file, because another program may have added some."""
         try:
             on_disk = load_taught(self._drive())
         except TaughtUnreadable:
@@ -136,7 +137,7 @@ class Teacher:
         return self._known
 
     def _change(self, looks: Mapping[str, tuple[DisplayLook, ...]], reference: str) -> None:
-        """Keep and use it; a scale that ended takes the confirmation of its reference along."""
+        """Use and store the readings; a lost scale cancels the confirmation of its reference."""
         every = {**self._known.looks, **looks}
         self._known = TaughtLooks({c: kept for c, kept in every.items() if kept}, reference)
         self._use()
@@ -150,11 +151,11 @@ class Teacher:
             log.warning("%s", error)
 
     def _use(self) -> None:
-        """The drive's profile, with what is known by the looks."""
+        """Set the session's profile to the family's profile with the learned scales."""
         self.session.learn(with_taught(self.family, self._taught_scales(), self._known.reference))
 
     def _taught_scales(self) -> dict[str, TaughtScale]:
-        """The scales in the kept readings."""
+        """Return the scales that follow from the readings, by code."""
         found = {code: taught_by(looks) for code, looks in self._known.looks.items()}
         return {code: scale for code, scale in found.items() if scale is not None}
 
@@ -164,7 +165,7 @@ class Teacher:
 
 
 def reference_asks(family: Profile, code: str) -> str:
-    """Return the question before a parameter takes the reference."""
+    """Return the warning that a person must confirm before a parameter takes the reference."""
     way = reference_of(family, code)
     chooses = ""
     if way is not None and way.bits:
