@@ -1,4 +1,4 @@
-"""The byte order in which a drive's words arrive, judged by every value that is read of it."""
+"""Byte order of a drive's words, judged by every value that is read."""
 
 from __future__ import annotations
 
@@ -12,57 +12,57 @@ from tui.drive.profile.profile import Profile
 from .reading import Reading
 
 LEAST_REGISTERS = 3
-"""Registers that must speak for swapped bytes; one word may be out of its range."""
+"""Least registers that must indicate swapped bytes; a single word may be out of its range."""
 MAJORITY = 4
-"""So many times more registers must speak for one order than for the other to change it."""
+"""Factor by which the registers for one byte order must outnumber those for the other."""
 VOTES_LAST = 90.0
-"""Seconds after which a value says nothing about the present order."""
+"""Seconds after which a value no longer counts."""
 
 
 class ByteOrder:
-    """True if the bytes of each word of one drive arrive swapped; for any thread."""
+    """Detects whether the bytes of each word of one drive arrive swapped. Thread-safe."""
 
     def __init__(self, device: int) -> None:
         self._device = device
         self._lock = threading.Lock()
         self._seen: dict[str, tuple[bool, float]] = {}
         self._against: tuple[str, ...] = ()
-        """Codes that showed swapped bytes, while words arrive so."""
+        """Codes that indicated swapped bytes; empty while words arrive correctly."""
         self.on_swapped: Callable[[str], object] = str
-        """Called with the text once words begin to arrive swapped."""
+        """Called with `text` when words begin to arrive swapped."""
         self._tested = self._was_away = False
 
     @property
     def error(self) -> BytesSwapped | None:
-        """Error; None while words arrive correctly."""
+        """Error to raise for reads; None while words arrive correctly."""
         return BytesSwapped(self._device, self._against) if self._against else None
 
     @property
     def text(self) -> str:
-        """The same as text, empty while nothing is wrong."""
+        """Text of the error; empty while words arrive correctly."""
         return str(self.error or "")
 
     @property
     def is_doubtful(self) -> bool:
-        """True if the settings that show the order are to be read: not yet, or not all agree."""
+        """True if the settings that show the byte order must be read, or read again."""
         return not self._tested or self.is_suspect
 
     @property
     def is_suspect(self) -> bool:
-        """True if a value speaks for swapped bytes, or the line was lost since they were read."""
+        """True if a value indicates swapped bytes, or the line was lost since the last check."""
         return self._was_away or any(swapped for swapped, _ in self._seen.values())
 
     def note_tested(self) -> None:
-        """Those settings were read, or the drive has none of them."""
+        """Note that these settings were read, or that the drive has none of them."""
         self._tested, self._was_away = True, False
 
     def forget(self) -> None:
-        """Another drive may answer now, or by another gateway."""
+        """Require a new check: another drive or gateway may answer now."""
         self._was_away = self._tested
         self._tested = False
 
     def note(self, profile: Profile, found: Mapping[str, Reading], now: float) -> None:
-        """Judge by values that were just read."""
+        """Judge the byte order by values that were just read."""
         read = {
             c: (reading, reading.raw) for c, reading in found.items() if reading.raw is not None
         }
@@ -73,7 +73,7 @@ class ByteOrder:
         wrong = sum(vote is True for vote in votes.values())
         with self._lock:
             if right >= LEAST_REGISTERS and right >= MAJORITY * wrong:
-                self._seen, self._against = {}, ()  # whatever came before
+                self._seen, self._against = {}, ()  # a clear majority overrides earlier values
             elif wrong >= LEAST_REGISTERS and wrong >= MAJORITY * right:
                 self._seen = {}
             kept = {c: s for c, s in self._seen.items() if c not in read}

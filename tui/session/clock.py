@@ -1,4 +1,4 @@
-"""The clock that a session counts by, so that a test can move it on."""
+"""Clock of a session, which a test can replace."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ import time
 from datetime import datetime
 
 SET_BY = 0.1
-"""Seconds by which the time of day must move against the other one to count as set again."""
+"""Least shift in seconds between both clocks that counts as a change of the computer's time."""
 
 
 class Clock:
-    """Monotonic seconds for ages, the time of day for people; for any thread.
+    """Monotonic seconds for ages, and the time of day for people. Thread-safe.
 
-    The line keeps the real clock, as its wires and devices do.
+    The line always uses the real clock, because its devices do.
     """
 
     _apart = 0.0
-    """Seconds that the time of day is ahead of the monotonic clock."""
+    """Seconds since 1970 minus monotonic seconds."""
 
     def monotonic(self) -> float:
-        """Seconds that only go forward."""
+        """Return seconds that never go back."""
         return time.monotonic()
 
     def wall(self) -> float:
-        """Seconds since 1970."""
+        """Return seconds since 1970."""
         return time.time()
 
     def wall_of(self, moment: float) -> float:
-        """When a monotonic moment was, in seconds since 1970.
+        """Convert a monotonic time to seconds since 1970.
 
-        The same for one moment, whenever it is asked for, unless the computer's time was set.
+        Repeated calls return the same result, unless the computer's time was set in between.
         """
         apart = self.wall() - self.monotonic()
         if abs(apart - self._apart) > SET_BY:
@@ -38,15 +38,15 @@ class Clock:
         return moment + self._apart
 
     def time_of_day(self) -> str:
-        """The local time in 24 h."""
+        """Return the local time as HH:MM:SS."""
         return datetime.fromtimestamp(self.wall()).strftime("%H:%M:%S")
 
     async def sleep(self, seconds: float) -> None:
-        """Let others go on for so many seconds; of a loop, and never less than one turn of it."""
+        """Sleep for some seconds; even 0 lets other tasks of the loop run once."""
         await asyncio.sleep(seconds)
 
     def line_time(self, reported: float) -> float:
-        """A moment that the line has told, time.monotonic(), on this clock."""
+        """Convert a time that the line reported (time.monotonic()) to this clock."""
         return reported
 
 

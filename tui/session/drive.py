@@ -36,7 +36,7 @@ OWN_PROFILE = "Drive Panel does not write with the profile of another drive."
 
 
 class DriveSession:
-    """A drive with its profile; the one owner of its registers, its work and its arming.
+    """A drive with its profile; the only owner of its registers, its work and its arming.
 
     It knows no reader, monitor, commander or editor of the drive. For any thread.
     """
@@ -66,7 +66,7 @@ class DriveSession:
         """True if its family was neither named nor reported by the drive; it is then never
         reported as stopped."""
         self.contradiction = contradiction(identity, profile)
-        """Contradiction between the drive's reported identity and its profile; empty if none."""
+        """How the drive's reported identity contradicts its profile; empty if it does not."""
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.byte_order = ByteOrder(device)
@@ -80,7 +80,7 @@ class DriveSession:
         self.commanded_at: float | None = None
         """When this program last sent it a command or reference (monotonic); None if never."""
         self.timeout: Timeout | None = None
-        """Its communication timeout; None before it was read."""
+        """Its communication timeout; None until it is read."""
         self.reported_by_line = False
         """True if this program has written a command, reference or stop word to it."""
         self.unsaved_settings = UnsavedSettings()
@@ -93,7 +93,7 @@ class DriveSession:
         self.starts: StartKeeper | None = None
         """Records of its motor's starts; None if they are not kept."""
         self.rest_seen = -math.inf
-        """When the motor was last seen at rest, or in an unknown state (monotonic)."""
+        """When it was last read in a state other than running or stopping (session's clock)."""
         self.stirs = 0
         """Number of requests to re-read every value."""
         line.describe(device, limits_of(profile))
@@ -197,7 +197,7 @@ class DriveSession:
 
 
 class UnsavedSettings:
-    """Raw values of settings that the drive keeps until power-off only, unless it saves them.
+    """Settings that the drive loses at power-off, unless it saves them.
 
     The saved value is the one read before the first write of this program, unless another source
     has changed it since. If that value is not known, the setting counts as unsaved. For any thread.

@@ -26,7 +26,7 @@ class DriveState:
     name: str
     kind: StateKind
     motion: StateKind
-    """The kind for callers that need a motor at rest: a fault word alone stops no motor."""
+    """Kind for callers that need a motor at standstill: a fault word alone is not a standstill."""
     direction: Direction | None
     reached: bool | None
     alarm: bool | None
@@ -36,16 +36,16 @@ class DriveState:
     reference: str
     """Source of its reference, if its words show it."""
     fault: FaultCode | None
-    """The fault that the drive is in now."""
+    """The present fault."""
     fault_raw: int | None
-    """The raw fault code as read, the last fault where the family keeps it."""
+    """Raw fault code as read; some families keep the code of the last fault."""
     alarms: tuple[Bit, ...]
     headline: str
-    """The state in a word or two; empty where its words were not asked for."""
+    """The state in a word or two; empty if its words are not among the readings."""
 
 
 def drive_state(profile: Profile, readings: Mapping[str, Shown]) -> DriveState:
-    """The state in these readings; stale and bad ones show nothing."""
+    """Return the state that these readings show; ignores stale and bad ones."""
     raws = {
         code: reading.raw
         for code, reading in readings.items()
@@ -73,12 +73,12 @@ def drive_state(profile: Profile, readings: Mapping[str, Shown]) -> DriveState:
 
 
 def _requested(profile: Profile, readings: Mapping[str, Shown]) -> bool:
-    """Return True if the words that show the state are among those read at all."""
+    """Return True if the words of the state are among the readings, of any quality."""
     return any(chart.status in readings for chart in profile.data.charts)
 
 
 def _present_fault(profile: Profile, chart: ChartState, raw: int | None) -> FaultCode | None:
-    """The fault now: a family that keeps its last fault is in it only while its chart says so."""
+    """Return the present fault; a stored last fault counts only while the state is a fault."""
     if raw is None or raw == profile.data.faults.none or chart.kind != "fault":
         return None
     return profile.fault(raw) or FaultCode(raw=raw, code=f"code {raw}", name="Not in the profile")
@@ -113,16 +113,16 @@ def _headline(chart: ChartState, fault: FaultCode | None) -> str:
 
 
 def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> Signed:
-    """A frequency with the sign of its direction.
+    """Return a frequency with the sign of its direction.
 
-    A drive that gives it without one reports the direction of its motor beside it.
+    Some drives report it without a sign, and the direction in the status word.
     """
     signed = parameter.type.startswith("int")
     return -number if not signed and state.direction == "reverse" else number
 
 
 def channel_text(parameter: Parameter, value: Value) -> str:
-    """Name the commander or the reference source: an enumeration, or a word with a bit for each."""
+    """Name the commander or reference source, from an enumeration or from the bits of a word."""
     if parameter.bits:
         return ", ".join(bit.name for bit in set_bits(parameter.bits, value.raw)) or "none"
     return value.text

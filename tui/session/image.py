@@ -56,7 +56,7 @@ class RegisterImage:
         """When a word was last written, or may have been (monotonic)."""
         self._trusted_from = -math.inf
         self._waiting_for: dict[str, Callable[[int], None]] = {}
-        """Callers that wait for the value of a word written without a sure answer."""
+        """Callbacks by code, for words written without a certain answer."""
 
     @property
     def raws(self) -> Mapping[str, int]:

@@ -1,4 +1,4 @@
-"""A parameter's value as it was read: what it is, when it was on the wire, how good it is."""
+"""Reading of a parameter: its value, the time it was on the wire, and its quality."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Origin(StrEnum):
 class Reading:
     """One parameter as last read; `time` is when its reply was complete (monotonic).
 
-    `raw` is None if there is none, and `error` says why. `value` follows words that may be others a
-    moment later, so it is computed for each caller and not kept.
+    `raw` is None if there is no value; `error` is the reason. `value` depends on other words that
+    may change at any time, so it is decoded for each caller and not stored.
     """
 
     parameter: Parameter
@@ -36,12 +36,12 @@ class Reading:
     time: float
     error: str = ""
     physical: Value | None = None
-    """The value of a percentage in the unit of its rating, once that is known."""
+    """A percentage in the unit of its rating; None if that is not known."""
     origin: Origin = Origin.READ
     absent: bool = False
-    """True where the drive itself said that it has no such word."""
+    """True if the drive reported that it has no such word."""
     silent: bool = False
-    """True where the drive met the request with silence while it answers others."""
+    """True if the drive did not answer this request although it answers others."""
 
     @property
     def text(self) -> str:
@@ -50,7 +50,7 @@ class Reading:
 
     @property
     def unit(self) -> str:
-        """The unit of the value, or that of the parameter while there is none."""
+        """Unit of the value; unit of the parameter if there is no value."""
         return self.value.unit if self.value is not None else self.parameter.unit
 
     @property
@@ -90,7 +90,7 @@ class Reading:
         return self
 
     def decoded(self, value: Value, physical: Value | None) -> Reading:
-        """The same reading with the present meaning of its raw value."""
+        """Return the reading with a decoded value."""
         return Reading(
             self.parameter,
             self.raw,
@@ -103,7 +103,7 @@ class Reading:
 
     @classmethod
     def undecoded(cls, parameter: Parameter, raw: int, time: float, origin: Origin) -> Reading:
-        """A raw value as it came."""
+        """Create a reading with a raw value that is not decoded yet."""
         return cls(parameter, raw, None, Quality.GOOD, time, origin=origin)
 
     @classmethod
@@ -116,15 +116,15 @@ class Reading:
         absent: bool = False,
         silent: bool = False,
     ) -> Reading:
-        """A parameter without a value, and why."""
+        """Create a reading without a value; `error` is the reason."""
         return cls(parameter, None, None, Quality.BAD, time, error, absent=absent, silent=silent)
 
 
 def reading_of(shown: Shown) -> Reading:
-    """The reading that a session created, with its text."""
+    """Return a shown value as its Reading, which has a text."""
     return cast("Reading", shown)  # there is no other implementation
 
 
 def with_text(readings: Mapping[str, Shown]) -> Mapping[str, Reading]:
-    """The readings by code, with their text: for output that has columns for quality and time."""
+    """Return shown values as Readings, for output that has columns for quality and time."""
     return {code: reading_of(shown) for code, shown in readings.items()}

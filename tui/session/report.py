@@ -24,12 +24,12 @@ from .journal import Entry
 from .trips import trips_of
 
 ENTRIES_SHOWN = 200
-"""Most entries of the journal in a report, the last ones."""
+"""Most journal entries in a report; it has the latest ones."""
 CHANNEL_QUANTITIES: tuple[Quantity, ...] = ("command_channel", "reference_channel")
 
 
 def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
-    """The whole report; `entries` are those of the journal about this drive, oldest first."""
+    """Return the report as Markdown; `entries` are the drive's journal entries, oldest first."""
     written = [entry for entry in entries if entry.kind == "write"]
     trips = [entry for entry in entries if entry.kind == "fault"]
     proofs = [entry for entry in entries if entry.kind == "proof"]
@@ -58,7 +58,7 @@ class _Report:
 
     @property
     def zone(self) -> tzinfo:
-        """The one zone of all times here: that in which the drive was read."""
+        """Time zone of all times in the report: that of the computer that read the drive."""
         return _zone_of(self.values.head.time)
 
     def _zone_text(self) -> str:
@@ -81,7 +81,7 @@ class _Report:
         ]
 
     def line(self) -> list[str]:
-        """The drive's own settings of its line."""
+        """Return the drive's communication settings."""
         rows = [
             (s.parameter, self.profile[s.parameter].name, self.text(s.parameter))
             for s in self.profile.data.link.settings
@@ -89,7 +89,7 @@ class _Report:
         return ["## Line settings of the drive", "", *_table(("code", "name", "value"), rows)]
 
     def changed(self) -> list[str]:
-        """Settings that are not as from the factory, with what the journal knows of before."""
+        """Return the settings that differ from the factory's, with the first old value written."""
         before: dict[str, str] = {}
         for entry in self.entries:
             before.setdefault(entry.code, entry.old)
@@ -171,7 +171,7 @@ class _Report:
         return [*lines, f"- Proved {last.time[:16].replace('T', ' ')}: {last.new}"]
 
     def faults(self) -> list[str]:
-        """The present or last fault, and the history that the drive keeps."""
+        """Return the present or last fault, and the drive's fault history."""
         data = self.profile.data.faults
         codes = list(dict.fromkeys(code for code in (data.parameter, *data.history) if code))
         rows = [(code, self.profile[code].name, self._fault(code)) for code in codes]
@@ -210,7 +210,7 @@ class _Report:
         return f"{fault.code} {fault.name}"
 
     def seen(self) -> list[str]:
-        """The trips of this drive that were seen on this computer, each once."""
+        """Return the trips of this drive that Drive Panel observed on this computer."""
         rows = [
             (
                 _when(trip.tripped, self.zone) if trip.tripped else "not seen",
@@ -234,7 +234,7 @@ class _Report:
         return ["## Writes by Drive Panel", "", *earlier, *_table(head, rows)]
 
     def text(self, code: str) -> str:
-        """A parameter's value as a person reads it."""
+        """Return a parameter's value with its unit, or dashes."""
         raw = self.values.raws.get(code)
         if raw is None:
             return NOT_AVAILABLE
@@ -244,7 +244,7 @@ class _Report:
 
 
 def _when(text: str, zone: tzinfo | None) -> str:
-    """A time in a zone, to the second; an invalid time unchanged."""
+    """Format an ISO time in a zone, to the second; return an invalid time unchanged."""
     try:
         return f"{datetime.fromisoformat(text).astimezone(zone):%Y-%m-%d %H:%M:%S}"
     except ValueError:
@@ -252,7 +252,7 @@ def _when(text: str, zone: tzinfo | None) -> str:
 
 
 def _zone_of(text: str) -> tzinfo:
-    """The time zone of the report; UTC where it names none."""
+    """Return the time zone of an ISO time; UTC if it has none."""
     try:
         return datetime.fromisoformat(text).tzinfo or UTC
     except ValueError:

@@ -1,4 +1,4 @@
-"""A value that was read, as a screen gets it: its text comes only with its quality and age.
+"""A value that was read, for screens: they get its text only with its quality and age.
 
 `Reading` has the text as well. Screens and widgets do not import it; a contract checks that.
 """

@@ -1,4 +1,4 @@
-"""The state folder, and small JSON files in it, of whatever content."""
+"""Small JSON files in the state folder."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pathlib import Path
 from tui.drive.small_file import read_small_text
 
 NOWHERE = Path(os.devnull) / "no home folder is known: name a folder in DRIVEPANEL_STATE"
-"""In place of the state folder where there is none: whatever is tried there fails, and says why."""
+"""Stands in for a missing state folder: every use of it fails, with its name as the reason."""
 FOLDER_MODE = 0o700
 LONGEST_STORED = 1_000_000
-"""Bytes of a file that may be one of these."""
+"""Most bytes of such a file; a longer one is not read."""
 
 
 def make_folder(folder: Path) -> None:
-    """See that a folder is there; those that are made are their owner's alone. Raises OSError."""
+    """Create a folder and its parents if missing, for the owner only (mode 700). Raises OSError."""
     if NOWHERE in (folder, *folder.parents):
         raise OSError(errno.ENOENT, NOWHERE.name)
     missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
@@ -28,8 +28,7 @@ def make_folder(folder: Path) -> None:
 
 
 def stored_json(file: Path) -> object:
-    """Return the contents of a file; None if it is missing, damaged, too long, too deep or not a
-    file."""
+    """Return the contents of a JSON file; None if it cannot be read or decoded, or is too long."""
     try:
         return json.loads(read_small_text(file, LONGEST_STORED))
     except (OSError, ValueError, RecursionError):
@@ -37,9 +36,9 @@ def stored_json(file: Path) -> object:
 
 
 def store_json(file: Path, what: object) -> None:
-    """Put a file down, whole or not at all. Raises OSError."""
+    """Write a JSON file completely or not at all. Raises OSError."""
     make_folder(file.parent)
     part = file.with_suffix(".part")
-    # what Unicode cannot hold, such as half a character, is kept as an escape
+    # JSON escapes keep lone surrogates, which UTF-8 cannot encode
     part.write_text(json.dumps(what, indent=1), encoding="utf-8")
     part.replace(file)

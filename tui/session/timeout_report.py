@@ -1,4 +1,4 @@
-"""Communication timeout that a drive reported: its length and its reaction."""
+"""Communication timeout as a drive reported it: its length and its reaction."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from tui.drive.profile.schema import Reaction
 
 @dataclass(frozen=True, slots=True)
 class TimeoutWatch:
-    """A drive's watch over the line: seconds to its timeout, and what it does then."""
+    """A drive's communication timeout in seconds, and its reaction; None if that is unknown."""
 
     timeout: float
     reaction: Reaction | None
     active: bool = True
-    """False where the reaction is off, and before the first command where it begins with that."""
+    """False if the reaction is off, or begins with the first command and none was written."""
     code: str = ""
-    """The parameter that sets the timeout."""
+    """Code of the parameter that sets the timeout."""
     fault: str = ""
-    """The fault in which its reaction ends; empty where it ends in none, or it is not known."""
+    """Fault code of the reaction; empty if it causes no fault, or an unknown one."""
     sure: bool = True
-    """True if a document says when it begins; it is taken to have begun where none does."""
+    """True if a document states when it begins; if none does, it counts as begun."""
 
     @property
     def acts(self) -> bool:
-        """True if a reaction follows a silent line; it may be switched off."""
+        """True if the drive reacts to communication loss; False if its reaction is off."""
         return self.reaction is None or not self.reaction.never_set
 
     @property
     def trips(self) -> bool:
-        """True if the drive may end in a fault; a reaction that is not known may be one."""
+        """True if the reaction is a fault, or unknown."""
         return self.reaction is None or self.reaction.trips
 
 
@@ -38,6 +38,6 @@ class Timeout:
     """Known facts about a drive's communication timeout."""
 
     known: bool
-    """True if the drive has told it."""
+    """True if the drive reported it."""
     watch: TimeoutWatch | None = None
-    """None where there is none, where it is off, or where it is not known."""
+    """None if there is no timeout, or it is off or not known."""
