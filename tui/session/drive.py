@@ -66,7 +66,7 @@ class DriveSession:
         """True if its family was neither named nor reported by the drive; it is then never
         reported as stopped."""
         self.contradiction = contradiction(identity, profile)
-        """How the drive's reported identity contradicts its profile; empty if it does not."""
+        """Contradiction between the drive's reported identity and its profile; empty if none."""
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.byte_order = ByteOrder(device)

@@ -10,7 +10,7 @@ from pathlib import Path
 from tui.drive.small_file import read_small_text
 
 NOWHERE = Path(os.devnull) / "no home folder is known: name a folder in DRIVEPANEL_STATE"
-"""Stands in for a missing state folder: every use of it fails, with its name as the reason."""
+"""Path for a missing state folder: every use of it fails, with its name as the reason."""
 FOLDER_MODE = 0o700
 LONGEST_STORED = 1_000_000
 """Most bytes of such a file; a longer one is not read."""

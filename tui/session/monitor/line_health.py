@@ -25,7 +25,7 @@ class LineTrouble(NamedTuple):
     signs: tuple[str, ...]
     """Short texts for the status bar, longest first."""
     text: str
-    """What happened, what it means, and the first step."""
+    """The event, its meaning, and the first step."""
 
 
 class LineHealth:
