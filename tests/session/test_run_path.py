@@ -11,7 +11,7 @@ from tests.sources import PACKAGE, ROOT
 
 from .slow_drive import COMMAND, SlowBench, until
 
-MOST_HOPS = 14
+MOST_HOPS = 12
 HEADING = "## The key `r`, from the screen to the frame"
 PATH = ["WorkQueue", "Commander", "MotorStart", "CommandAccess"]
 """Objects between the queue of a drive and its line."""
