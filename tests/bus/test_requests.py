@@ -44,6 +44,22 @@ REQUESTS: list[tuple[Request, str]] = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("request_", "register", "changes"),
+    [
+        (Read(2, 3102, 4), 3102, False),
+        (WriteOne(1, 0xFA01, 0x1770), 0xFA01, True),
+        (WriteMany(2, 4043, (20, 30)), 4043, True),
+        (ReadWrite(2, 3102, 4, 9001, (20, 30)), 3102, True),
+        (Diagnose(4, 0, 0x3132), 0, False),
+        (Identify(2), 0, False),
+        (ReportId(1), 0, False),
+    ],
+)
+def test_first_register_and_effect(request_: Request, register: int, changes: bool) -> None:
+    assert (request_.register, request_.changes) == (register, changes)
+
+
 @pytest.mark.parametrize(("request_", "text"), REQUESTS)
 def test_bytes(request_: Request, text: str) -> None:
     assert frame(request_.device, request_.pdu()) == bytes.fromhex(text)

@@ -179,3 +179,15 @@ def test_end_of_time(received: bytes, kind: ResultKind) -> None:
     exchange = exchange_of(READ)
     exchange.feed(received)
     assert exchange.expired().kind is kind
+
+
+def test_whole_frames_around_a_reply_are_strays_and_noise_is_not() -> None:
+    exchange = exchange_of(READ)
+    result = exchange.feed(b"\x33" + OTHER + b"\x44\x55" + REPLY)
+    assert result is not None
+    assert result.strays == [Piece(OTHER, whole=True)]
+    assert result.resynchronised
+    assert result.received == b"\x33" + OTHER + b"\x44\x55" + REPLY
+    alone = exchange_of(READ).feed(REPLY)
+    assert alone is not None
+    assert (alone.strays, alone.resynchronised) == ([], False)

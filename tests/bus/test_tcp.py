@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import Callable, Sequence
 
 import pytest
@@ -13,6 +14,7 @@ from tui.bus.limits import CAUTIOUS
 from tui.bus.line import Timing
 from tui.bus.link import RtuTcpLink, TcpLink
 from tui.bus.prepared import prepared_write
+from tui.bus.transport.tcp import TcpTransport
 
 from .conftest import BRISK, WIDE, OpenLine
 from .peer import Step, TcpPeer, eventually, honest, reply, tcp_reply, tcp_request_length
@@ -53,6 +55,23 @@ async def test_wrong_reply_is_thrown_away(case: str, open_line: OpenLine) -> Non
         line = open_line(TcpLink("127.0.0.1", peer.port))
         with pytest.raises(WrongReply):
             await line.read(1, 5)
+
+
+async def test_dead_network_is_noticed_without_requests() -> None:
+    with TcpPeer(tcp_honest, length=tcp_request_length) as peer:
+        transport = await TcpTransport.connect("127.0.0.1", peer.port, 5.0)
+        assert transport._connection is not None
+        connection: socket.socket = transport._connection.get_extra_info("socket")
+        assert connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+        options = ("TCP_KEEPIDLE", "TCP_KEEPINTVL", "TCP_KEEPCNT", "TCP_USER_TIMEOUT")
+        found = {
+            name: connection.getsockopt(socket.IPPROTO_TCP, getattr(socket, name))
+            for name in options
+            if hasattr(socket, name)  # not on every system
+        }
+        expected = dict(zip(options, (10, 5, 3, 5000), strict=True))
+        assert found == {name: expected[name] for name in found}
+        transport._connection.close()
 
 
 async def test_reply_of_another_unit_is_thrown_away(open_line: OpenLine) -> None:
