@@ -294,6 +294,7 @@ def test_broken_frames_and_silences_are_reported() -> None:
     assert "Broken silences: 1 frame began too soon after another" in hasty.lines
     kept = Heard().say(READ, WORDS)
     assert "Silences between frames are kept." in kept.lines
+    assert "Silences between frames" not in Heard().say(b"\x33\x44").lines
 
 
 def test_silences_are_not_judged_where_readings_tell_none() -> None:
