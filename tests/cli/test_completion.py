@@ -53,6 +53,11 @@ def test_commands_are_not_imported_for_it() -> None:
     assert done.stdout.splitlines() == ["['status']", "[]"]
 
 
+def test_profiles_are_completed_with_their_names() -> None:
+    found = ShellComplete(main, {}, "drivepanel", "_X").get_completions(["status", "-p"], "atv7")
+    assert [(item.value, item.help) for item in found] == [("atv71", library.load("atv71").name)]
+
+
 def test_options() -> None:
     assert {"--device", "--profile", "--every", "--csv", "--json"} <= set(completed("watch --"))
     assert {"--read-only", "--low-bandwidth", "--verbose"} <= set(completed("--"))

@@ -12,7 +12,7 @@ from typing import Any, get_args, get_type_hints
 import pytest
 
 from tests.session.test_journal import entry
-from tui.cli.commands.journal import since
+from tui.cli.commands.journal import entry_line, since
 from tui.session.journal import Entry
 
 from .commands import ended, held, put, refused, run, tcp_line
@@ -46,6 +46,12 @@ def test_journal_lists_writes_and_reports_damage(journal: Path) -> None:
     assert "FAULT ObF Overbraking" in trip
     assert f"{journal}, line 4 is not a valid entry" in done.stderr
     assert "\x1b" not in done.output
+
+
+def test_entry_begins_with_its_local_time() -> None:
+    made = replace(entry(1), time="2026-11-26T14:05:09.123+00:00")
+    assert entry_line(made).startswith("2026-11-26 14:05:09  1/")
+    assert entry_line(replace(made, time="cut off")).startswith("cut off  1/")
 
 
 def test_drive_and_time_select(journal: Path) -> None:

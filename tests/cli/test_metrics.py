@@ -14,7 +14,7 @@ import pytest
 import pytest_asyncio
 
 from tui.bus.api import Contact, DeviceCounters, LastMinute, LineCounters
-from tui.cli.plant.metrics import BASE_UNITS, metrics_text, value_metric
+from tui.cli.plant.metrics import BASE_UNITS, METRICS, metrics_text, value_metric
 from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
 from tui.cli.plant.status import DriveStatus, LineReport
 from tui.drive.profile import library
@@ -150,6 +150,13 @@ def test_every_line_has_the_form_and_every_metric_its_type_once() -> None:
             assert SAMPLE.fullmatch(line), line
             assert line.startswith(types[-1]), "samples of one metric stand together"
     assert len(types) == len(set(types))
+
+
+def test_every_metric_has_a_type_and_a_sentence() -> None:
+    for name, head in METRICS.items():
+        assert head.kind in ("gauge", "counter", "histogram"), name
+        assert (head.kind == "counter") is name.endswith("_total"), name
+        assert re.fullmatch(r"[A-Z1].* .*\.", head.help), name
 
 
 def test_every_unit_of_every_profile_makes_a_name() -> None:
