@@ -416,6 +416,8 @@ def _is_only_read(node: ast.AST) -> bool:
             return True
         case ast.Assign(targets=[ast.Name(id="__all__" | "__slots__")]):
             return True
+        case ast.keyword(arg="frozen" | "kw_only"):
+            return True  # of a class: what a program does wrong by it, mypy finds
         case ast.Call(func=ast.Name(id=name)) | ast.Subscript(value=ast.Name(id=name)):
             return name in FOR_TYPES
     return False
