@@ -1,6 +1,7 @@
-"""What a class with a lock changes, it changes under the lock, in each of its methods.
+"""What a class with a lock changes, it changes under the lock; no thread keeps a program alive.
 
-A test of behavior would notice a missing lock once in thousands of runs.
+A test of behavior would notice a missing lock once in thousands of runs, and such a thread only if
+its disk or its port hangs.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 import pytest
 
-from .sources import PACKAGE, modules, nodes_of
+from .sources import PACKAGE, calls_of, modules, nodes_of
 
 LOCKS = {"Lock", "RLock", "Condition"}
 CHANGES = {
@@ -137,6 +138,16 @@ def test_class_with_a_lock_changes_nothing_without_it() -> None:
     assert len(classes) >= 20
     found = {name: used for node in classes for name, used in without_lock(node).items()}
     assert found == {name: set(used.split()) for name, (used, _) in WITHOUT_LOCK.items()}
+
+
+def test_no_thread_keeps_its_program_from_ending() -> None:
+    keeping = set()
+    for path, call in calls_of("Thread"):
+        daemon = next((word.value for word in call.keywords if word.arg == "daemon"), None)
+        if not (isinstance(daemon, ast.Constant) and daemon.value is True):
+            keeping.add(path.relative_to(PACKAGE).as_posix())
+    # one stops motors when its program ends, and the callers of the other one choose
+    assert keeping == {"cli/shared/signals.py", "terminal/last_words.py"}
 
 
 BOX = """
