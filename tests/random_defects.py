@@ -30,16 +30,19 @@ from tests.sources import PACKAGE, ROOT, modules, tree_of
 PACKAGES = ("bus", "keeper", "session", "drive", "cli", "screens")
 LEAST = 0.92
 """The share of defects that must be noticed; on the way of a stop, all."""
-MOST_TESTS = 40
+MOST_TESTS = 40, 120
+"""Tests that are run for one defect, and as many more if none of them fails."""
 MOST_ALIKE = 3
 """Tests of one function with other parameters that are run for one defect, if there are others."""
-MOST_SECONDS = 100.0
-"""The tests of one defect, when they were recorded."""
+MOST_SECONDS = 100.0, 200.0
+"""Time of these tests, as recorded."""
+FOLDERS = {"screens": "ui", "keeper": "session"}
+"""By package: the folder of its tests, if it has another name."""
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
 IN_PROCESSES = {"tui/keeper/": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py")}
 """By the beginning of a path: tests of code that runs in processes that are not recorded."""
-BY_SOURCE = {"lock": ["tests/test_locks.py"]}
-"""By kind of defect: tests that read the source itself."""
+BY_SOURCE = re.compile(r"\bwith self\._|Thread\(")
+"""Lines on locks and threads, which tests check in the source."""
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.*)$", re.MULTILINE)
 UNREACHED, EQUAL = "NOT REACHED", "EQUIVALENT"
 
@@ -167,14 +170,15 @@ class Chooser:
             name for name, reach in record.tests.items() if reach.passed and _exists(name)
         }
 
-    def tests(self, mutant: Mutant) -> list[str]:
-        """The tests to run, those most about the changed line first."""
-        found = self._reaching(mutant) & self._usable
-        tests = self._best(found, mutant.path.removesuffix(".py").replace("/", "."))
+    def tests(self, mutant: Mutant) -> list[list[str]]:
+        """The tests to run, those most about the changed line first, and those to run then."""
+        first, then = self._best(self._reaching(mutant) & self._usable, mutant.path)
         for beginning, others in IN_PROCESSES.items():
             if mutant.path.startswith(beginning):
-                tests += others
-        return tests + BY_SOURCE.get(mutant.change.kind, [])
+                first += others
+        if BY_SOURCE.search(_text(mutant.path).splitlines()[mutant.line - 1]):
+            first.append("tests/test_locks.py")
+        return [part for part in (first, then) if part]
 
     def _reaching(self, mutant: Mutant) -> set[str]:
         lines = self._record.lines(mutant.path)
@@ -187,19 +191,31 @@ class Chooser:
         found = set().union(*(self._record.lines(path).get(line, set()) for path, line in used))
         return found or set().union(*lines.values())
 
-    def _best(self, found: set[str], module: str) -> list[str]:
-        """At most so many: half of files that name the module, all with few lines first."""
+    def _best(self, found: set[str], path: str) -> list[list[str]]:
+        """First those of files that name the module, then of its package, and others.
+
+        Of each of them those that reach the fewest lines.
+        """
         few_lines = sorted(found, key=lambda name: (self._record.tests[name].lines, name))
+        module = path.removesuffix(".py").replace("/", ".")
+        package = path.split("/")[1]
+        folder = f"tests/{FOLDERS.get(package, package)}/"
         near = [name for name in few_lines if module in _text(name.partition("::")[0])]
-        ordered = dict.fromkeys([*_varied(near)[: MOST_TESTS // 2], *_varied(few_lines)])
-        chosen: list[str] = []
-        seconds = 0.0
-        for name in ordered:
-            takes = self._record.tests[name].seconds
-            if len(chosen) < MOST_TESTS and seconds + takes < MOST_SECONDS:
-                chosen.append(name)
-                seconds += takes
-        return chosen
+        beside = [name for name in few_lines if name.startswith(folder)]
+        most = MOST_TESTS[0]
+        ordered = [*_varied(near)[: most // 2], *_varied(beside)[: most // 4], *_varied(few_lines)]
+        left = list(dict.fromkeys(ordered))
+        parts = []
+        for number, seconds in zip(MOST_TESTS, MOST_SECONDS, strict=True):
+            part: list[str] = []
+            for name in left:
+                takes = self._record.tests[name].seconds
+                if len(part) < number and takes < seconds:
+                    part.append(name)
+                    seconds -= takes
+            left = [name for name in left if name not in part]
+            parts.append(part)
+        return parts
 
 
 def _varied(names: Iterable[str]) -> list[str]:
@@ -234,7 +250,7 @@ def _exists(name: str) -> bool:
 class Judge:
     """Plants one defect at a time in copies, and believes only a test that fails by it alone."""
 
-    def __init__(self, tests: Mapping[Mutant, list[str]]) -> None:
+    def __init__(self, tests: Mapping[Mutant, list[list[str]]]) -> None:
         self._tests = tests
         self._passes: dict[str, bool] = {}
 
@@ -245,7 +261,7 @@ class Judge:
         if mutant.identity in EQUIVALENT:
             by = EQUAL
         else:
-            by = self._noticed_by(mutant, tests.copy(), copy) if tests else UNREACHED
+            by = self._noticed_by(mutant, tests, copy) if tests else UNREACHED
         package = mutant.path.split("/")[1]
         seconds = time.monotonic() - begun
         first_line = (
@@ -253,20 +269,21 @@ class Judge:
         )
         return Judged(mutant.identity, package, first_line, by, seconds, len(tests))
 
-    def _noticed_by(self, mutant: Mutant, tests: list[str], copy: Path) -> str:
+    def _noticed_by(self, mutant: Mutant, parts: list[list[str]], copy: Path) -> str:
         path = copy / mutant.path
         defective = mutant.apply(path.read_text("utf-8"))
-        while tests:
-            with replaced(path, defective):
-                failed = self._first_failure(tests, copy)
-                repeated = failed and self._first_failure([failed], copy)
-            if not failed:
-                return SURVIVED
-            if repeated and self._passes_without(failed, copy):
-                return failed
-            if failed not in tests:
-                return SURVIVED  # one of a file that was chosen as a whole
-            tests.remove(failed)
+        for tests in map(list.copy, parts):
+            while tests:
+                with replaced(path, defective):
+                    failed = self._first_failure(tests, copy)
+                    repeated = failed and self._first_failure([failed], copy)
+                if not failed:
+                    break
+                if repeated and self._passes_without(failed, copy):
+                    return failed
+                if failed not in tests:
+                    break  # one of a file that was chosen as a whole
+                tests.remove(failed)
         return SURVIVED
 
     def _first_failure(self, tests: list[str], copy: Path) -> str:
