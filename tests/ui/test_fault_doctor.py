@@ -42,6 +42,15 @@ def test_every_fault_is_reported_without_a_cut_at_80_columns(family: str) -> Non
         assert all(line.cell_len <= 80 for line in doctor_lines(shown, 80, 40))
 
 
+def test_fault_without_a_number_is_named_before_its_causes() -> None:
+    profile = library.load("powerdrive")
+    (help_,) = profile.guide.data.faults
+    text = reported(view(None, profile=profile, present=True), 120)
+    first, second = text.partition("Probably")[2].splitlines()[:2]
+    assert first.strip() == help_.name
+    assert help_.probable[0] in second
+
+
 def test_general_practice_is_reported_to_be_so() -> None:
     practice = reported(view(1))
     assert "practice" in practice.partition("Probably")[2].splitlines()[0]
