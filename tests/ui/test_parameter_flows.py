@@ -172,6 +172,8 @@ async def test_reports_on_edits_are_true_while_motor_runs() -> None:
         await stage(made, "5", "DEC → 5.0 s: 3 staged. TFR waits until the motor is at standstill.")
         await made.pilot.press("W")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        follows = str(made.app.screen.query_one("#follows").render())
+        assert {"ACC", "DEC", "TFR"} & set(follows.split()) == {"DEC"}
         await made.pilot.press("y")
         await message(made, "Wrote 1, all verified; 2 still staged: ACC, TFR")
         await until(made.pilot, lambda: "Now 5.0 s, was 3.0 s." in shown(made.app, "detail"))
