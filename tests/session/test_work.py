@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
 
@@ -392,3 +393,22 @@ async def test_the_drive_is_looked_at_again_behind_every_task(reported: Notified
     reported.put("c", error=OrderRefused("No."))
     await reported.idle()
     assert seen == ["a done", "b begun", "c given up"]
+
+
+async def test_stop_while_a_drive_is_armed_leaves_it_disarmed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    notified = Notified()
+    notified.arming.disarm("")
+    arm = notified.arming.arm
+    stop = threading.Thread(target=notified.queue.stop, args=("the stop key",), daemon=True)
+
+    def met(*, seconds: float) -> None:
+        stop.start()
+        stop.join(0.2)  # it waits for the end of the arming
+        arm(seconds=seconds)
+
+    monkeypatch.setattr(notified.arming, "arm", met)
+    notified.queue.arm(notified.queue.stops, 60.0)
+    stop.join(20.0)
+    assert not notified.arming.armed
