@@ -8,6 +8,7 @@ from tui.drive.profile import library
 from tui.drive.settings.dependence import builds_on
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.in_force import limit_passed, limits_in_force
+from tui.drive.settings.limits import edit_problems
 from tui.drive.settings.selection import (
     Choice,
     FilterContext,
@@ -42,6 +43,17 @@ def test_the_own_limit_counts_where_the_other_is_wider_or_not_known() -> None:
     wide = limits_in_force(ATV71, ATV71["HSP"], {**HELD, "TFR": 30000})
     assert wide is not None
     assert wide.high_by == ""
+
+
+def test_limit_by_a_multiple_counts_if_either_parameter_is_edited() -> None:
+    held = {**HELD, "TA1": 10, "TA2": 80}
+    assert edit_problems(ATV71, Edits().stage(ATV71, "TA1", "15", held), held) == {}
+    for code, value in (("TA1", "30"), ("TA2", "95")):
+        problems = edit_problems(ATV71, Edits().stage(ATV71, code, value, held), held)
+        assert list(problems) == [code]
+        assert "TA2 = " in problems[code]
+    past = {**held, "TA1": 30}
+    assert edit_problems(ATV71, Edits().stage(ATV71, "ACC", "4", past), past) == {}
 
 
 def test_non_number_has_no_limits() -> None:
