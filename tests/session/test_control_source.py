@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
 from tui.session.work import OutcomeKind
@@ -45,4 +46,14 @@ async def test_a_word_that_cannot_be_read_changes_nothing() -> None:
         before = made.writes()
         made.commander.configure(made.session.profile.data.control_sources[1])
         assert "RFC cannot be read" in await made.done(OutcomeKind.REFUSED)
+        assert made.writes() == before
+
+
+async def test_value_out_of_range_is_not_written() -> None:
+    async with bench("atv71") as made:
+        before = made.writes()
+        source = made.session.profile.data.control_sources[1]
+        settings = [msgspec.structs.replace(setting, value=999) for setting in source.settings]
+        made.commander.configure(msgspec.structs.replace(source, settings=settings))
+        assert "999" in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == before
