@@ -189,16 +189,6 @@ async def test_unanswered_stop_is_repeated(open_line: OpenLine) -> None:
         await asyncio.to_thread(eventually, lambda: writes(peer) == [0, 0])
 
 
-async def test_read_of_a_stop_is_not_repeated(open_line: OpenLine) -> None:
-    with PtyPeer(slow) as peer:
-        line = doubting(open_line, peer, 0.6)
-        line.describe(1, NO_ECHO)
-        await line.read(1, OTHER, priority=Priority.STOP)
-        await asyncio.sleep(0.7)
-        await line.read(1, OTHER)
-        assert functions(peer) == [3, 3]
-
-
 async def test_only_last_stop_of_a_drive_is_repeated(open_line: OpenLine) -> None:
     with PtyPeer(slow) as peer:
         line = doubting(open_line, peer, 0.6)
