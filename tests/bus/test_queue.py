@@ -11,6 +11,7 @@ from tui.bus.master import Piece
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
 from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, SHORT_WAIT, Devices, pause
 from tui.bus.schedule.queue import Job, JobQueue
+from tui.bus.schedule.unsent import is_stop_word
 from tui.bus.trace import Trace
 from tui.wire.frames import frame
 
@@ -467,3 +468,14 @@ def test_when_a_device_was_last_heard() -> None:
     devices.answered(1, expectation, 0.005, 5.0)
     devices.silent(1, expectation, 6.0, 7.0)
     assert devices.state(1).heard == 5.0
+
+
+@pytest.mark.parametrize(
+    ("priority", "stops"),
+    [(Priority.STOP, True), (Priority.FEED, True), (Priority.OPERATOR_WRITE, False)],
+)
+def test_only_writes_up_to_the_repeat_of_a_stop_are_stop_words(
+    priority: Priority, stops: bool
+) -> None:
+    assert is_stop_word(Job(WriteOne(1, 8501, 0), priority, WIDE)) is stops
+    assert not is_stop_word(Job(Read(1, 8501, 1), priority, WIDE))

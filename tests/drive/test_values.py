@@ -282,3 +282,20 @@ def find_everything(profile: Profile) -> int:
 def test_every_code_is_found(profile_id: str) -> None:
     profile = library.load(profile_id)
     assert find_everything(profile) == len(profile.parameters)
+
+
+@pytest.mark.parametrize(
+    ("type", "low", "high"),
+    [
+        ("uint16", 0, 65535),
+        ("int16", -32768, 32767),
+        ("uint32", 0, 4294967295),
+        ("int32", -2147483648, 2147483647),
+    ],
+)
+def test_range_of_each_type(type: str, low: int, high: int) -> None:
+    assert type_range(parameter(type=type)) == (low, high)
+
+
+def test_range_of_a_field_is_its_mask() -> None:
+    assert type_range(parameter(mask=7, shift=4)) == (0, 7)

@@ -306,3 +306,22 @@ def test_reader_sees_latest_entry(journal: Journal) -> None:
     for number in range(30):
         journal.add(entry(number))
         assert entries_of(journal, "line", 1)[-1].new_raw == number
+
+
+def test_entries_wait_if_there_is_no_thread_to_write_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Journal(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, "start", no_thread)
+        made.add(entry(1))
+        assert "no thread can be started" in made.trouble
+        assert (made.unkept, made.lost) == (1, 0)
+    made.add(entry(2))
+    assert made.flush()
+    assert (made.unkept, made.trouble) == (0, "")
+    made.close()
+
+
+def no_thread(thread: threading.Thread) -> None:
+    raise RuntimeError("no thread can be started")
