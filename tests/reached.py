@@ -218,7 +218,9 @@ def same_lines(before: list[str], after: list[str]) -> list[tuple[int, int]]:
 
 
 def recorded() -> Record | None:
-    """All that is recorded for the present commit and those that it comes from."""
-    kept = {path.stem for path in folder().glob("*.json")}
-    commits = [commit for commit in git("rev-list", "HEAD").split() if commit in kept]
-    return Record(commits) if commits else None
+    """All that is recorded for commits that this repository has, rebased ones included."""
+    files = sorted(folder().glob("*.json"), key=lambda path: path.stat().st_mtime, reverse=True)
+    known = git("cat-file", "--batch-check", "--batch-all-objects", "--unordered")
+    commits = {name for name, kind, _ in map(str.split, known.splitlines()) if kind == "commit"}
+    kept = [path.stem for path in files if path.stem in commits]
+    return Record(kept) if kept else None
