@@ -14,7 +14,7 @@ import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE
 from tests.sweeps import kept
-from tui.cli.commands.orders import close_journal
+from tui.cli.shared.drive_commands import close_journal
 from tui.session.journal import Journal
 
 from .commands import invoked

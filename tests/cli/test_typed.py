@@ -10,8 +10,8 @@ import click
 import pytest
 
 from tui.bus.fake import FakeLine
-from tui.cli.commands.orders import permit_of
 from tui.cli.main import main
+from tui.cli.shared.drive_commands import permit_of
 from tui.cli.shared.errors import REFUSED_HERE, Failure
 from tui.cli.shared.typed import ONE_COMMAND, note_typed, process_began, typed_at
 from tui.drive.profile import library

@@ -10,6 +10,14 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.block_output import show_blocks, show_neighbors
+from ..shared.drive_commands import (
+    arm_option,
+    close_journal,
+    complain,
+    journal_document,
+    need_arming,
+    permit_of,
+)
 from ..shared.errors import (
     DIFFERENT,
     DONE,
@@ -33,7 +41,6 @@ from ..shared.options import (
 from ..shared.registration import WRITING, command
 from ..shared.say import say
 from ..shared.sets import dry_run_option, write_down
-from .orders import arm_option, close_journal, complain, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment

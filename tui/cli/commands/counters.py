@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.drive_commands import arm_option, close_journal, journal_document, need_arming
 from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
@@ -23,7 +24,6 @@ from ..shared.options import (
 from ..shared.output import drive_fields, last_minute_field, print_json
 from ..shared.registration import WRITING, command
 from ..shared.say import say, say_row
-from .orders import arm_option, close_journal, journal_document, need_arming
 
 if TYPE_CHECKING:
     from tui.bus.api import DeviceCounters

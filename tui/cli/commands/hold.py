@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import click
 
 from ..running.holding import Holding, keep_polling
+from ..shared.drive_commands import complain
 from ..shared.errors import LINE_TROUBLE, Failure, status_of
 from ..shared.options import (
     Target,
@@ -25,7 +26,6 @@ from ..shared.options import (
 from ..shared.pending_timeouts import timeout_field
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say
-from .orders import complain
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine

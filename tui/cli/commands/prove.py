@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.drive_commands import (
+    arm_drive,
+    arm_option,
+    carried_out,
+    complain,
+    need_arming,
+    watched,
+)
 from ..shared.errors import DIFFERENT, DRIVE_REFUSED, REFUSED_HERE, Failure
 from ..shared.options import (
     Target,
@@ -19,7 +27,6 @@ from ..shared.options import (
 from ..shared.output import drive_fields, print_json
 from ..shared.registration import WRITING, command
 from ..shared.say import say
-from .orders import arm_drive, arm_option, carried_out, complain, need_arming, watched
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine

@@ -8,6 +8,13 @@ from typing import TYPE_CHECKING, TypedDict
 
 import click
 
+from ..shared.drive_commands import (
+    arm_option,
+    close_journal,
+    journal_document,
+    need_arming,
+    permit_of,
+)
 from ..shared.drives import on_each_drive
 from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE
 from ..shared.options import (
@@ -36,7 +43,6 @@ from ..shared.sets import (
     set_in,
     status_of_results,
 )
-from .orders import arm_option, close_journal, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edit

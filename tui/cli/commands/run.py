@@ -11,6 +11,7 @@ import click
 
 from ..running.telling import BufferedOutput, RunTelling
 from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
+from ..shared.drive_commands import arm_drive, arm_option, carried_out, need_arming, watched
 from ..shared.errors import REFUSED_HERE, Failure
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
@@ -23,7 +24,6 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.registration import WRITING, command
-from .orders import arm_drive, arm_option, carried_out, need_arming, watched
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId

@@ -15,6 +15,13 @@ from tui.drive.reset_text import MAY_START
 from tui.session.patience import patience
 from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 
+from ..shared.drive_commands import (
+    arm_drive,
+    arm_option,
+    carried_out,
+    need_arming,
+    watched,
+)
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from ..shared.options import (
     Target,
@@ -27,13 +34,6 @@ from ..shared.options import (
 )
 from ..shared.registration import WRITING, command
 from ..shared.say import Messages
-from .orders import (
-    arm_drive,
-    arm_option,
-    carried_out,
-    need_arming,
-    watched,
-)
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine

@@ -18,6 +18,7 @@ from ..running.stop_targets import (
 )
 from ..running.stop_telling import StopTelling
 from ..shared.control import GIVE_BACK_OPTION, taking_of
+from ..shared.drive_commands import carried_out, close_journal, complain, journal_document
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, end_with
 from ..shared.left_behind import forget_start
 from ..shared.options import (
@@ -31,7 +32,6 @@ from ..shared.options import (
 from ..shared.output import print_json
 from ..shared.pending_timeouts import PolledDrive, look_after
 from ..shared.registration import WRITING, command
-from .orders import carried_out, close_journal, complain, journal_document
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId

@@ -7,6 +7,13 @@ from typing import TYPE_CHECKING, TypedDict
 import click
 
 from ..shared.completion import complete_setting
+from ..shared.drive_commands import (
+    arm_option,
+    close_journal,
+    journal_document,
+    need_arming,
+    permit_of,
+)
 from ..shared.errors import DONE, REFUSED_HERE, end_with
 from ..shared.options import (
     Target,
@@ -32,7 +39,6 @@ from ..shared.sets import (
     say_afterwards,
     status_of_results,
 )
-from .orders import arm_option, close_journal, journal_document, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edits

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from tui.session.running.ending import Ending
 
-from ..commands.orders import close_journal, journal_document
 from ..plant.publish_options import PublishOptions, is_loopback
+from ..shared.drive_commands import close_journal, journal_document
 from ..shared.errors import LINE_TROUBLE, Failure
 from ..shared.host_port import why_not_served, written_host_port
 from ..shared.line_argument import mind_the_drive

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..commands.orders import complain
+from ..shared.drive_commands import complain
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from ..shared.options import unidentified
 

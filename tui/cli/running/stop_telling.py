@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tui.session.connect.addresses import addresses_text
 
-from ..commands.orders import complain
+from ..shared.drive_commands import complain
 from ..shared.errors import DONE
 from ..shared.pending_timeouts import timeout_field
 from ..shared.say import say

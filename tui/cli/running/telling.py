@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from tui.session.reading import with_text
 
-from ..commands.orders import complain
+from ..shared.drive_commands import complain
 from ..shared.drive_status import shown_fields, shown_values
 from ..shared.pending_timeouts import timeout_field
 from ..shared.say import printable

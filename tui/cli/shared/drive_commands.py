@@ -12,13 +12,10 @@ import click
 from tui.drive.orders import OrderRefused
 from tui.session.work import Outcome, OutcomeKind
 
-from ..shared.errors import REFUSED_HERE, Failure, note_journal, status_of
-from ..shared.options import (
-    Target,
-    connect_drive,
-)
-from ..shared.say import say
-from ..shared.typed import refuse_if_stopped
+from .errors import REFUSED_HERE, Failure, note_journal, status_of
+from .options import Target, connect_drive
+from .say import say
+from .typed import refuse_if_stopped
 
 if TYPE_CHECKING:
     from tui.session.command.commander import Commander
@@ -70,7 +67,7 @@ async def watched(
     from tui.session.fleet import Fleet
     from tui.session.running.watching import WATCH_PERIOD, first_cycle
 
-    from ..shared.drive_status import shown_codes
+    from .drive_status import shown_codes
 
     session = await connect_drive(opened, target)
     journal = journal_document()
