@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -159,6 +160,34 @@ async def test_a_write_that_was_never_sent_changes_nothing_of_what_is_known(
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert session.image.raws["ACC"] == 30
     assert line.written == []
+
+
+KEPT_IN_RAM = profile_of(
+    parameter("ACC", 10, unit="s", scale="0.1", storage="ram-until-saved"),
+    functions=[{"code": 3, "name": "Read", "max_read": 29}, {"code": 6, "name": "Write"}],
+)
+
+
+@pytest.mark.parametrize(
+    ("error", "unsaved"),
+    [
+        (None, {"ACC"}),
+        (NoAnswer(1, 6, 10), {"ACC"}),
+        (DeviceException(1, 6, 10, 4, "failure"), set()),
+        (RequestRefused("The line is read-only: nothing is written."), set()),
+    ],
+)
+async def test_setting_counts_as_unsaved_if_its_frame_was_sent_and_not_refused(
+    line: WilfulLine, journal: Journal, error: LineError | None, unsaved: set[str]
+) -> None:
+    session = DriveSession(line, 1, KEPT_IN_RAM)
+    session.arming.arm(seconds=math.inf)
+    await Reader(session).read(["ACC"])
+    if error is not None:
+        line.fail_write(1, 10, error)
+    with suppress(LineError):
+        await writer(session, journal).write_parameter(KEPT_IN_RAM["ACC"], 50, why="setting")
+    assert session.unsaved_settings.codes == unsaved
 
 
 async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
