@@ -52,3 +52,19 @@ def test_noise_is_a_packet_of_the_raw_form_only(tmp_path: Path) -> None:
         file.close()
     assert (raw.packets, tcp.packets) == (2, 1)
     assert b"before it, no frame: 00" in (tmp_path / "b").read_bytes()
+
+
+def test_file_whose_head_does_not_fit_is_closed_and_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Any] = []
+    open_file = Path.open
+
+    def full(path: Path, *how: Any, **more: Any) -> Any:
+        opened.append(open_file(path, *how, **more))
+        return FullDisk(opened[0], 30)
+
+    monkeypatch.setattr(Path, "open", full)
+    with pytest.raises(OSError, match="No space"):
+        CaptureFile(tmp_path / "x.pcapng", "line")
+    assert opened[0].closed
