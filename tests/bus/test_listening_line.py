@@ -79,7 +79,7 @@ def _leads_to(descriptor: int) -> str:
 def test_a_port_that_goes_away_is_reported(talk: Talk) -> None:
     with ListeningLine(SerialLink(talk.path), None, ME) as line:
         talk.close()
-        with pytest.raises(LineLost, match="went away"):
+        with pytest.raises(LineLost, match="disappeared"):
             line.read(5.0)
 
 
