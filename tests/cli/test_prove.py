@@ -28,7 +28,7 @@ def test_on_the_run_without_a_terminal_takes_a_yes() -> None:
 
 def test_the_time_out_of_each_port_counts() -> None:
     output = refused(1, "prove", "sim:powerdrive", "-p", "powerdrive", "--arm")
-    assert "15.07 is Off and 11.63 is Off: the drive does not notice a dead line" in output
+    assert "15.07 is Off and 11.63 is Off: the drive does not react to communication loss" in output
     with tcp_line("powerdrive@1", "--set", "11.63=5", "--any-settings") as line:
         reported = ended(1, "prove", line, "-p", "powerdrive", "--arm")
     # the simulated drive is asked by its module, which has another timeout

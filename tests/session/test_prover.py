@@ -276,7 +276,7 @@ async def test_a_watch_that_is_off_is_nothing_to_prove() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     drive.registers[TIMEOUT] = 0
-    with pytest.raises(NothingToProve, match="does not notice"):
+    with pytest.raises(NothingToProve, match="does not react"):
         await bench(clock, drive).prove()
     assert not drive.facts.paused
 
@@ -314,7 +314,7 @@ class WithoutModule(OneDrive):
 @pytest.mark.parametrize(
     ("codes", "reported"),
     [
-        (("15.07",), "11.63 is Off: the drive does not notice .* 15.07 cannot be read: perhaps"),
+        (("15.07",), "11.63 is Off: the drive does not react .* 15.07 cannot be read: perhaps"),
         (("15.07", "11.63"), "15.07 and 11.63 cannot be read: .* is not known; nothing was proved"),
     ],
 )

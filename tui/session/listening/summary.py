@@ -171,7 +171,7 @@ def feeding_text(feeding: Feeding) -> str:
     heard = feeding.known == "heard"
     known = "as heard" if heard else "factory setting; its own was not heard"
     if feeding.seconds is None or feeding.margin is None:
-        follows = ": it does not notice a lost master" if heard else ""
+        follows = ": it does not react to a lost master" if heard else ""
         return f"timeout {feeding.code} off ({known}){follows}"
     head = f"timeout {feeding.code} {feeding.seconds:g} s ({known})"
     if not feeding.begun:

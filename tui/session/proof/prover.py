@@ -57,9 +57,9 @@ def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) ->
     silent = " and ".join(code for code in ports if code not in reported)
     missing = f"{silent} cannot be read: perhaps this drive has no such word"
     if not reported:
-        return f"{missing}. Whether it notices a dead line is not known; nothing was proved."
+        return f"{missing}. Its reaction to communication loss is not known; nothing was proved."
     off = " and ".join(f"{code} is {reading.text}" for code, reading in reported.items())
-    goes_on = "the drive does not notice a dead line, and a motor that runs goes on."
+    goes_on = "the drive does not react to communication loss, and a running motor continues."
     return f"{off}: {goes_on}" + (f" {missing}." if silent else "")
 
 
