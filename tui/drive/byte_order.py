@@ -1,4 +1,4 @@
-"""True if the bytes of words arrive swapped, by what a profile documents. Pure functions."""
+"""Detection of swapped bytes in a drive's words, from its profile. Pure functions."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ USUAL_SETTINGS: tuple[Quantity, ...] = (
     "max_frequency",
     "rated_frequency",
 )
-"""Settings that have a narrow range on every family, and are hardly ever 0."""
+"""Roles of settings with a narrow range in every family, which are rarely 0."""
 
 ENOUGH = 5
-"""Settings that are read to see the order."""
+"""Number of settings to read to detect the byte order."""
 
 
 def swapped_word(word: int) -> int:
-    """A word with its two bytes the other way round."""
+    """Return a word with its two bytes swapped."""
     return (word >> 8 | word << 8) & 0xFFFF
 
 
 def only_swapped(profile: Profile, parameter: Parameter, raw: int) -> bool | None:
-    """True if a raw value makes sense only with its bytes swapped, False if only as it came.
+    """Return True if a raw value is valid only with its bytes swapped, False if only unchanged.
 
-    None if both make sense, or neither, or if no manual says what makes sense.
+    None if both are valid, or neither, or if no manual states the valid values.
     """
     if not _has_limits(profile, parameter):
         return None
     word = raw & 0xFFFF
     if profile.data.reading.unknown_word in (word, swapped_word(word)):
-        return None  # the drive has no value for it
+        return None  # the drive's word for "no value"
     came = _makes_sense(profile, parameter, word)
     return None if came == _makes_sense(profile, parameter, swapped_word(word)) else not came
 
 
 def telling_codes(profile: Profile) -> tuple[str, ...]:
-    """Settings of which nearly every value shows how its bytes arrive: those of the line first."""
+    """Return settings whose values show the byte order; those of the line come first."""
     roles: dict[str, str] = {}
     for setting in profile.data.link.settings:
-        roles.setdefault(setting.role, setting.parameter)  # of the first port: others may lack
+        roles.setdefault(setting.role, setting.parameter)  # the first port; others may be missing
     first = (profile.get(code) for code in roles.values())
     more = (profile.quantity(quantity) for quantity in USUAL_SETTINGS)
     found = [
@@ -53,7 +53,7 @@ def telling_codes(profile: Profile) -> tuple[str, ...]:
 
 
 def _has_limits(profile: Profile, parameter: Parameter) -> bool:
-    """True if a manual names the values that a whole word can have."""
+    """Return True if a manual states the valid values of this whole word."""
     if word_count(parameter) != 1 or is_field(parameter) or parameter.bits:
         return False
     if not is_verified(parameter) or parameter.access == "w":

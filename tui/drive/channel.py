@@ -12,20 +12,20 @@ from .values import set_bits
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """The channel in force."""
+    """The active command or reference channel."""
 
     text: str
     """Name of the channel for a person; empty if it is not known."""
     by_line: bool | None
-    """True if it is this line; None where it is not known."""
+    """True if it is Modbus; None if that is not known."""
     parameter: Parameter | None = None
-    """The word that shows it, or that was not read and decides."""
+    """The word that shows the channel; if it is unknown, the deciding word that was not read."""
     is_several: bool = False
-    """True if another word counts under other conditions."""
+    """True if another word decides under other conditions."""
 
 
 NOT_TOLD = Channel("", None)
-"""No row of the profile holds."""
+"""Result if no row of the profile applies."""
 
 
 def command_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | None:
@@ -41,7 +41,7 @@ def reference_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | No
 
 
 def channel_codes(profile: Profile) -> list[str]:
-    """Codes of all words that show the channels in force, and what switches them."""
+    """Return the codes of all words that show or switch the active channels."""
     channels = profile.data.channels
     rows = [*channels.command, *channels.reference]
     reported = [(row.parameter, row.when) for row in rows]
@@ -51,7 +51,7 @@ def channel_codes(profile: Profile) -> list[str]:
 
 
 def switch_texts(profile: Profile, raws: Mapping[str, int]) -> list[str]:
-    """Return sentences on what can change the channel, or follows from a change."""
+    """Return sentences on the causes and the effects of a channel change."""
     found = []
     for switch in profile.data.channels.switches:
         raw = raws.get(switch.parameter)
@@ -64,7 +64,7 @@ def switch_texts(profile: Profile, raws: Mapping[str, int]) -> list[str]:
 
 
 def _in_force(profile: Profile, rows: Sequence[ChannelRow], raws: Mapping[str, int]) -> Channel:
-    """The channel of the first row that holds; not known where a word before it was not read."""
+    """Return the channel of the first row that applies; unknown if an earlier word is missing."""
     for row in rows:
         unread = _unread(row.when, raws)
         if unread == "":
@@ -79,7 +79,7 @@ def _in_force(profile: Profile, rows: Sequence[ChannelRow], raws: Mapping[str, i
 
 
 def _unread(conditions: Sequence[When], raws: Mapping[str, int]) -> str | None:
-    """The first word that was not read and decides; None where all hold, "" where one does not."""
+    """Return the first unread word that decides; None if all conditions hold, "" if one fails."""
     verdicts = [(when.parameter, when.holds(raws)) for when in conditions]
     if any(holds is False for _, holds in verdicts):
         return ""

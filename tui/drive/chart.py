@@ -1,4 +1,4 @@
-"""Reading a state chart: which state a status word means, and what else its bits say."""
+"""State chart evaluation: the state of a status word, and the meaning of its other bits."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class ChartState:
     """State from the status words; a part is None if its word was not read."""
 
     state: State
-    """The state in force: a fault if the fault word shows one, whatever the status word."""
+    """The state; a fault if the fault word shows one, independent of the status word."""
     own: State = UNKNOWN
-    """The state by the status word alone."""
+    """The state according to the status word only."""
     direction: Direction | None = None
     reached: bool | None = None
     alarm: bool | None = None
@@ -37,17 +37,17 @@ class ChartState:
 
     @property
     def kind(self) -> StateKind:
-        """The kind of the state, the same words on every family."""
+        """Kind of the state; the same terms for every family."""
         return self.state.kind
 
     @property
     def motion(self) -> StateKind:
-        """The kind for callers that need a motor at rest: a fault word alone stops no motor."""
+        """Kind for callers that need a motor at standstill: a fault word alone is no proof."""
         return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind
 
 
 def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
-    """The state of a drive, given raw values by code; UNKNOWN where none fits."""
+    """Return the state of a drive from raw values by code; UNKNOWN if no state matches."""
     chart = profile.chart(raws)
     word = raws.get(chart.status) if chart else None
     if chart is None or word is None:
@@ -65,12 +65,12 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
 
 
 def state_of(chart: Chart, word: int) -> State:
-    """The first state of the chart whose masked value the word has."""
+    """Return the first state of the chart whose masked value matches the word."""
     return next((s for s in chart.states if word & s.mask == s.value), UNKNOWN)
 
 
 def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
-    """The state in force in a chart; a fault word goes before the status word.
+    """Return the state in a chart; a fault word takes precedence over the status word.
 
     UNKNOWN if the status word was not read and there is no fault.
     """
@@ -82,25 +82,25 @@ def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
 
 
 def fault_number(profile: Profile, raws: Mapping[str, int]) -> int | None:
-    """The present fault by the fault word; None if it shows none, or keeps the last one."""
+    """Return the present fault from the fault word; None if it shows none, or the last one."""
     faults = profile.data.faults
     raw = raws.get(faults.parameter)
     return None if faults.shows_last or raw == faults.none else raw
 
 
 def fault_code(profile: Profile) -> str:
-    """The code of the word that alone shows a present fault; empty where none does."""
+    """Return the code of the word that shows a present fault; empty if the family has none."""
     faults = profile.data.faults
     return "" if faults.shows_last else faults.parameter
 
 
 def state_codes(profile: Profile, chart: Chart) -> list[str]:
-    """Codes of the words that show the state in a chart."""
+    """Return the codes of the words that show the state in a chart."""
     return [code for code in (chart.status, fault_code(profile)) if code]
 
 
 def watched_codes(profile: Profile) -> list[str]:
-    """Codes of every word that the charts of a profile look at, and of a present fault."""
+    """Return the codes of all words that the charts of a profile use, and of the fault word."""
     codes: list[str] = []
     for chart in profile.data.charts:
         marks = (

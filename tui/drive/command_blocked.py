@@ -1,4 +1,4 @@
-"""Why a command that can move the motor would have no effect now, and what is the way out."""
+"""Reasons why a command that can move the motor would have no effect now, and remedies."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class CommandBlocked:
     """Remedy as a sentence."""
     way: UnblockHint = ""
     by_channel: bool = False
-    """True if somebody else commands the drive."""
+    """True if the reason is that another source commands the drive, or may command it."""
 
 
 def held_back(
     profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]
 ) -> CommandBlocked | None:
-    """Return the reason against a command, as far as known; an unknown deciding word is one."""
+    """Return the reason against a command, if any; a deciding word that is unknown is a reason."""
     if (lock := locked_by(chart, id, raws)) is not None:
         if lock.parameter not in raws:
             return CommandBlocked(f"{lock.parameter} is not known, and it decides: {lock.text}")
@@ -54,7 +54,7 @@ def held_back(
 
 
 def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
-    """Why the present state allows no such start; empty where it does."""
+    """Return why the present state does not allow such a start; empty if it does."""
     state = state_now(profile, chart, raws)
     if state.kind == "fault":
         return IN_FAULT
@@ -69,7 +69,7 @@ def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str
 
 
 def _by_others(profile: Profile, found: Channel) -> CommandBlocked:
-    """Somebody else commands, or who does is not known."""
+    """Return the reason if another source commands the drive, or the commander is unknown."""
     word = found.parameter
     if word is None:
         return CommandBlocked("Who commands the drive is not known.", by_channel=True)
@@ -83,7 +83,7 @@ def _by_others(profile: Profile, found: Channel) -> CommandBlocked:
 
 
 def _is_set_up(profile: Profile, code: str) -> bool:
-    """Return True if a way of commanding the drive, as it is set up from here, sets this word."""
+    """Return True if a control source that Drive Panel can set up writes this word."""
     sources = profile.data.control_sources
     written = {setting.parameter for source in sources for setting in source.settings}
     return code in written or profile[code].quantity == "command_channel"

@@ -1,4 +1,4 @@
-"""Which configuration of command and reference a drive has, and what another would change."""
+"""Control source of a drive: its present configuration, and the writes that change it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .profile.schema import ControlSource, Parameter
 
 @dataclass(frozen=True, slots=True)
 class SourceChange:
-    """A word that a configuration needs, with what the drive holds in its place."""
+    """A word that a configuration requires, with the drive's present value."""
 
     parameter: Parameter
     old: int | None
@@ -19,18 +19,18 @@ class SourceChange:
 
     @property
     def verified(self) -> bool:
-        """True if a document in hand confirms the parameter's address."""
+        """True if an available document confirms the parameter's address."""
         return is_verified(self.parameter)
 
 
 def source_codes(profile: Profile) -> list[str]:
-    """Codes of all words that the configurations of a profile set."""
+    """Return the codes of all words that the configurations of a profile set."""
     codes = [s.parameter for source in profile.data.control_sources for s in source.settings]
     return list(dict.fromkeys(codes))
 
 
 def source_in_force(profile: Profile, raws: Mapping[str, int]) -> ControlSource | None:
-    """The configuration whose every word the drive holds; the one that says most, if several."""
+    """Return the configuration that matches all its words; the one with most words if several."""
     fitting = [
         source
         for source in profile.data.control_sources
@@ -42,7 +42,7 @@ def source_in_force(profile: Profile, raws: Mapping[str, int]) -> ControlSource 
 def source_changes(
     profile: Profile, source: ControlSource, raws: Mapping[str, int]
 ) -> list[SourceChange]:
-    """The words that differ from what a configuration needs, in the order of writing."""
+    """Return the words that differ from a configuration, in the order of writing."""
     return [
         SourceChange(profile[setting.parameter], raws.get(setting.parameter), setting.value)
         for setting in source.settings

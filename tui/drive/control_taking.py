@@ -1,4 +1,4 @@
-"""True if a drive's control can be taken from its terminals, and given back; pure."""
+"""Taking control of a drive from its terminals, and giving it back. Pure."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .profile.schema import OrderId
 
 @dataclass(frozen=True, slots=True)
 class ControlTaking:
-    """Which of the two commands a drive has, and who has the control as far as that is known."""
+    """Commands to take and give back control that a drive has, and its present controller."""
 
     can_take: bool
     can_give_back: bool
     taken: bool | None
-    """True if the line has it; None if no word shows it."""
+    """True if Modbus has control; None if no word shows it."""
 
 
 def control_taking(profile: Profile, raws: Mapping[str, int]) -> ControlTaking | None:
-    """Return what can be done about a drive's control; None if it has neither command."""
+    """Return the possibilities to switch control; None if the drive has neither command."""
     chart = chart_in_force(profile, raws)
     if chart is None:
         return None

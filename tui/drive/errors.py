@@ -1,8 +1,8 @@
-"""Errors about drives, their profiles and their values, in words for the person at the panel."""
+"""Errors about drives, profiles and values; their texts are for the person at the panel."""
 
 
 class DriveError(Exception):
-    """Something about a drive's description or a value is wrong; the text says what to do."""
+    """An error in a drive's description or a value; the text says what to do."""
 
 
 class ProfileError(DriveError):
@@ -22,4 +22,4 @@ class ValueRefused(DriveError):
 
 
 class UnitRefused(ValueRefused):
-    """A typed value in a unit that nothing known leads to the parameter's own from."""
+    """A typed value in a unit that cannot be converted to the parameter's unit."""

@@ -33,7 +33,7 @@ MARKS, MARK_WIDTH = ("!", "*"), 4
 
 @dataclass(frozen=True, slots=True)
 class PageRow:
-    """One thing, what it is called, and how surely it is known."""
+    """A fact with its heading and its certainty."""
 
     head: str
     text: str
@@ -55,12 +55,12 @@ class PageLine:
 
     kind: Literal["title", "row", "warning", "gap"]
     head: str
-    """A title, or the start of the text in so many columns as it takes."""
+    """A title, or a heading padded to the column of the text."""
     text: str = ""
 
 
 def family_page(profile: Profile) -> list[PageSection]:
-    """Every section that anything is known of."""
+    """Return the sections about which the profile has facts."""
     data = profile.data
     sections = [
         PageSection("Warnings", tuple(_warnings(data))),
@@ -79,7 +79,7 @@ def family_page(profile: Profile) -> list[PageSection]:
 
 
 def page_lines(sections: Sequence[PageSection], width: int) -> list[PageLine]:
-    """The page in lines of that width: head, text, and how sure it is behind the text."""
+    """Lay out the page in lines of this width: heading, text, and certainty after the text."""
     lines: list[PageLine] = []
     for section in sections:
         if lines:

@@ -1,4 +1,4 @@
-"""The effect of a fault reset: by the command channel and the inputs that are closed now."""
+"""Effect of a fault reset, from the command channel and the inputs that are closed now."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NONE_CLOSED = "No input is closed at the terminals now."
 
 
 def reset_codes(profile: Profile) -> list[str]:
-    """Codes of all words on which the text of `reset_follows` depends."""
+    """Return the codes of all words that the text of `reset_follows` depends on."""
     faults = profile.data.faults
     codes = [when.parameter for row in faults.after_reset for when in row.when]
     codes += deciding_codes(profile)
@@ -29,7 +29,7 @@ def reset_codes(profile: Profile) -> list[str]:
 
 
 def reset_follows(profile: Profile, raws: Mapping[str, int], inputs: Mapping[str, int]) -> str:
-    """The motor's reaction to a reset under the present command channel, in sentences.
+    """Describe the motor's reaction to a reset under the present command channel.
 
     `inputs` holds current raw values only; `raws` may hold what was read earlier.
     """
@@ -40,7 +40,7 @@ def reset_follows(profile: Profile, raws: Mapping[str, int], inputs: Mapping[str
 
 
 def no_fault(chart: Chart, state_id: str, kind: StateKind, name: str) -> str:
-    """A sentence if a reset has nothing to do in this state; empty if it has, or may have."""
+    """Return a sentence if there is no fault to reset; empty if there is or may be one."""
     states = {state for order in chart.orders if order.id == "reset" for state in order.states}
     if kind in ("fault", "unknown") or state_id in states:
         return ""
@@ -48,7 +48,7 @@ def no_fault(chart: Chart, state_id: str, kind: StateKind, name: str) -> str:
 
 
 def not_in_command(profile: Profile, raws: Mapping[str, int]) -> str:
-    """The reason why a drive may have ignored its reset, with the way out; empty if none."""
+    """Return why a drive may have ignored its reset, with the remedy; empty if not known."""
     if command_holder(profile, raws) != "others":
         return ""
     chart = chart_in_force(profile, raws)
@@ -60,7 +60,7 @@ def not_in_command(profile: Profile, raws: Mapping[str, int]) -> str:
 
 
 def command_holder(profile: Profile, raws: Mapping[str, int]) -> Literal["line", "others"] | None:
-    """The holder of the command channel; None if it is not known."""
+    """Return the holder of the command channel; None if not known."""
     found = command_channel(profile, raws)
     if found is not None:
         return None if found.by_line is None else "line" if found.by_line else "others"
@@ -70,7 +70,7 @@ def command_holder(profile: Profile, raws: Mapping[str, int]) -> Literal["line",
 
 
 def closed_inputs(profile: Profile, raws: Mapping[str, int]) -> str:
-    """A sentence that names the inputs closed at the terminals; `raws` are current values."""
+    """Return a sentence that names the closed inputs; `raws` must be current values."""
     shown_by = profile.data.faults.inputs
     if shown_by is None:
         return NO_INPUTS
@@ -81,7 +81,7 @@ def closed_inputs(profile: Profile, raws: Mapping[str, int]) -> str:
 
 
 def _after_reset(profile: Profile, raws: Mapping[str, int]) -> str:
-    """The sentence of the first row that surely holds, else the general one."""
+    """Return the sentence of the first row that certainly applies, else the general one."""
     by = command_holder(profile, raws)
     for row in profile.data.faults.after_reset:
         if row.by in (None, by) and all(when.holds(raws) for when in row.when):

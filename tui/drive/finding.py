@@ -21,7 +21,7 @@ SLOW_BELOW = 1200
 0.2 s and more there."""
 IDENTIFY = 43
 ASKED_CHARACTERS = 8
-"""Characters of the request that finds out whether anybody is there."""
+"""Characters of the request that probes an address."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,39 +41,38 @@ class LineSetting:
 
     @property
     def slow(self) -> bool:
-        """True if it is tried last, and only after that was said."""
+        """True if scans try it last, and only after a warning."""
         return self.baud < SLOW_BELOW
 
     def hears(self, other: LineSetting) -> bool:
-        """Return True if a drive of the one setting may understand the other: but for stop bits
-        alike."""
+        """Return True if both settings are equal but for stop bits: drives may understand both."""
         return (self.baud, self.format[:2]) == (other.baud, other.format[:2])
 
 
 @dataclass(frozen=True, slots=True)
 class WatchingFamily:
-    """A family that watches the line from the first request on."""
+    """A family whose communication timeout begins with the first request."""
 
     id: str
     name: str
     code: str
     """The parameter that sets its timeout."""
     sure: bool
-    """True if a document says so; it is taken so where none does."""
+    """True if a document states this; False if it is only assumed."""
 
 
 @dataclass(frozen=True, slots=True)
 class PresenceProbe:
-    """A question to which drives answer if they are there: a read, or who they are."""
+    """A request that present drives answer: a read, or an identification."""
 
     register: int | None
-    """The one register that is read by function 3; None for function 43."""
+    """Register to read with function 3; None for function 43."""
     families: tuple[str, ...] = ()
-    """Ids of the families without function 43 that show their state there."""
+    """Ids of the families without function 43 whose status word is this register."""
 
 
 def wait_for_reply(setting: LineSetting, turnaround: float) -> float:
-    """Seconds from the end of a request until the first character of a reply must have come.
+    """Return the seconds from the end of a request in which a reply must begin.
 
     A drive answers after its `turnaround`, and not before the silence that ends a frame.
     """
@@ -82,18 +81,18 @@ def wait_for_reply(setting: LineSetting, turnaround: float) -> float:
 
 
 def silent_cost(setting: LineSetting, wait: float, probes: int = 1) -> float:
-    """Seconds that an address costs at which nobody is: the requests, and the wait for each."""
+    """Return the seconds for an unused address: the requests, and the timeout of each."""
     request = ASKED_CHARACTERS * character_seconds(setting.baud, setting.format)
     return probes * (request + wait)
 
 
 def longest_turnaround(profiles: Iterable[Profile]) -> float:
-    """Seconds that the slowest family takes before it answers, as it leaves the factory."""
+    """Return the longest turnaround of all families with factory settings, in seconds."""
     return max((float(profile.data.link.turnaround_ms) / 1000 for profile in profiles), default=0.0)
 
 
 def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[LineSetting]:
-    """Every baud and format that a family can have, in the order in which they are worth a try.
+    """Return every baud rate and format that a family can have, most promising first.
 
     Factory settings first; then by how many drives are likely to have it, for the time that it
     takes to ask an address: at 300 baud one costs as much as thirty at 19 200. Slow ones last.
@@ -120,7 +119,7 @@ def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[Li
 
 
 def families_at(profiles: Iterable[Profile], settings: Iterable[LineSetting]) -> list[str]:
-    """Names of the families that can be set to one of these."""
+    """Return the names of the families that support one of these."""
     wanted = {(setting.baud, setting.format) for setting in settings}
     found = []
     for profile in profiles:
@@ -132,13 +131,13 @@ def families_at(profiles: Iterable[Profile], settings: Iterable[LineSetting]) ->
 
 
 def names_text(names: Sequence[str]) -> str:
-    """Names in a sentence: one, or several with `and` before the last."""
+    """Join names for a sentence, with `and` before the last."""
     *first, last = names or ("none",)
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
-    """Return how likely each value is: half for the factory's, the rest shared evenly."""
+    """Return the share of each value: FACTORY_SHARE for the factory's, the rest evenly."""
     others = [
         type_var_type for type_var_type in dict.fromkeys(all_of_them) if type_var_type != factory
     ]
@@ -149,7 +148,7 @@ def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
 
 
 def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
-    """The fewest questions of which every family answers one, be it with a refusal.
+    """Return the fewest requests so that every family answers one, even with a refusal.
 
     A family without function 43 answers a read of its status word; one that refuses the read of
     a word it does not have is found by that read as well.
@@ -169,7 +168,7 @@ def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
 
 
 def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
-    """Families whose communication timeout begins with any request; the documented ones first."""
+    """Return the families whose timeout begins with any request; documented ones first."""
     found = []
     for profile in profiles:
         rules = profile.data.communication_fault
@@ -181,7 +180,7 @@ def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
 
 
 def watching_text(families: Sequence[WatchingFamily]) -> str:
-    """Name the families that react to lost polling, in a sentence; empty for none."""
+    """Return a sentence that names the families that react when polling stops; empty for none."""
     sure = ", ".join(f"{family.name} ({family.code})" for family in families if family.sure)
     likely = ", ".join(f"{family.name} ({family.code})" for family in families if not family.sure)
     if not families:

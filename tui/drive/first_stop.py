@@ -1,4 +1,4 @@
-"""Which word stops a drive of which it is not known for sure what it is; pure functions.
+"""Stop words for a drive whose family is not certain. Pure functions.
 
 A word that stops one family may start another at the same address (what ramps one down in its
 state chart is a run command in the other's): only a word that stops in every chart that the
@@ -18,7 +18,7 @@ from .profile.stop_profile import StopProfile
 
 @dataclass(frozen=True, slots=True)
 class FirstWord:
-    """A word that stops every family which the drive may be of."""
+    """A word that stops every family that the drive may belong to."""
 
     address: int
     word: int
@@ -30,20 +30,19 @@ class FirstWord:
 
 @dataclass(frozen=True, slots=True)
 class StopPlace:
-    """One register that families are stopped by, those of them first that were named."""
+    """A register that stops families; families that were named come first."""
 
     address: int
     families: tuple[StopProfile, ...]
 
     @property
     def status(self) -> tuple[int, ...]:
-        """Addresses of the words that show their states: a drive without any of them is of another
-        family."""
+        """Addresses of the families' status words; a drive without them is of another family."""
         return self._addresses(chart.status for family in self.families for chart in family.charts)
 
     @property
     def deciding(self) -> tuple[int, ...]:
-        """Addresses of what else decides by which word they stop."""
+        """Addresses of further words that decide which word stops them."""
         codes = (
             code
             for family in self.families
@@ -114,7 +113,9 @@ def families_beside(families: Sequence[StopProfile], named: str) -> tuple[StopPr
 def first_word(
     place: StopPlace, raws: Mapping[int, int], wanted: OrderId, named: Sequence[str] = ()
 ) -> FirstWord | None:
-    """The gentlest word that stops whatever is there, given words read by address; None if none.
+    """Return the gentlest word that stops every possible family; None if there is none.
+
+    `raws` are words read from the drive, by address.
 
     A family that lacks a word which the drive has answered is another, unless it was named.
     """
@@ -143,7 +144,7 @@ def first_word(
 
 
 def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tuple[str, ...]:
-    """Families whose own stop is the very word that was sent, given the same words.
+    """Return the families whose own stop is the word that was sent, given the same words.
 
     By these a drive that does not say what it is may be stopped on: another's word may start it.
     """
@@ -156,7 +157,7 @@ def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tupl
 
 
 def blind_stops(families: Sequence[StopProfile]) -> list[FirstWord]:
-    """The words that stop a drive of any of these families in any chart; one for each register.
+    """Return the words that stop a drive of any of these families in any chart, one per register.
 
     Nothing needs to be known of the drive. Empty if no word stops them all.
     """
@@ -196,7 +197,7 @@ def _charts(family: StopProfile, known: Mapping[str, int]) -> list[Chart]:
 
 
 def _holds(order: Order, chart: Chart, known: Mapping[str, int]) -> bool:
-    """Return True if an order surely may be given now."""
+    """Return True if a command is certainly possible now."""
     if any(not when.holds(known) for when in order.when):
         return False
     if not order.states:
@@ -214,5 +215,5 @@ def _place(family: StopProfile, chart: Chart, order: Order) -> int | None:
 
 
 def _known(family: StopProfile, raws: Mapping[int, int]) -> dict[str, int]:
-    """Raw values by the family's own codes."""
+    """Return the raw values by the family's own codes."""
     return {code: raws[address] for code, address in family.places.items() if address in raws}

@@ -49,7 +49,7 @@ class ExternalWord:
 
 @lru_cache(maxsize=32)
 def _places(profile: Profile) -> Mapping[int, tuple[Parameter, ...]]:
-    """The parameters at each address, those of two words at both of theirs."""
+    """Return the parameters at each address; a two-word parameter is at both of its addresses."""
     places: dict[int, list[Parameter]] = {}
     for parameter in profile.parameters:
         if parameter.function == 3:
@@ -61,7 +61,7 @@ def _places(profile: Profile) -> Mapping[int, tuple[Parameter, ...]]:
 def classify_words(
     profile: Profile, words: Mapping[int, int], raws: Mapping[str, int]
 ) -> list[ExternalWord]:
-    """Return the effect of each word of a write, given what was surely read just now."""
+    """Return the effect of each word of a write, given raw values that were just read."""
     return [_word(profile, address, word, raws) for address, word in words.items()]
 
 
@@ -78,7 +78,7 @@ def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) ->
 
 
 def parameters_at(words: Collection[ExternalWord]) -> list[Parameter]:
-    """The parameters of several words, each once."""
+    """Return the parameters of several words, without repeats."""
     return list({p.code: p for word in words for p in word.parameters}.values())
 
 
@@ -110,7 +110,7 @@ def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirecti
 
 @lru_cache(maxsize=32)
 def _ordered(profile: Profile) -> frozenset[str]:
-    """Words that orders write, a setting that takes the control among them."""
+    """Return the codes of words that commands write, including settings that take control."""
     orders = (order for chart in profile.data.charts for order in chart.orders)
     return frozenset(order.parameter for order in orders if order.parameter)
 
@@ -151,7 +151,7 @@ def _is_stop(
 
 
 def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, int]) -> bool:
-    """Return True if the words carry out an order that stops, should what it depends on be so."""
+    """Return True if the words carry out a stop, provided its conditions hold."""
     if order.id not in WAYS_TO_STOP or len(order.words) != 1:
         return False
     place = order_target(profile, chart, order)
@@ -163,7 +163,7 @@ def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, 
 
 
 def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]:
-    """Codes of the words that decide whether one of these words only stops; none where none can.
+    """Return the codes that decide whether one of these words only stops; none if none can.
 
     As few as possible: a stop waits until they are read.
     """
@@ -189,7 +189,7 @@ def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]
 
 
 def setting_refusal(profile: Profile, found: ExternalWord, allowed: Collection[str]) -> str:
-    """Why a setting is not written for a program that is not ours; empty where it may be.
+    """Return why a setting is not written for a third-party program; empty if it may be.
 
     `allowed` are codes, or `ALL`: that leaves out what decides who commands the drive, what cuts
     the line, and what no document confirms. These are written where they are named.
@@ -208,7 +208,7 @@ def setting_refusal(profile: Profile, found: ExternalWord, allowed: Collection[s
 
 @lru_cache(maxsize=32)
 def _named_only(profile: Profile) -> frozenset[str]:
-    """Settings that decide who commands or gives the reference, and those that cut the line."""
+    """Return the settings of command and reference sources, and those that cut communication."""
     cutting = {parameter.code for parameter in profile.parameters if cuts_line(profile, parameter)}
     channels = {
         parameter.code
@@ -219,7 +219,7 @@ def _named_only(profile: Profile) -> frozenset[str]:
 
 
 def value_refusal(profile: Profile, parameter: Parameter, words: Mapping[int, int]) -> str:
-    """Why a value is never written, or not both of its words are; empty where it may be."""
+    """Return why a value is never written, or only half of it was; empty if it may be written."""
     own = [parameter.address + offset for offset in range(word_count(parameter))]
     if any(address not in words for address in own):
         return f"{parameter.code} has two words: both are written, or none."

@@ -16,7 +16,7 @@ TRUST: Mapping[HelpConfidence, str] = {
     "public": "public guide",
     "practice": "general practice",
 }
-"""Certainty of the first cause, in words."""
+"""Text for the certainty of the first cause."""
 RESETS: Mapping[ResetWay | None, str] = {
     "by-reset": "{by} once the cause is gone.",
     "automatic": "{by} once the cause is gone, or the automatic restart, if it is on.",
@@ -30,17 +30,17 @@ RESET_NOT_YET = "Not yet, says the drive: the cause is still there."
 
 @dataclass(frozen=True, slots=True)
 class ExcludedAdvice:
-    """A cause or a check that a value rules out, and that value in words."""
+    """A cause or check that a value excludes, with that value as text."""
 
     text: str
     code: str
     reason: str
-    """`ruled out, BRA Yes`; `not now, ULN 228.0 V` where the value at the fault is not known."""
+    """`ruled out, BRA Yes`, or `not now, ULN 228.0 V` if the value at the fault is not known."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaultAdvice:
-    """The causes and checks of a fault that its values leave."""
+    """The causes and checks of a fault that its values do not exclude."""
 
     probable: tuple[str, ...]
     check: tuple[str, ...]
@@ -51,7 +51,7 @@ class FaultAdvice:
 
 @dataclass(frozen=True, slots=True)
 class ResetText:
-    """Reset of a fault, in a sentence or two, and whether the drive itself states it."""
+    """Text about the reset of a fault, and True if the drive itself reports this."""
 
     text: str
     by_drive: bool
@@ -75,7 +75,7 @@ def reset_text(
 
 
 def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
-    """Return True if the drive says that a reset can work now; None if it does not show it."""
+    """Return True if the drive reports that a reset can work now; None if it has no such word."""
     reported = profile.data.faults.reset_ready
     raw = raws.get(reported.parameter) if reported else None
     if reported is None or raw is None:
@@ -84,7 +84,7 @@ def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
 
 
 def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
-    """Parameters to read for a fault that is looked at."""
+    """Return the codes to read to display a fault."""
     reported = profile.data.faults.reset_ready
     codes = [look.code for look in hint.look_at] if hint else []
     for row in hint.ruled_out if hint else ():
@@ -93,7 +93,7 @@ def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
 
 
 def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: bool) -> FaultAdvice:
-    """The causes and checks of a fault or an alarm, without those that values rule out.
+    """Return the causes and checks of a fault or an alarm, without those that values exclude.
 
     `latest` is false for a fault that is not the last one: what the drive stored is not of it.
     """
@@ -119,13 +119,13 @@ def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: boo
 
 
 def alarm_words(profile: Profile) -> list[str]:
-    """Words of the monitoring set that carry alarm bits."""
+    """Return the codes of words of the monitoring set that carry alarm bits."""
     watched = [value.parameter for value in profile.data.monitoring.values]
     return [code for code in watched if any(bit.alarm for bit in profile[code].bits)]
 
 
 def alarms_on(profile: Profile, raws: Mapping[str, int]) -> list[tuple[str, int, str]]:
-    """Alarm bits that are set: word, bit and name."""
+    """Return the alarm bits that are set, as code of the word, bit and name."""
     return [
         (code, bit.bit, bit.name)
         for code, raw in raws.items()

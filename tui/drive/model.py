@@ -1,4 +1,4 @@
-"""Which model a drive is, by the code word that it keeps of itself."""
+"""Model of a drive, from the drive's own code word."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from .profile.schema import Model
 
 
 def model_codes(profile: Profile) -> list[str]:
-    """Words that show the model: its code, and the word with the bit of its class."""
+    """Return the codes of the words that show the model: its code word, and its class word."""
     known = profile.data.identification
     return [code for code in (known.model_parameter, known.class_parameter) if code]
 
 
 def model_of(profile: Profile, raws: Mapping[str, int]) -> Model | None:
-    """The model in raw values by code; None if they show none that is known.
+    """Return the model that raw values show; None if they show no known model.
 
     Where two models share a code the bit of the class must be known.
     """
@@ -30,7 +30,7 @@ def model_of(profile: Profile, raws: Mapping[str, int]) -> Model | None:
 
 
 def model_read(profile: Profile, raws: Mapping[str, int]) -> str:
-    """The model that a drive reports, in words; empty if it reports none."""
+    """Return the model that a drive reports as text; empty if it reports none."""
     model = model_of(profile, raws)
     if model is not None:
         return model_text(model)
@@ -39,7 +39,7 @@ def model_read(profile: Profile, raws: Mapping[str, int]) -> str:
 
 
 def model_text(model: Model) -> str:
-    """A model as a person reads it."""
+    """Describe a model: reference or code, voltage, power and filter class."""
     parts = (
         model.reference or f"code {model.code}",
         f"{model.voltage} V" if model.voltage else "",

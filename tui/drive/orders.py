@@ -1,4 +1,4 @@
-"""Which words carry out an order in the state that a drive is in; pure functions of a profile."""
+"""Words that carry out a command in the drive's present state. Pure functions of a profile."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from .profile.profile import Profile
 from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, State, When
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
-"""Ways to stop that trip no drive, the gentlest first."""
+"""Stop commands that do not trip the drive, gentlest first."""
 INSTEAD: Mapping[OrderId, tuple[OrderId, ...]] = {
     "emergency-stop": ("emergency-stop", "quick-stop", "stop"),
     "quick-stop": ("quick-stop", "stop"),
 }
-"""Ways to stop that take another's place where a drive lacks it."""
+"""Stop commands that replace one that a drive does not have."""
 WAYS_TO_STOP = frozenset[OrderId]({"stop", "quick-stop", "freewheel", "emergency-stop"})
 
 
 class OrderRefused(DriveError):
-    """An order that cannot be given now, and why."""
+    """A command that is not possible now; the text gives the reason."""
 
 
 def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
-    """The chart that surely holds; None while the word that decides between charts is unknown.
+    """Return the chart that certainly applies; None if the deciding word is unknown.
 
-    It is unknown, too, while it holds a value of no chart.
+    A value that belongs to no chart counts as unknown.
     """
     found = profile.chart(raws) if raws.keys() >= set(chart_codes(profile)) else None
     return found if found is None or found.when is None or found.when.holds(raws) else None
 
 
 def chart_codes(profile: Profile) -> list[str]:
-    """Codes of the words that decide which chart holds; none for most families."""
+    """Return the codes of the words that decide between charts; none for most families."""
     codes = (chart.when.parameter for chart in profile.data.charts if chart.when)
     return list(dict.fromkeys(codes))
 
 
 def deciding_codes(profile: Profile) -> list[str]:
-    """Codes of the words on which it depends how an order is carried out, and by whom."""
+    """Return the codes of the words that decide how a command is carried out, and by whom."""
     codes = chart_codes(profile)
     for chart in profile.data.charts:
         codes += [when.parameter for order in chart.orders for when in order.when]
@@ -49,7 +49,7 @@ def deciding_codes(profile: Profile) -> list[str]:
 
 
 def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | None = None) -> Order:
-    """The order that holds in a state, by default that of the status word; raises OrderRefused."""
+    """Return the command for a state (default: that of the status word); raises OrderRefused."""
     same = [order for order in chart.orders if order.id == id]
     if not same:
         raise OrderRefused(f"The {chart.name} has no command {id.replace('-', ' ')!r}.")
@@ -75,7 +75,7 @@ def follows_from(chart: Chart, id: OrderId) -> str:
 
 
 def nearest_stop(chart: Chart, id: OrderId) -> OrderId:
-    """The way to stop that a chart has in place of one that it lacks.
+    """Return the stop command of a chart that replaces one that it does not have.
 
     An emergency stop becomes a quick stop, else a ramp stop; never coasting or braking.
     """
@@ -84,7 +84,7 @@ def nearest_stop(chart: Chart, id: OrderId) -> OrderId:
 
 
 def stop_conditions(chart: Chart, id: OrderId) -> list[str]:
-    """Codes of the words on which it depends by which word a chart stops."""
+    """Return the codes of the words that decide which word stops a chart."""
     same = [order for order in chart.orders if order.id == id]
     codes = [when.parameter for order in same for when in order.when]
     if any(order.states for order in same):
@@ -93,7 +93,7 @@ def stop_conditions(chart: Chart, id: OrderId) -> list[str]:
 
 
 def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order]:
-    """The order that stops in every chart that the drive could be in, given what is known.
+    """Return the command that stops in every chart that may apply.
 
     On its ramp where one word does that in all of them, else faster, else coasting. Raises
     OrderRefused where no word stops in all.
@@ -123,7 +123,7 @@ def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:
 
 
 def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int]) -> bool:
-    """Return True if words at a place stop a motor in a chart, in whichever state it is."""
+    """Return True if words written at a place stop a motor in every state of a chart."""
     return any(
         order.id in GENTLE_FIRST
         and not order.when
@@ -143,8 +143,7 @@ def last_word(chart: Chart, order: Order) -> Order | None:
 
 
 def stop_alike(profiles: Sequence[Profile]) -> bool:
-    """Return True if the same words stop the drives of all these families, told by the same
-    states."""
+    """Return True if the same words stop all these families, with the same state words."""
     ways = [_ways_to_stop(profile) for profile in profiles]
     return bool(ways) and all(way == ways[0] for way in ways)
 
@@ -178,7 +177,7 @@ MOVING_ORDERS: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking
 
 
 def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock | None:
-    """The first interlock that holds an order back now, or whose word is not known."""
+    """Return the first interlock that blocks a command now, or whose word is not known."""
     if id in STOP_ORDERS:
         return None
     for lock in chart.interlocks:
@@ -193,7 +192,7 @@ def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock |
 
 
 def unmet(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> When | None:
-    """A condition of every form of an order that surely does not hold now, whatever the state."""
+    """Return a condition that certainly does not hold, if every form of a command has one."""
     first = None
     for order in chart.orders:
         if order.id != id:
@@ -206,14 +205,14 @@ def unmet(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> When | None:
 
 
 def interlock_codes(chart: Chart) -> list[str]:
-    """Codes of the words that the interlocks of a chart look at."""
+    """Return the codes of the words that the interlocks of a chart check."""
     codes = [lock.parameter for lock in chart.interlocks]
     codes += [when.parameter for lock in chart.interlocks for when in lock.when]
     return list(dict.fromkeys(codes))
 
 
 def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[int]:
-    """The words of an order, with the option bits that its word carries now kept.
+    """Return the words of a command; the present option bits of its word are kept.
 
     Zeros hand the control back or lock the drive: they stay zeros.
     """
@@ -223,7 +222,7 @@ def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[in
 
 
 def optional_bits(chart: Chart, code: str) -> int:
-    """The bits of a word that carry options beside a command."""
+    """Return the bits of a command word that carry options."""
     bits = 0
     for option in chart.options:
         if option.parameter == code:
@@ -237,7 +236,7 @@ def order_target(profile: Profile, chart: Chart, order: Order) -> Parameter:
 
 
 def walk(chart: Chart, source: str, goal: str) -> list[tuple[str, int]]:
-    """The shortest way through the chart by commands: pairs of next state and command word.
+    """Return the shortest path through the chart: pairs of next state and command word.
 
     Without edges and faults. Raises OrderRefused where there is none.
     """

@@ -1,4 +1,4 @@
-"""Text that a person, a drive, a file or a profile brings, as it may be shown to a person.
+"""Sanitizing of text from persons, drives, files and profiles before display.
 
 A drive's name with an escape sequence in it must neither command the terminal nor hide there: each
 control character is replaced by a picture, one for one, so that the layout by length stays correct.
@@ -14,38 +14,38 @@ PICTURES = 0x2400
 """Offset of the Unicode pictures of the first 32 control characters: ␀ to ␟."""
 DELETE = "␡"
 UNSHOWN = "\ufffd"
-"""For what has no picture: C1 controls, marks of direction, halves of characters."""
+"""Replaces characters without a picture: C1 controls, direction marks, lone surrogates."""
 COMMANDING = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-"""Categories of characters that a terminal takes as commands, or that show nothing."""
+"""Categories of characters that may command a terminal, or are invisible."""
 
 
 def plain(text: str, *, lines: bool = False) -> str:
-    """The text with control characters as visible signs; with `lines` line feeds stay."""
+    """Replace control characters by visible signs; keep line feeds if `lines`."""
     if text.isprintable():
         return text
     return "".join(c if lines and c == "\n" else _sign(c) for c in text)
 
 
 def plain_cells(cells: Iterable[object]) -> list[str]:
-    """The cells of a row of a table, for a file or a terminal; nothing for None."""
+    """Return the cells of a table row as sanitized text; empty for None."""
     return ["" if cell is None else plain(str(cell)) for cell in cells]
 
 
 def escaped_json(text: str) -> str:
-    """JSON that means the same, with every character escaped that could command a terminal."""
+    """Return equivalent JSON; every character that could command a terminal is escaped."""
     if text.replace("\n", "").isprintable():
         return text
     return "".join(json.dumps(c)[1:-1] if c != "\n" and commands(c) else c for c in text)
 
 
 def escaped_toml(text: str) -> str:
-    """A basic string of TOML with every character escaped that could command a terminal."""
+    """Return a basic TOML string; every character that could command a terminal is escaped."""
     quoted = json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False)
     return "".join(f"\\U{ord(c):08X}" if commands(c) else c for c in quoted)
 
 
 def commands(character: str) -> bool:
-    """Return True if a character could command a terminal, or show nothing at all."""
+    """Return True if a character could command a terminal, or is invisible."""
     return unicodedata.category(character) in COMMANDING
 
 

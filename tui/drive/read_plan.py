@@ -1,4 +1,4 @@
-"""Which requests read a set of parameters with the least time on the wire.
+"""Planning of the requests that read a set of parameters with the least time on the wire.
 
 Exact for what it considers: every split of the wanted addresses into runs of neighbors that
 the drive allows, with or without one stretch of each indirect block or scanner table whose
@@ -38,23 +38,23 @@ class WireTiming:
     turnaround: float = 0.005
 
     def read(self, words: int) -> float:
-        """Time of one read of so many words, from its request to the next request.
+        """Return the seconds of a read of `words` words, from its request to the next request.
 
         The turnaround counts from the end of the request to the start of the reply.
         """
         return self._exchange(REQUEST_CHARACTERS + REPLY_CHARACTERS + 2 * words)
 
     def write(self, words: int, *, multiple: bool) -> float:
-        """Time of one write, by function 16 if `multiple`, else by function 6."""
+        """Return the seconds of a write, with function 16 if `multiple`, else function 6."""
         request = WRITE_MANY_CHARACTERS + 2 * words if multiple else WRITE_ONE_CHARACTERS
         return self._exchange(request + WRITE_ONE_CHARACTERS)
 
     def read_write(self, read: int, written: int) -> float:
-        """Time of one exchange by function 23."""
+        """Return the seconds of an exchange with function 23."""
         return self._exchange(READ_WRITE_CHARACTERS + 2 * written + REPLY_CHARACTERS + 2 * read)
 
     def _exchange(self, characters: int) -> float:
-        # a drive tells the end of the request by the same silence: it lies in its turnaround
+        # the turnaround includes the inter-frame gap by which the drive detects the frame's end
         waits = max(self.turnaround, self.silence) + self.silence
         return characters * self.character + waits
 
@@ -79,12 +79,12 @@ class ReadRequest:
 
 @dataclass(frozen=True, slots=True)
 class SlotCheck:
-    """A read of slots after the block they govern, and what they must hold for it to count."""
+    """A read of slots after their block, and the values that they must have for it to count."""
 
     request: ReadRequest
     slots: Mapping[str, int]
     governs: tuple[str, ...]
-    """Codes whose values stand for nothing when a slot holds something else."""
+    """Codes whose values are invalid if a slot has another value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ class _Stretch:
     checked: bool
 
     def brings(self, wanted: Mapping[str, Parameter]) -> bool:
-        """Return True if any of its words is wanted."""
+        """Return True if it reads any of these parameters."""
         return any(place.code in wanted for place in self.request.places)
 
 
@@ -195,7 +195,7 @@ def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iter
 def _checks(
     profile: Profile, stretch: _Stretch, timing: WireTiming, unreadable: Collection[str]
 ) -> list[SlotCheck]:
-    """The reads that prove after a stretch was used that its slots have not changed."""
+    """Return the reads that verify, after a stretch, that its slots have not changed."""
     if not stretch.checked:
         return []
     slots = [profile[code] for code in stretch.slots]
@@ -207,7 +207,7 @@ def _checks(
 
 
 def _assigned(profile: Profile, block: Block, raw: int | None) -> str | None:
-    """The code that a slot's raw value stands for; None where it is free or not known."""
+    """Return the code that a slot's raw value selects; None if it is unused or unknown."""
     if raw is None:
         return None
     if block.selects_by == "address":
@@ -244,7 +244,7 @@ def _cheapest(
     timing: WireTiming,
     unreadable: Collection[str] = (),
 ) -> list[tuple[float, int]]:
-    """For every beginning of the row: its least time in seconds, and where its last run starts."""
+    """Return, for each prefix of `ordered`, its least time in seconds and the last run's start."""
     best: list[tuple[float, int]] = [(0.0, 0)]
     longest = _longest(profile, ordered[0])
     for end in range(1, len(ordered) + 1):
@@ -264,13 +264,13 @@ def _span(run: Sequence[Parameter]) -> int:
 
 
 def _longest(profile: Profile, parameter: Parameter) -> int:
-    """The most words that one read brings by the function that reads this parameter."""
+    """Return the most words that the function of this parameter reads at once."""
     function = profile.function(parameter.function)
     return (function.max_read if function else None) or 1
 
 
 def request_of(run: Sequence[Parameter]) -> ReadRequest:
-    """The request that reads a run of neighbors, in the order of their addresses."""
+    """Return the request for a run of adjacent parameters, in the order of their addresses."""
     first = run[0].address
     places = tuple(Place(p.code, p.address - first) for p in run)
     return ReadRequest(first, _span(run), places, run[0].function)
@@ -282,7 +282,7 @@ def run_length(
     unreadable: Collection[str] = (),
     longest: int | None = None,
 ) -> int | None:
-    """Words of a read over this run, or None where the drive does not allow it.
+    """Return the words of a read over this run; None if the drive does not allow it.
 
     `longest` is the limit of a function other than 3.
     """

@@ -1,4 +1,4 @@
-"""A raw value as a person reads it, and back: the one way for screen, journal and command line.
+"""Conversion between raw values and text: the only one for screen, journal and command line.
 
 Needed are the raw values that the parameter's scale and unit follow, and what the drive lacks:
 where a scale is not known the value is shown raw, never in a unit that it may not have.
@@ -26,7 +26,7 @@ def shown(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> Value:
-    """The reading of a raw value; `raws` are raw values by code, `absent` codes the drive lacks."""
+    """Decode a raw value; `raws` are raw values by code, `absent` codes that the drive lacks."""
     if (taught := profile.taught.get(parameter.code)) is not None:
         return _taught_value(raw, taught)
     scale = profile.scale(parameter, raws, absent)
@@ -43,7 +43,7 @@ def raw_of_text(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> Conversion:
-    """The raw value of a typed text: the one conversion of all writes, as `shown` of all reads.
+    """Encode typed text as a raw value; every write uses this, as every read uses `shown`.
 
     Raises ValueRefused as `encode` does, and where the unit or the sign is not known.
     """
@@ -64,7 +64,7 @@ def raw_of_text(
 
 
 def _taught_value(raw: int, taught: TaughtScale) -> Value:
-    """The reading of a word whose scale was taught; raw as long as its sign is not known."""
+    """Decode a word with a learned scale; the result is raw while the sign is not known."""
     number = taught.number(raw)
     if number is None:
         return Value(raw, Decimal(raw), "raw", str(raw))
@@ -78,7 +78,7 @@ def shown_text(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> str:
-    """The reading of a raw value with its unit; empty where there is no value."""
+    """Return a raw value as text with its unit; empty if there is no value."""
     return "" if raw is None else shown(profile, parameter, raw, raws, absent).display
 
 
@@ -89,7 +89,7 @@ def typed_text(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> str:
-    """A raw value as a person types it in one word: hexadecimal for bit words, else a number."""
+    """Return a raw value as a person types it: hexadecimal for bit words, else a number."""
     if parameter.bits:
         return shown(profile, parameter, raw, raws, absent).text
     number = number_of(profile, parameter, raw, raws, absent)
@@ -97,7 +97,7 @@ def typed_text(
 
 
 def depends_on(parameter: Parameter) -> tuple[str, ...]:
-    """Codes that must be read, or known to be lacking, before a value can be shown in its unit."""
+    """Return the codes that must be read, or known as missing, to show a value in its unit."""
     scale = parameter.scale_by.parameter if parameter.scale_by else ""
     unit = parameter.unit_by.parameter if parameter.unit_by else ""
     return tuple(code for code in (scale, unit) if code)
@@ -110,7 +110,7 @@ def number_of(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> Decimal | None:
-    """The engineering value of a raw one, a named one too; None while its scale is not known."""
+    """Return the engineering value of a raw value, even if named; None if the scale is unknown."""
     if (taught := profile.taught.get(parameter.code)) is not None:
         return taught.number(raw)
     scale = profile.scale(parameter, raws, absent)
@@ -118,5 +118,5 @@ def number_of(
 
 
 def scale_sources(profile: Profile) -> frozenset[str]:
-    """Codes of the parameters that other parameters' scales follow."""
+    """Return the codes of the parameters that other parameters' scales depend on."""
     return frozenset(p.scale_by.parameter for p in profile.parameters if p.scale_by is not None)

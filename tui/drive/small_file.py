@@ -1,6 +1,6 @@
-"""Files that a person names, or that lie where the panel keeps its own: read only as far as sane.
+"""Bounded reads of files that a person names, or that the panel stores.
 
-A pipe would hold its reader up for good, a device such as /dev/zero would fill the memory.
+A pipe would block its reader forever, and a device such as /dev/zero would fill the memory.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ LONGEST_TEXT = 2_000_000
 
 
 def open_regular(path: Path) -> int:
-    """A handle that reads a file; raises OSError, also unless it is a regular file."""
+    """Open a file for reading; raises OSError, also if it is not a regular file."""
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)
     flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0)
     handle = os.open(path, flags)
@@ -29,7 +29,7 @@ def open_regular(path: Path) -> int:
 
 
 def read_small(path: Path, longest: int = LONGEST_TEXT) -> bytes:
-    """All of a file. Raises OSError, also where it is longer than `longest` bytes or no file."""
+    """Read a file. Raises OSError, also if it has more than `longest` bytes or is not a file."""
     with os.fdopen(open_regular(path), "rb") as file:
         data = file.read(longest + 1)
     if len(data) > longest:
@@ -38,6 +38,6 @@ def read_small(path: Path, longest: int = LONGEST_TEXT) -> bytes:
 
 
 def read_small_text(path: Path, longest: int = LONGEST_TEXT) -> str:
-    """The text of a file, line ends as `\\n`. Raises OSError, and UnicodeDecodeError."""
+    """Read a text file, with line ends as `\\n`. Raises OSError and UnicodeDecodeError."""
     text = read_small(path, longest).decode("utf-8")
     return text.replace("\r\n", "\n").replace("\r", "\n")

@@ -1,4 +1,4 @@
-"""A family's profile with what a person has taught of one drive: scales, and its reference."""
+"""Family profile with the learned scales and the taught reference of one drive."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .teaching import TaughtScale
 from .values import is_enumeration, word_count
 
 REFERENCE_UNITS: Mapping[str, Quantity] = {"Hz": "command_frequency", "rpm": "command_speed"}
-"""In which unit a reference can be given, and what its word is then."""
+"""Units in which a reference can be given, and the quantity of its word."""
 RUNS = frozenset({"forward", "reverse"})
 
 
 def why_not_taught(family: Profile, code: str) -> str:
-    """Why a parameter's scale cannot be taught, by the profile of its family; empty if it can."""
+    """Return why a parameter's scale cannot be taught; empty if it can."""
     parameter = family[code]
     if parameter.access == "w" or parameter.bits or word_count(parameter) != 1:
         return f"{code} is not a number of one word: it has no scale to teach."
@@ -41,7 +41,7 @@ def is_raw(family: Profile, parameter: Parameter) -> bool:
 
 
 def teachable_codes(family: Profile) -> list[str]:
-    """Codes of all parameters whose scale can be taught, in the order of the profile."""
+    """Return the codes of all parameters whose scale can be taught, in the profile's order."""
     return [p.code for p in family.parameters if is_raw(family, p) and p.access != "w"]
 
 
@@ -52,7 +52,7 @@ def reference_of(family: Profile, code: str) -> TeachableReference | None:
 
 
 def why_no_reference(family: Profile, code: str, taught: Mapping[str, TaughtScale]) -> str:
-    """Why a parameter cannot take the reference; empty if it can, once a person confirms it."""
+    """Return why a parameter cannot take the reference; empty if it can after confirmation."""
     if reference_of(family, code) is None:
         known = ", ".join(reference.parameter for reference in family.data.teachable_references)
         may = f"{known} may." if known else f"{family.name} has none that may."
@@ -66,7 +66,7 @@ def why_no_reference(family: Profile, code: str, taught: Mapping[str, TaughtScal
 
 
 def with_taught(family: Profile, taught: Mapping[str, TaughtScale], reference: str = "") -> Profile:
-    """The profile of one drive; `reference` is the confirmed parameter that takes its reference."""
+    """Return the profile of one drive; `reference` is the parameter confirmed for its reference."""
     known = {
         code: scale
         for code, scale in taught.items()
@@ -91,13 +91,13 @@ def with_taught(family: Profile, taught: Mapping[str, TaughtScale], reference: s
 
 
 def _taught(parameter: Parameter, scale: TaughtScale, reference: bool) -> Parameter:
-    """The parameter with its scale and unit; it stays one that the editor does not write."""
+    """Return the parameter with its scale and unit; the editor still does not write it."""
     quantity = REFERENCE_UNITS[scale.unit] if reference else parameter.quantity
     return replace(parameter, unit=scale.unit, scale=f"{scale.scale:f}", quantity=quantity)
 
 
 def _choosing(chart: Chart, bits: int) -> Chart:
-    """The chart whose commands to run choose the reference too; stops stay as they are."""
+    """Return the chart with these bits set in its run commands; stops are unchanged."""
     orders = [
         replace(order, words=[word | bits if word else word for word in order.words])
         if order.id in RUNS and order.parameter in ("", chart.command)

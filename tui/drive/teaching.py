@@ -1,7 +1,7 @@
-"""The scale of a raw word, learnt from what the drive's own display shows beside it; pure.
+"""Learning the scale of a raw word from the drive's own display. Pure.
 
-A look is a raw word and the number that a person read at the same moment. Of a fixed list of
-scales that one is right with which every look agrees; where none or several do, nothing is taught.
+A look is a raw word with the number that the display showed at the same moment. If exactly one of
+a fixed list of scales agrees with every look, that scale is learned.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from enum import StrEnum
 from .errors import ValueRefused
 
 LOOKS_KEPT = 8
-"""Looks at one word that are kept; a later one takes the place of the last."""
+"""Most looks kept for one word; a further one replaces the last."""
 SIGN_FROM = 0x8000
-"""Words from here on are negative where the word has a sign."""
+"""Lowest word that is negative if the word has a sign."""
 WORDS = 0x10000
 POWERS_OF_TEN = tuple(Decimal(text) for text in ("1", "0.1", "0.01", "0.001", "10", "100"))
 USUAL_SCALES = tuple(
@@ -27,9 +27,9 @@ USUAL_SCALES = tuple(
 )
 """Steps of 2, 5 and 2.5, and rpm of 1 or 0.1 Hz with 1 to 5 pole pairs."""
 SCALES = (*POWERS_OF_TEN, *USUAL_SCALES)
-"""Possible values of one count, the likeliest first."""
+"""Possible values of one count, most likely first."""
 UNITS = ("Hz", "rpm", "A", "V", "kW", "W", "%", "s", "ms", "°C", "Nm", "h", "kWh")
-"""Units that are usual on drives, as they are written here."""
+"""Usual units of drives, as Drive Panel writes them."""
 _ALIASES = {
     "1/min": "rpm", "min-1": "rpm", "tr/min": "rpm", "tr/mn": "rpm", "r/min": "rpm", "°c": "°C",
     "m3/h": "m³/h", "m3/s": "m³/s",
@@ -40,7 +40,7 @@ _UNIT = re.compile(r"[A-Za-zµΩ°%][A-Za-zµΩ°%²³/·]{0,7}")
 
 @dataclass(frozen=True, slots=True)
 class DisplayLook:
-    """A raw word, and what the drive's own display showed with it."""
+    """A raw word with the number that the drive's display showed for it."""
 
     word: int
     """As on the wire, 0 to 65535."""
@@ -50,7 +50,7 @@ class DisplayLook:
 
     @property
     def text(self) -> str:
-        """Both, for a person."""
+        """Word and number as text."""
         return f"raw {self.word} at {self.shown:f} {self.unit}".rstrip()
 
 
@@ -61,10 +61,10 @@ class TaughtScale:
     scale: Decimal
     unit: str
     signed: bool | None
-    """True if words from 32768 on are negative; None while no look has told."""
+    """True if words from 32768 on are negative; None while no look shows it."""
 
     def number(self, raw: int) -> Decimal | None:
-        """The value of a raw word; None where its sign is not known."""
+        """Return the value of a raw word; None if its sign is not known."""
         word = raw % WORDS
         if word < SIGN_FROM:
             return word * self.scale
@@ -74,7 +74,7 @@ class TaughtScale:
 
     @property
     def text(self) -> str:
-        """Value of one count, for a person."""
+        """Value of one count as text."""
         return f"1 count is {self.scale:f} {self.unit}".rstrip()
 
 
@@ -92,23 +92,22 @@ class LessonKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """Result of a reading, with the readings kept and the knowledge gained."""
+    """Result of one more look, with the looks kept and the scale learned."""
 
     kind: LessonKind
     looks: tuple[DisplayLook, ...]
     text: str
-    """For a person: what is known now, and what to do next."""
+    """The result, and what to do next."""
     scale: TaughtScale | None = None
 
     @property
     def went_wrong(self) -> bool:
-        """True if looks contradict each other."""
+        """True if the looks contradict each other."""
         return self.kind in (LessonKind.DISAGREES, LessonKind.ENDED)
 
 
 def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
-    """Number and unit of what a person read: `50.3`, `50,3 Hz`, `-12A`; a space before the unit is
-    allowed.
+    """Parse number and unit as a person typed them: `50.3`, `50,3 Hz`, `-12A`.
 
     Raises ValueRefused for what is neither.
     """
@@ -124,7 +123,7 @@ def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
 
 
 def unit_named(text: str) -> str:
-    """A unit as it is written here; raises ValueRefused for what is none."""
+    """Return a unit in its usual spelling; raises ValueRefused if it is not a unit."""
     typed = text.strip()
     folded = typed.casefold()
     if not typed:
@@ -140,7 +139,7 @@ def unit_named(text: str) -> str:
 
 
 def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
-    """Every scale of the list with which all looks agree, with its sign; none without a look."""
+    """Return every scale of the list that agrees with all looks, with its sign; none for none."""
     if not looks or (unit := _unit_of(looks)) is None:
         return []
     reported = any(look.word >= SIGN_FROM for look in looks)
@@ -152,7 +151,7 @@ def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
 
 
 def taught_by(looks: Sequence[DisplayLook]) -> TaughtScale | None:
-    """The one scale that fits readings of two or more words; None where they do not."""
+    """Return the scale that alone fits looks at two or more words; None if there is none."""
     if len({look.word for look in looks}) < 2:
         return None
     found = scales_that_fit(looks)
@@ -184,8 +183,7 @@ def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson
 def _contradiction(
     code: str, before: tuple[DisplayLook, ...], look: DisplayLook, known: TaughtScale | None
 ) -> Lesson:
-    """A look with which no scale agrees: nothing is taught any more; this reading starts a new
-    series."""
+    """Return the result for a look that no scale agrees with: it begins a new series."""
     alone = scales_that_fit([look])
     kept = (look,) if alone else ()
     if not alone:
@@ -201,9 +199,9 @@ def _contradiction(
 
 
 def _with(before: Sequence[DisplayLook], look: DisplayLook) -> tuple[DisplayLook, ...]:
-    """The looks with one more; a repeated one adds nothing, but for a unit.
+    """Return the looks with one more; a repeated one adds only a unit.
 
-    Of too many those are left out first without which the same is known.
+    If there are too many, those that do not change the result are dropped first.
     """
     same = [item for item in before if (item.word, item.shown) == (look.word, look.shown)]
     if same and look.unit in ("", same[0].unit):
@@ -218,15 +216,14 @@ def _with(before: Sequence[DisplayLook], look: DisplayLook) -> tuple[DisplayLook
 
 
 def _agrees(look: DisplayLook, scale: TaughtScale) -> bool:
-    """Return True if a display shows this, to one step of its last digit: it cuts, rounds, and
-    lags."""
+    """Return True if a display may show this: it may truncate, round or lag by one digit step."""
     number = scale.number(look.word)
     step = Decimal(1).scaleb(min(0, int(look.shown.as_tuple().exponent)))
     return number is not None and abs(number - look.shown) <= step
 
 
 def _unit_of(looks: Iterable[DisplayLook]) -> str | None:
-    """The unit of all looks; None where two differ."""
+    """Return the unit of all looks; None if two differ."""
     units = {look.unit for look in looks if look.unit}
     return None if len(units) > 1 else next(iter(units), "")
 

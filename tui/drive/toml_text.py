@@ -1,4 +1,4 @@
-"""TOML of any content read as tables, or refused in a sentence with its line.
+"""Parsing of TOML from any source; errors are a sentence with the line.
 
 The parser itself lets Python's own limits through, and takes minutes for some texts that no person
 writes.
@@ -18,7 +18,7 @@ _OPENED = re.compile(rf"(?:[\[{{][ \t\r\n]*(?:[\w-]+[ \t]*=[ \t\r\n]*)?){{{DEEPE
 
 
 def toml_tables(text: str) -> dict[str, Any]:
-    """The tables of a text; raises tomli.TOMLDecodeError, whatever is wrong with it."""
+    """Parse a text; raises tomli.TOMLDecodeError for every kind of error."""
     for pattern in (_PARTS, _OPENED):
         if found := pattern.search(text):
             raise _too_deep(text, found.start())

@@ -1,4 +1,4 @@
-"""Units that a person may type in place of a parameter's own: the same kind, another size."""
+"""Units that a person may type instead of a parameter's own, with their factors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KINDS: tuple[dict[str, str], ...] = (
 
 
 def factor_between(typed: str, own: str) -> Decimal | None:
-    """By what a number in the typed unit is multiplied to be in the own one; None if they differ.
+    """Return the factor from the typed unit to the parameter's own; None if their kinds differ.
 
     Capitals do not count: no two units of one kind differ by them alone.
     """
@@ -36,6 +36,6 @@ def factor_between(typed: str, own: str) -> Decimal | None:
 
 
 def spelled(typed: str) -> str:
-    """A unit in the usual capitals: `hz` is Hz; an unknown one as it was typed."""
+    """Return a unit in its usual capitals: `hz` is Hz; an unknown unit unchanged."""
     known = (unit for kind in KINDS for unit in kind if unit.casefold() == typed.casefold())
     return next(known, typed)

@@ -17,7 +17,7 @@ from .units import factor_between
 from .value_names import raw_of_name
 
 LONGEST_NUMBER = 30
-"""Places before or behind the point of a number that anybody means."""
+"""Most digits before or after the point of a typed number."""
 NOT_AVAILABLE = "-----"
 HALF_A_STEP = Decimal("0.5")
 SPARE_DECIMALS = 1
@@ -27,7 +27,7 @@ _WITH_UNIT = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,].*)", re.DOTALL)
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A raw value with its reading: number and unit, or a name, or the set bits."""
+    """A decoded raw value: number and unit, or a name, or the bits that are set."""
 
     raw: int
     number: Decimal | None
@@ -35,9 +35,9 @@ class Value:
     text: str
     """Text for a person, without the unit."""
     taught: bool = False
-    """True if a person has taught its scale; no document has it."""
+    """True if its scale was learned; no document states it."""
     unsure: bool = False
-    """True if no document says what so high a raw value means; its text ends with `?`."""
+    """True if no document states the meaning of such a high raw value; its text ends with `?`."""
 
     @property
     def display(self) -> str:
@@ -52,7 +52,7 @@ class Conversion:
     raw: int
     rounded: bool
     lossy: bool = False
-    """True if rounding made another value of it: 0, or either of two that are as near."""
+    """True if rounding changed the value: it became 0, or one of two equally near values."""
 
 
 def word_count(parameter: Parameter) -> int:
@@ -61,7 +61,7 @@ def word_count(parameter: Parameter) -> int:
 
 
 def from_words(parameter: Parameter, words: Sequence[int]) -> int:
-    """The raw value in the parameter's registers: sign, word order and own bits applied."""
+    """Return the raw value in the parameter's registers, by its sign, word order and bits."""
     if word_count(parameter) == 2:
         low, high = words if parameter.low_word_first else reversed(words)
         raw, width = (high << 16) | low, 32
@@ -73,12 +73,12 @@ def from_words(parameter: Parameter, words: Sequence[int]) -> int:
 
 
 def is_field(parameter: Parameter) -> bool:
-    """Return True if the parameter is some bits of its register, and others are not its own."""
+    """Return True if the parameter is only a part of the bits of its register."""
     return parameter.shift != 0 or parameter.mask != 0xFFFF
 
 
 def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[int, ...]:
-    """The registers that carry a raw value; raises ValueRefused if it does not fit.
+    """Return the register words for a raw value; raises ValueRefused if it does not fit.
 
     `held` is the word as the drive has it, needed for a field of a register: the bits that are
     not its own stay.
@@ -119,7 +119,7 @@ def raw_range(parameter: Parameter) -> tuple[int, int]:
 
 
 def engineering(raw: int, scale: Decimal) -> Decimal:
-    """The engineering value of a raw one, with as many decimals as `decimals_of` its scale."""
+    """Return the engineering value of a raw value, with `decimals_of(scale)` decimals."""
     number, decimals = raw * scale, decimals_of(scale)
     if -int(scale.as_tuple().exponent) <= decimals:
         return number
@@ -127,7 +127,7 @@ def engineering(raw: int, scale: Decimal) -> Decimal:
 
 
 def decimals_of(scale: Decimal) -> int:
-    """The number of decimals with which a value of this scale is shown.
+    """Return the number of decimals to show for a value of this scale.
 
     Those of the scale itself (0.1, 0.25). A longer scale (60/32767) gets as many as keep two
     neighboring counts apart, so that a shown value always leads back to its raw value.
@@ -139,7 +139,7 @@ def decimals_of(scale: Decimal) -> int:
 def decode(
     parameter: Parameter, raw: int, names: Mapping[int, str], scale: Decimal | None
 ) -> Value:
-    """A raw value as a person reads it.
+    """Decode a raw value.
 
     A name where the raw value has one, the word in hexadecimal for bit words, else the
     number with the decimals of its scale; without a scale the raw value itself, unit `raw`.
@@ -164,21 +164,21 @@ def is_enumeration(parameter: Parameter) -> bool:
 
 
 def _is_number(parameter: Parameter) -> bool:
-    """A plain number may name special values; it then allows more raw values than it names."""
+    """Return True for a number, even with named special values: its range exceeds the names."""
     if parameter.enumeration or parameter.min is None or parameter.max is None:
         return False
     return parameter.max - parameter.min + 1 > 4 * len(parameter.values)
 
 
 def set_bits(bits: Sequence[Bit], word: int) -> list[Bit]:
-    """The named bits that are 1 in a word."""
+    """Return the named bits that are 1 in a word."""
     return [bit for bit in bits if word >> bit.bit & 1]
 
 
 def encode(
     parameter: Parameter, text: str, names: Mapping[int, str], scale: Decimal | None
 ) -> Conversion:
-    """A raw value from what a person typed: a name, a number with or without unit, a word.
+    """Encode what a person typed: a name, a number with or without unit, or a word.
 
     Raises ValueRefused when the text is none of these, the scale is not known, the raw
     value is out of the profile's range or sets a reserved bit.
@@ -233,7 +233,7 @@ def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
 
 
 def _doubt(parameter: Parameter) -> str:
-    """No document of the family states the limits, and only the row itself is sure."""
+    """Return a remark if no document of the family states the limits; else empty."""
     grounds = parameter.limit_grounds
     weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
     return " (limits that no document of this family states)" if weak else ""
@@ -279,7 +279,7 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
 
 
 def percent_of(percent: Decimal, rating: Decimal) -> Decimal:
-    """A percentage in the unit of its rating, to the rating's decimals, half away from zero."""
+    """Convert a percentage to the unit of its rating, with its decimals, half away from zero."""
     return (percent * rating / 100).quantize(
         Decimal(1).scaleb(int(rating.as_tuple().exponent)), ROUND_HALF_UP
     )
