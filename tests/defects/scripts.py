@@ -43,7 +43,7 @@ DEFECTS = (
     ),
     Defect(
         "old-values-called-good",
-        "tui/session/monitor/cycle.py",
+        "tui/session/monitor/snapshot.py",
         "elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):",
         "elif reading.quality is Quality.GOOD and not snapshot.cycle:",
         "A recorder continues with values of a drive that no longer answers.",

@@ -560,7 +560,7 @@ DEFECTS = (
     ),
     Defect(
         "trend-of-another-drive",
-        "tui/session/monitor/trend_notes.py",
+        "tui/session/monitor/trend.py",
         "if (note.device, note.kind) == (self._device, self._kind):",
         "if note.device == self._device:",
         "Monitor shows the trend of the drive that had the address before.",

@@ -26,8 +26,8 @@ from tui.session.blocks.user_words import load_words, read_words, save_words
 from tui.session.blocks.write import AssignmentRefused, write_assignment
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
+from tui.session.read.proof import SlotMatch
 from tui.session.read.reader import Reader
-from tui.session.read.verdict import SlotMatch
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 NO_WORDS = (UserWord(),) * COUNT

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from tests.blocks import block_of
 from tui.drive.profile import library
 from tui.drive.values import decode, type_range
-from tui.session.read.proof import SlotEvidence
-from tui.session.read.verdict import SlotMatch
+from tui.session.read.proof import SlotEvidence, SlotMatch
 from tui.session.reading import Reading
 from tui.session.shown import Quality
 

@@ -16,8 +16,7 @@ from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
 from tui.session.event_notes import EVENTS_OF_LINE, EventNotes, LeftEvent
 from tui.session.events import Event, EventLog
-from tui.session.monitor.trend import TREND_SECONDS, Trend, TrendPoint
-from tui.session.monitor.trend_notes import NOTED_EVERY, TrendNotes
+from tui.session.monitor.trend import NOTED_EVERY, TREND_SECONDS, Trend, TrendNotes, TrendPoint
 
 ATV71 = library.load("atv71")
 

@@ -18,7 +18,7 @@ from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
-from tui.session.read.verdict import SlotMatch
+from tui.session.read.proof import SlotMatch
 from tui.session.work import Outcome, OutcomeKind
 
 from . import fakes

@@ -148,7 +148,7 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 def _status(views: list[BlockView]) -> int:
     """0 if every comparable slot in use returns its mapped parameter."""
-    from tui.session.read.verdict import SlotMatch
+    from tui.session.read.proof import SlotMatch
 
     wrong = (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE)
     for view in views:

@@ -145,7 +145,7 @@ def _table(session: DriveSession, view: BlockView, width: int) -> Table:
 
 
 def _in_use(view: BlockView) -> list[Slot]:
-    from tui.session.read.verdict import SlotMatch
+    from tui.session.read.proof import SlotMatch
 
     return [slot for slot in view.slots if slot.verdict is not SlotMatch.UNUSED]
 

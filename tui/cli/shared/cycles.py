@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tui.session.monitor.cycle import as_read
+from tui.session.monitor.snapshot import as_read
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession

@@ -15,7 +15,7 @@ from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
-from tui.session.read.verdict import SlotMatch
+from tui.session.read.proof import SlotMatch
 from tui.widgets.drawing import cut, rule, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
 from tui.wire.frames import hex_text

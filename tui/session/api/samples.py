@@ -11,9 +11,8 @@ from datetime import UTC, datetime
 from tui.drive.errors import DriveError
 
 from ..drive import DriveSession
-from ..monitor.cycle import as_read
 from ..monitor.monitor import Monitor
-from ..monitor.snapshot import Snapshot
+from ..monitor.snapshot import Snapshot, as_read
 from ..reading import reading_of
 from .values import Sample, value_from
 

@@ -25,7 +25,7 @@ from ..drive import DriveSession
 from ..journal import Journal
 from ..monitor.monitor import Monitor
 from ..monitor.snapshot import Snapshot
-from ..read.verdict import SlotMatch
+from ..read.proof import SlotMatch
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .exchange import exchange
 from .mapping import BlockView, Force, Mapper

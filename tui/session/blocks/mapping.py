@@ -24,9 +24,8 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from ..drive import DriveSession
-from ..read.proof import SURE, SlotEvidence
+from ..read.proof import SURE, SlotEvidence, SlotMatch
 from ..read.retrying_reader import RetryingReader
-from ..read.verdict import SlotMatch
 from ..reading import Reading
 
 COMPARISONS_MOST = 2 * SURE

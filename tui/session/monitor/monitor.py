@@ -27,8 +27,7 @@ from ..shown import Quality
 from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan
-from .trend import Trend, TrendPoint
-from .trend_notes import TrendNotes
+from .trend import Trend, TrendNotes, TrendPoint
 
 log = logging.getLogger(__name__)
 

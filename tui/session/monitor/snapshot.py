@@ -1,15 +1,17 @@
-"""Result of one cycle of a monitor."""
+"""Result of one cycle of a monitor, for screens and for recorders."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from tui.bus.api import Contact, LineState
+from tui.drive.profile.profile import Profile
 from tui.safety import STALE_CYCLES, STALE_LEAST
 
-from ..drive_state import DriveState
-from ..shown import Shown
+from ..drive_state import DriveState, drive_state
+from ..reading import Reading, with_text
+from ..shown import Quality, Shown
 from .rates import SLOW_FACTOR
 
 TOO_SLOW = 1.2
@@ -57,3 +59,21 @@ class Snapshot:
     def is_stale(self, now: float) -> bool:
         """Return True if the last cycle ended so long ago that none of its values is current."""
         return now - self.time > max(stale_after(self.period), STALE_LEAST)
+
+
+def as_read(profile: Profile, codes: Sequence[str], snapshot: Snapshot, since: float) -> Snapshot:
+    """Return the cycle with exactly these codes; values not read after `since` are stale.
+
+    `since` is the end of the previous cycle (monotonic). A code that was never read gets a bad
+    reading with the reason. The state follows from the good readings only.
+    """
+    readings: dict[str, Reading] = {}
+    last = with_text(snapshot.readings)
+    for code in codes:
+        reading = last.get(code)
+        if reading is None:
+            reading = Reading.bad(profile[code], snapshot.time, snapshot.error)
+        elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):
+            reading = replace(reading, quality=Quality.STALE)
+        readings[code] = reading
+    return replace(snapshot, readings=readings, state=drive_state(profile, readings))

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import from_words, word_count
 
 from ..reading import Reading
-from .verdict import SlotMatch
 
 SURE = 3
 """Comparisons that must match one parameter and exclude each other one."""
@@ -24,6 +24,18 @@ BEYOND = 3
 """Factor: a word may differ by this many times the seen jitter, and still match."""
 LEAST = 3
 """Jitter in raw units that is assumed for every value, even if none was seen."""
+
+
+class SlotMatch(StrEnum):
+    """Match of a slot's word with its parameter, which is read directly."""
+
+    SAME = "same"
+    MOVING = "moving"
+    DIFFERS = "differs"
+    CHANGED = "changed meanwhile"
+    NONE = "no value"
+    UNUSED = "unused"
+    UNREAD = "not compared"
 
 
 @dataclass(slots=True)
