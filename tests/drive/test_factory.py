@@ -10,11 +10,10 @@ import pytest
 
 from tui.drive.profile import library
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
-from tui.drive.settings.dependence import builds_on
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.factory import factory_is_sure, factory_raw, factory_value, not_factory
 from tui.drive.settings.in_force import limits_in_force
-from tui.drive.settings.limits import edit_problems, limit_sources
+from tui.drive.settings.limits import builds_on, edit_problems, limit_sources
 from tui.drive.settings.parameter_set import ParameterSet, SetHead
 from tui.drive.settings.selection import FilterContext, rows, start_up_codes
 from tui.drive.settings.write_sequence import ordered

@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tui.drive.profile import library
-from tui.drive.settings.dependence import builds_on
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.in_force import limit_passed, limits_in_force
-from tui.drive.settings.limits import edit_problems
+from tui.drive.settings.limits import builds_on, edit_problems
 from tui.drive.settings.selection import (
     Choice,
     FilterContext,

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from tui.wire.frames import read_frame, read_write_frame, write_frame
 
 from ..profile.profile import Profile
-from ..profile.schema import Parameter
+from ..profile.schema import Block, Parameter
 from ..read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length
 from ..values import word_count
-from .assignment import Assignment, slot_target
+from .assignment import Assignment, empty, slot_target
+from .picking import raw_of
+from .slot_rules import reason_against
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,3 +209,37 @@ def _stretch(
     )
     alone = sum(timing.read(word_count(p)) for p in run)
     return Stretch(request, codes, beside, round(timing.read(count) * 1e6), round(alone * 1e6))
+
+
+def best_assignment(
+    profile: Profile,
+    block: Block,
+    codes: Sequence[str],
+    timing: WireTiming,
+    others: Mapping[str, int],
+    unreadable: Collection[str] = (),
+) -> Assignment:
+    """Slots for these parameters such that reading all of them takes least.
+
+    One slot after another takes what helps most then, though the first ones may cost more than
+    they save; the best of all lengths counts. `others` are the slots of other blocks.
+    """
+    left = [code for code in codes if code not in unreadable]
+    left = [code for code in left if not reason_against(profile, block, profile[code])]
+
+    def takes(plan: Assignment) -> int:
+        slots = {**others, **plan.slots}
+        return cost(profile, codes, timing, slots, unreadable).microseconds
+
+    plan = best = empty(block)
+    least = takes(plan)
+    for place in range(len(block.slots)):
+        if not left:
+            break
+        tried = {c: plan.with_raw(place, raw_of(profile, block, profile[c])) for c in left}
+        code = min(tried, key=lambda c: takes(tried[c]))
+        left.remove(code)
+        plan = tried[code]
+        if (now := takes(plan)) < least:
+            least, best = now, plan
+    return best

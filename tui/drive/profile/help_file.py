@@ -8,11 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeVar
+
+import msgspec
 
 from ..errors import ProfileError
-from .decode import decode_tables, line_of
+from .converting import converted
+from .form import form_faults, place_label
 from .schema import AlarmHelp, FaultHelp, HelpData, Hint, ProfileData
-from .shared_rows import source_text
+from .shared_rows import SourceText, parsed, source_text
+from .toml_lines import TomlPath
 
 FOLDER = "help"
 HelpPlace = tuple[str, int]
@@ -109,3 +114,30 @@ def _alarms(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpPlace, 
         seen.add((alarm.word, alarm.bit))
         if alarm.bit not in bits.get(alarm.word, set()):
             yield place, f"{_label(alarm)}: there is no such bit."
+
+
+T = TypeVar("T")
+
+
+def decode_tables(source: SourceText, form: type[T]) -> T:
+    """The data of a TOML text in a form; raises ProfileError with each fault, file and line."""
+    tables = parsed(source)
+    try:
+        data: T = converted(tables, form)
+    except msgspec.ValidationError as error:
+        found = form_faults(tables, form)[0].found or [((), str(error))]
+        lines = [
+            f"{source.file}:{line_of(source, path)}: {place_label(tables, path)}:"
+            f" {fault.rstrip('.')}."
+            for path, fault in found
+        ]
+        raise ProfileError("\n".join(lines)) from error
+    return data
+
+
+def line_of(source: SourceText, path: TomlPath) -> int:
+    """The line of a place, or of the row that it is in."""
+    for length in range(len(path), -1, -1):
+        if (line := source.lines.get(path[:length])) is not None:
+            return line
+    return 1

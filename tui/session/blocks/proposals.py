@@ -17,10 +17,9 @@ from tui.drive.blocks.assignment import (
     slot_changes,
     slots_of,
 )
-from tui.drive.blocks.best import best_assignment
 from tui.drive.blocks.picking import pick
 from tui.drive.blocks.slot_rules import Problem, assignment_problems
-from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
+from tui.drive.blocks.wire_cost import Saving, Stretch, best_assignment, saving, stretches
 from tui.drive.profile.schema import Block
 
 from ..drive import DriveSession

@@ -21,9 +21,8 @@ from tui.bus.errors import (
     strip_outcome_note,
 )
 from tui.drive.errors import DriveError
-from tui.drive.settings.dependence import builds_on
 from tui.drive.settings.edits import Edit, Edits
-from tui.drive.settings.limits import edit_problems, limit_sources
+from tui.drive.settings.limits import builds_on, edit_problems, limit_sources
 from tui.drive.settings.writable import cuts_line, option_code, waits_for_reset, write_refusal
 from tui.drive.settings.write_sequence import ordered
 from tui.drive.shown import shown
