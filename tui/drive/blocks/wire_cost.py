@@ -1,4 +1,4 @@
-"""Cost and savings of an assignment on the wire, and the requests that use it.
+"""Cost and savings of an assignment on the wire, the best one, and the requests that use it.
 
 Also, for families without blocks: what neighboring parameters cost in one read, and which
 stretch of them saves most.
@@ -219,10 +219,10 @@ def best_assignment(
     others: Mapping[str, int],
     unreadable: Collection[str] = (),
 ) -> Assignment:
-    """Slots for these parameters such that reading all of them takes least.
+    """Return an assignment of the block with which reading these parameters takes least time.
 
-    One slot after another takes what helps most then, though the first ones may cost more than
-    they save; the best of all lengths counts. `others` are the slots of other blocks.
+    A greedy search fills one slot after another, and returns the best of all lengths, because the
+    first slots may cost more than they save. `others` are the slots of other blocks.
     """
     left = [code for code in codes if code not in unreadable]
     left = [code for code in left if not reason_against(profile, block, profile[code])]

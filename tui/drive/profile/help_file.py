@@ -1,7 +1,6 @@
-"""Reading what the faults and alarms of a family point at, once somebody asks.
+"""Help of a family's faults and alarms, read on first use.
 
-It is in a file of its own beside the profiles, so that a profile stays readable and the first
-picture of a drive waits for none of it.
+It has its own file, so that a profile stays readable and a drive is displayed without loading it.
 """
 
 from __future__ import annotations
@@ -120,7 +119,7 @@ T = TypeVar("T")
 
 
 def decode_tables(source: SourceText, form: type[T]) -> T:
-    """The data of a TOML text in a form; raises ProfileError with each fault, file and line."""
+    """Decode a TOML text into a form; raises ProfileError with each fault, its file and line."""
     tables = parsed(source)
     try:
         data: T = converted(tables, form)
@@ -136,7 +135,7 @@ def decode_tables(source: SourceText, form: type[T]) -> T:
 
 
 def line_of(source: SourceText, path: TomlPath) -> int:
-    """The line of a place, or of the row that it is in."""
+    """Return the line of a place, or of the row that contains it."""
     for length in range(len(path), -1, -1):
         if (line := source.lines.get(path[:length])) is not None:
             return line

@@ -1,4 +1,4 @@
-"""Settings that limit each other, and edits that would put one beyond its limit."""
+"""Settings that limit each other, edits beyond a limit, and edits that depend on others."""
 
 from __future__ import annotations
 
@@ -126,11 +126,11 @@ def builds_on(
     edits: Edits,
     raws: Mapping[str, int],
 ) -> str:
-    """The missed edit that this one builds on, by its code; empty where there is none.
+    """Return the code of the failed edit that this one depends on; empty if there is none.
 
-    `missed` are codes of edits that the drive did not take, `edits` all that were to be written,
-    `raws` what the drive holds now. An edit builds on what gives it its scale, on what changes
-    other settings as it is written, and on a limit that it would pass as long as that stays.
+    `missed` are codes of edits that the drive did not accept, `edits` all edits to write, `raws`
+    the drive's present values. An edit depends on the source of its scale, on a setting that
+    changes others when it is written, and on a limit that it would exceed without that edit.
     """
     follows = profile[edit.code].scale_by
     if follows is not None and follows.parameter in missed:
@@ -138,7 +138,7 @@ def builds_on(
     for code in missed:
         if profile[code].resets_others:
             return code
-    # of what was refused it may not be known what the drive holds now: what it held before
+    # the present value of a refused setting may be unknown: assume the one from before
     held = {e.code: e.old for e in edits if e.code in missed and e.old is not None}
     after = {**held, **raws, **{e.code: e.new for e in edits if e.code not in missed}}
     for low, high in limit_pairs(profile):
