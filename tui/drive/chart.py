@@ -42,7 +42,7 @@ class ChartState:
 
     @property
     def motion(self) -> StateKind:
-        """Kind for callers that need a motor at standstill: a fault word alone is no proof."""
+        """Kind for callers that need a motor at standstill: a fault word alone does not show it."""
         return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind
 
 

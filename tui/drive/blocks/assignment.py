@@ -13,30 +13,30 @@ from ..profile.profile import Profile
 from ..profile.schema import Block, Parameter
 
 UNUSED = 0
-"""The raw value of a slot that stands for nothing."""
+"""Raw value of an unused slot."""
 
 
 class MappingError(DriveError):
-    """A slot cannot hold what was asked for; the text says why and what to do."""
+    """A slot cannot hold the requested value; the text says why and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """The raw values of a block's slots, in their order; 0 where a slot is unused."""
+    """Raw values of a block's slots, in their order; 0 for an unused slot."""
 
     block: Block
     raws: tuple[int, ...]
 
     def with_raw(self, place: int, raw: int) -> Assignment:
-        """The same with another raw value in one slot; places count from 0."""
+        """Return a copy with another raw value in one slot; places count from 0."""
         return replace(self, raws=(*self.raws[:place], raw, *self.raws[place + 1 :]))
 
     def cleared(self, place: int) -> Assignment:
-        """The same with one slot unused."""
+        """Return a copy with one slot unused."""
         return self.with_raw(place, UNUSED)
 
     def moved(self, place: int, step: int) -> Assignment:
-        """The same with a slot's content one place up (-1) or down (1), the other one there."""
+        """Return a copy with a slot swapped with the one above (-1) or below (1) it."""
         other = place + step
         if not (0 <= place < len(self.raws) and 0 <= other < len(self.raws)):
             return self
@@ -59,7 +59,7 @@ class SlotChange:
 
     slot: str
     old: int | None
-    """None where it could not be read."""
+    """None if it could not be read."""
     new: int
 
 
@@ -76,17 +76,17 @@ def assignment(block: Block, raws: Mapping[str, int]) -> Assignment | None:
 
 
 def empty(block: Block) -> Assignment:
-    """A block none of whose slots is used."""
+    """Return an assignment with all slots unused."""
     return Assignment(block, (UNUSED,) * len(block.slots))
 
 
 def factory(profile: Profile, block: Block) -> Assignment:
-    """A block as it leaves the factory; slots without a known setting are unused."""
+    """Return the factory assignment; slots without a known factory setting are unused."""
     return Assignment(block, tuple(profile[slot].factory or UNUSED for slot in block.slots))
 
 
 def slot_target(profile: Profile, block: Block, raw: int) -> Parameter | None:
-    """The parameter that a slot's raw value stands for; None for unused and unknown ones."""
+    """Return the parameter that a slot's raw value selects; None if unused or unknown."""
     if raw == UNUSED:
         return None
     if block.selects_by == "address":
@@ -96,7 +96,7 @@ def slot_target(profile: Profile, block: Block, raw: int) -> Parameter | None:
 
 
 def place_of(profile: Profile, slot: str) -> tuple[Block, int]:
-    """The block and the place of a slot by its code, in any case; raises MappingError."""
+    """Return block and place of a slot by its code, ignoring case; raises MappingError."""
     for block in profile.data.blocks:
         for place, code in enumerate(block.slots):
             if code.casefold() == slot.strip().casefold():
@@ -107,7 +107,7 @@ def place_of(profile: Profile, slot: str) -> tuple[Block, int]:
 
 
 def no_blocks(profile: Profile) -> str:
-    """Why there is nothing to assign, and what serves instead; for a family without blocks."""
+    """Return a text for a family without blocks: why, and what to use instead."""
     function = profile.function(3)
     longest = function.max_read if function else None
     instead = (
@@ -119,7 +119,7 @@ def no_blocks(profile: Profile) -> str:
 
 
 def slot_changes(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
-    """The slots that would be written, against raw values by slot as they are."""
+    """Return the slots that differ from the present raw values by slot."""
     return [
         SlotChange(slot, before.get(slot), raw)
         for slot, raw in after.slots.items()
@@ -128,7 +128,7 @@ def slot_changes(before: Mapping[str, int], after: Assignment) -> list[SlotChang
 
 
 def steps(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
-    """The writes that lead from one assignment to another, one slot at a time.
+    """Return the writes that lead from one assignment to another, one slot at a time.
 
     A slot whose content goes to another slot is set to 0 first: at no moment do two slots
     stand for the same parameter, so an output is never taken from two places.
@@ -143,7 +143,7 @@ def steps(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
         for change in found
         if not (change.slot in zeroed and change.new == UNUSED)
     ]
-    # what becomes unused goes before what is taken into use
+    # slots that become unused are written before slots that come into use
     return first + sorted(rest, key=lambda change: change.new != UNUSED)
 
 
@@ -160,5 +160,5 @@ def describe(profile: Profile, block: Block, raw: int | None) -> str:
 
 
 def slots_of(plans: Sequence[Assignment]) -> dict[str, int]:
-    """Raw values by slot of several blocks together."""
+    """Return the raw values by slot of several blocks together."""
     return {slot: raw for plan in plans for slot, raw in plan.slots.items()}

@@ -13,7 +13,7 @@ NONE = frozenset({"", "-", "--", "none", "off", "0", "w0", "16#0", "0x0"})
 
 
 def raw_of(profile: Profile, block: Block, parameter: Parameter) -> int:
-    """The raw value that makes a slot stand for a parameter.
+    """Return the raw value with which a slot selects a parameter.
 
     Raises MappingError where the block cannot bring or take it.
     """
@@ -33,7 +33,7 @@ def pick(profile: Profile, today: Assignment, place: int, text: str) -> Assignme
 
 
 def raw_named(profile: Profile, block: Block, text: str) -> int:
-    """The raw value of a slot for what a person names; raises MappingError, UnknownParameter."""
+    """Return a slot's raw value for typed text; raises MappingError and UnknownParameter."""
     wanted = text.strip()
     if wanted.casefold() in NONE:
         return UNUSED
@@ -51,7 +51,7 @@ def raw_named(profile: Profile, block: Block, text: str) -> int:
 
 
 def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]:
-    """The parameters that a slot of the block can stand for, those that fit a search first.
+    """Return the parameters that a slot of the block can select, best matches first.
 
     A search finds codes, numbers, addresses and names, and leaves out what holds none of its
     words.

@@ -18,7 +18,7 @@ class Problem:
     slot: str
     text: str
     refuses: bool = True
-    """True where it must not be written so; else it is only to be known."""
+    """True if it prevents the write; False if it is only a remark."""
 
 
 def assignment_problems(
@@ -43,7 +43,7 @@ def assignment_problems(
 
 
 def refusing(found: Iterable[Problem]) -> list[Problem]:
-    """Those that keep an assignment from being written."""
+    """Return the problems that prevent the write of an assignment."""
     return [problem for problem in found if problem.refuses]
 
 
@@ -95,7 +95,7 @@ def _shape_problems(plan: Assignment) -> list[Problem]:
 
 
 def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
-    """Why a slot of this block cannot stand for a parameter; empty where it can."""
+    """Return why a slot of this block cannot select a parameter; empty if it can."""
     code = parameter.code
     if block.selects_by == "choice" and code not in {c.parameter for c in block.choices}:
         codes = ", ".join(choice.parameter for choice in block.choices)

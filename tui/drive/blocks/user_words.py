@@ -1,4 +1,4 @@
-"""The four words that a person watches beside the monitoring set.
+"""The four user words: words that a person monitors in addition to the monitoring set.
 
 Each is an address with a format. A word that is not assigned, not known to the drive or
 protected shows `-----`, never a number.
@@ -28,7 +28,7 @@ class UserWord:
     format: WordFormat = "hex"
 
     def text(self, word: int | None) -> str:
-        """The word as it is shown; dashes where there is none."""
+        """Return the word in its format; dashes if there is none."""
         if not self.address or word is None:
             return NOT_AVAILABLE
         word &= 0xFFFF
@@ -60,7 +60,7 @@ def word_named(profile: Profile, text: str, format: WordFormat = "hex") -> UserW
 
 
 def format_named(text: str) -> WordFormat:
-    """The format of a name; raises MappingError."""
+    """Return the format with this name; raises MappingError."""
     for format in FORMATS:
         if format == text.strip().casefold():
             return format

@@ -26,12 +26,12 @@ class Cost:
 
     microseconds: int
     requests: int
-    """Requests, those that check a scanner's slots included."""
+    """Number of requests, including those that check a scanner's slots."""
 
 
 @dataclass(frozen=True, slots=True)
 class Saving:
-    """The cost of the same set under two assignments."""
+    """Cost of the same set with two assignments."""
 
     before: Cost
     after: Cost
@@ -48,13 +48,13 @@ class Stretch:
 
     request: ReadRequest
     brings: tuple[str, ...]
-    """Codes of the wanted parameters in it."""
+    """Codes of the requested parameters in it."""
     beside: tuple[str, ...]
-    """Codes that come with them for nothing but their words."""
+    """Codes of other parameters in it; they cost only the time of their words."""
     cost: int
     """Microseconds."""
     alone: int
-    """Microseconds of reading the wanted ones one by one."""
+    """Microseconds to read the requested ones one by one."""
 
     @property
     def saves(self) -> int:
@@ -98,7 +98,7 @@ def span(plan: Assignment) -> tuple[int, int] | None:
 
 
 def reach(profile: Profile, plan: Assignment, codes: Collection[str]) -> range:
-    """The places that one write of these parameters takes, from the first to the last of them."""
+    """Return the places that one write of these parameters covers, from first to last."""
     block = plan.block
     named = [
         place
@@ -129,7 +129,7 @@ def block_request(
     words: Sequence[int] = (),
     places: range | None = None,
 ) -> bytes:
-    """The request that uses an assignment; empty where no slot is in use.
+    """Return the request that uses an assignment; empty if no slot is in use.
 
     With inputs and outputs in use and function 23 in the drive, one exchange for both; else the
     read of the inputs, or the write of the outputs where there are none. `words` are written to
@@ -153,7 +153,7 @@ def microseconds(
     inputs: Assignment | None,
     outputs: Assignment | None,
 ) -> int:
-    """Time of the exchange that `frame` begins, its reply included; 0 without a slot in use."""
+    """Return the time of the exchange that `frame` begins, with its reply; 0 if no slot is used."""
     read = span(inputs) if inputs else None
     write = span(outputs) if outputs else None
     if read and write and profile.function(23) is not None:
@@ -171,7 +171,7 @@ def stretches(
     timing: WireTiming,
     unreadable: Collection[str] = (),
 ) -> list[Stretch]:
-    """The reads of neighbors that save most for these parameters, the best first.
+    """Return the reads of adjacent words that save most for these parameters, best first.
 
     Each parameter counts for one stretch only. Empty where the drive reads single words only.
     """

@@ -1,4 +1,4 @@
-"""Staged edits of one drive's settings: what was typed, and what it becomes.
+"""Staged edits of one drive's settings, as typed and as raw values.
 
 Everything here is pure: nothing is written. Applying them is session/settings/apply.py.
 """
@@ -17,7 +17,7 @@ from .writable import never_set, warning
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """One setting that is to be written."""
+    """One setting to write."""
 
     code: str
     typed: str
@@ -29,15 +29,15 @@ class Edit:
     """The new value as the drive will hold it."""
     old_text: str = ""
     rounded: bool = False
-    """True where the drive cannot hold exactly what was typed."""
+    """True if the drive cannot store exactly the typed value."""
     lossy: bool = False
-    """True where rounding makes another value of it: 0, or either of two neighbors."""
+    """True if rounding changes the value: to 0, or to one of two equally near values."""
     warning: str = ""
     """Danger of the value; else empty."""
 
     @property
     def loss(self) -> str:
-        """Why it is not written unless a person lets it be rounded; else empty."""
+        """Why writing it requires consent to rounding; empty if it does not."""
         return f"{self.code}: {self.typed} would be held as {self.text}" if self.lossy else ""
 
     @property
@@ -56,7 +56,7 @@ class Edits:
 
     @property
     def items(self) -> tuple[Edit, ...]:
-        """Those that change something."""
+        """Edits that change a value."""
         return tuple(edit for edit in self.requested if edit.new != edit.old)
 
     def __iter__(self) -> Iterator[Edit]:
@@ -108,7 +108,7 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str] = (),
     ) -> Edits:
-        """Stage several at once, so that each is encoded with the scales after all of them."""
+        """Stage several edits together, so that each is encoded with the resulting scales."""
         return self._with(list(edits), profile, raws, absent)
 
     def undo(
@@ -128,7 +128,7 @@ class Edits:
         return Edits(_resolve(fresh, profile, raws, absent))
 
     def after(self, raws: Mapping[str, int]) -> dict[str, int]:
-        """The raw values of the drive once all of this is written."""
+        """Return the drive's raw values after all edits are written."""
         return {**raws, **{edit.code: edit.new for edit in self.items}}
 
     def _with(

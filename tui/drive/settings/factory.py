@@ -1,4 +1,4 @@
-"""The factory setting of a parameter on the drive at hand, and whether it was changed from it.
+"""Factory setting of a parameter on the present drive, and detection of changes from it.
 
 Some follow another parameter (50 or 60 Hz), some the drive's rated current, and of some only words
 are known. Uncertain settings count as unchanged.
@@ -19,7 +19,7 @@ from .writable import is_setting
 def factory_raw(
     profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> int | None:
-    """The raw factory setting, given what the drive holds; None if that does not state it.
+    """Return the raw factory setting, from the drive's values; None if they do not determine it.
 
     A raw value counts with the factory scale: see `factory_value`.
     """
@@ -36,7 +36,7 @@ def factory_raw(
 def factory_value(
     profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> Value | None:
-    """The factory setting as a person reads it: under the scale that the drive left with.
+    """Decode the factory setting with the scale that the drive had when it left the factory.
 
     A ramp that left the factory with 30 counts of 0.1 s is 3.0 s, whatever a count is worth now.
     """
@@ -47,7 +47,7 @@ def factory_value(
 
 
 def factory_sources(parameter: Parameter) -> tuple[str, ...]:
-    """Codes that must be read before its factory setting can be known."""
+    """Return the codes that must be read to determine the factory setting."""
     by, of = parameter.factory_by, parameter.factory_of
     return tuple(factory_by.parameter for factory_by in (by, of) if factory_by is not None)
 
@@ -65,10 +65,9 @@ def not_factory(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> bool:
-    """Return True if a setting holds something else than its factory setting, as far as that is
-    known.
+    """Return True if a setting is known to differ from its factory setting.
 
-    What the drive sets itself, by auto-tuning, nobody has changed.
+    Settings that the drive itself changes by auto-tuning do not count as changed.
     """
     held = raws.get(parameter.code)
     factory = factory_raw(profile, parameter, raws, absent)
@@ -104,7 +103,7 @@ def _differs(
 def _first_scales(
     profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str]
 ) -> Mapping[str, int]:
-    """The raw values with what gives the parameter its scale as it left the factory."""
+    """Return the raw values, with the factory settings of the parameter's scale sources."""
     follows = parameter.scale_by
     source = None if follows is None else profile[follows.parameter]
     if source is None or source.factory is None or source.code in absent:

@@ -1,4 +1,4 @@
-"""The limits that are in force for a number: its own, and those that other parameters set."""
+"""Present limits of a number: its own, and those that other parameters set."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .multiple import value_of
 
 @dataclass(frozen=True, slots=True)
 class LimitsInForce:
-    """The present lowest and highest value, in the parameter's unit; None where not known."""
+    """Present lowest and highest value in the parameter's unit; None if not known."""
 
     low: Decimal | None
     high: Decimal | None
@@ -25,14 +25,14 @@ class LimitsInForce:
     step: Decimal
     """Value of one count."""
     low_by: str = ""
-    """The parameter whose value the lowest is; empty where it is the parameter's own."""
+    """Code of the parameter that sets the lowest value; empty if the limit is fixed."""
     high_by: str = ""
     sure: bool = True
     """False if no document of the family states them: marked with a ?."""
 
     @property
     def text(self) -> str:
-        """From the lowest to the highest, with what sets them."""
+        """The range as text, with the parameters that set its ends."""
         if self.low is None and self.high is None:
             return ""
         # the mark before what sets them: it stays where the end is cut off
@@ -50,7 +50,7 @@ class LimitsInForce:
 def limits_in_force(
     profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> LimitsInForce | None:
-    """The limits of a number under these raw values; None for what is none, or has no scale."""
+    """Return the limits of a number for these raw values; None if it has no number or scale."""
     scale = profile.scale(parameter, raws, absent)
     if parameter.access == "r" or parameter.bits or is_enumeration(parameter) or scale is None:
         return None
@@ -82,7 +82,7 @@ def limits_in_force(
 
 
 def limit_passed(profile: Profile, before: Edits, after: Edits, raws: Mapping[str, int]) -> str:
-    """Which limit the newest edit would pass, in a sentence that names it; empty where none."""
+    """Return a sentence with the limit that the last edit would exceed; empty if none."""
     known = edit_problems(profile, before, raws)
     reported = edit_problems(profile, after, raws)
     return next((text for code, text in reported.items() if known.get(code) != text), "")

@@ -14,10 +14,10 @@ from .multiple import formula_of, value_of
 from .writable import is_order
 
 
-# a profile stays as it was loaded, and every row of a table asks
+# cached because every row of a table calls it, and a profile does not change
 @lru_cache(maxsize=32)
 def limit_pairs(profile: Profile) -> tuple[tuple[str, str], ...]:
-    """Pairs of codes of which the first must never be above the second, in the same unit."""
+    """Return pairs of codes; the first value must not exceed the second, in the same unit."""
     pairs: dict[tuple[str, str], None] = {}
     for parameter in profile.parameters:
         if parameter.min_from:
@@ -38,7 +38,7 @@ def _comparable(profile: Profile, low: str, high: str) -> bool:
 
 @lru_cache(maxsize=32)
 def multiple_limits(profile: Profile) -> tuple[tuple[Parameter, Multiple], ...]:
-    """Return parameters limited by a multiple of another: of each its lowest, then its highest."""
+    """Return the parameters with a multiple of another as their limit: lowest, then highest."""
     return tuple(
         (parameter, of)
         for parameter in profile.parameters
@@ -48,7 +48,7 @@ def multiple_limits(profile: Profile) -> tuple[tuple[Parameter, Multiple], ...]:
 
 
 def limit_sources(profile: Profile, codes: Iterable[str]) -> set[str]:
-    """Codes that must be known to check these against their limits, and what they limit."""
+    """Return the codes needed to check these against their limits and those they limit."""
     wanted, found = set(codes), set[str]()
     for low, high in limit_pairs(profile):
         if {low, high} & wanted:
@@ -67,7 +67,7 @@ def limits_are_sure(parameter: Parameter) -> bool:
 
 
 def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, str]:
-    """By code, why an edit cannot be applied with the values after all of them."""
+    """Return, by code, why an edit contradicts a limit after all edits."""
     after = edits.after(raws)
     found: dict[str, str] = {}
     for low, high in limit_pairs(profile):
@@ -89,7 +89,7 @@ def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> di
 def _past_multiples(
     profile: Profile, edits: Edits, after: Mapping[str, int]
 ) -> Iterator[tuple[str, str]]:
-    """Edits past a limit that is so many times another parameter."""
+    """Yield code and reason of each edit beyond a limit that is a multiple of another parameter."""
     for parameter, of in multiple_limits(profile):
         code = parameter.code
         if code not in edits and of.parameter not in edits:

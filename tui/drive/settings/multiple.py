@@ -18,12 +18,12 @@ def counts_of(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> int | None:
-    """It as a raw value of the parameter, cut to a whole count; None while it is not known."""
+    """Return the multiple as a raw value, truncated to a whole count; None if not known."""
     raw, scale = raws.get(of.parameter), profile.scale(parameter, raws, absent)
     if raw is None or scale is None:
         return None
     number = number_of(profile, profile[of.parameter], raw, raws, absent)
-    # a rated current of 0 tells nothing
+    # a rated current of 0 is not a valid rating
     if number is None or (number == 0 and Decimal(of.plus) == 0):
         return None
     counts = (Decimal(of.times) * number + Decimal(of.plus)) / scale
@@ -37,7 +37,7 @@ def value_of(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> Decimal | None:
-    """It in the unit of the parameter, cut to a whole count; None while it is not known."""
+    """Return the multiple in the parameter's unit, truncated to a count; None if not known."""
     counts = counts_of(profile, parameter, of, raws, absent)
     scale = profile.scale(parameter, raws, absent)
     return None if counts is None or scale is None else engineering(counts, scale)

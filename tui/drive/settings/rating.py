@@ -1,4 +1,4 @@
-"""True if settings belong to one rating of drive and motor, and whether two drives are of one."""
+"""Rating of drive and motor: the settings that depend on it, and a comparison of two drives."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ RATED: frozenset[Quantity] = frozenset(
         "switching_frequency",
     }
 )
-"""Quantities that belong to one rating of drive and motor."""
+"""Quantities that depend on the rating of drive and motor."""
 
 
 def rating_codes(profile: Profile) -> list[str]:
-    """Codes of read-only words that show the drive's model or rating."""
+    """Return the codes of read-only words that show the drive's model or rating."""
     current = profile.quantity("drive_current")
     own = current.code if current is not None and current.access == "r" else ""
     return [code for code in (profile.data.identification.model_parameter, own) if code]
@@ -31,7 +31,7 @@ def rating_codes(profile: Profile) -> list[str]:
 def same_rating(
     profile: Profile, held: Held, source: ParameterSet, *, across: bool = False
 ) -> bool | None:
-    """Return True if set and drive are of one rating; None if one of them does not show it."""
+    """Return True if set and drive have the same rating; None if one does not show its rating."""
     if across:
         return False
     reported = source.head.identity.get("reference", "")
@@ -42,5 +42,5 @@ def same_rating(
 
 
 def rated(parameter: Parameter) -> bool:
-    """Return True if a setting belongs to one rating of drive and motor, or to one model."""
+    """Return True if a setting depends on the rating of drive and motor, or on the model."""
     return parameter.rated or parameter.quantity in RATED or parameter.unit in ("A", "kW", "HP")

@@ -35,7 +35,7 @@ class Options:
     confirmed: frozenset[str] = frozenset()
     """Codes of unverified parameters that the user has confirmed."""
     rounded: bool = False
-    """Write values that rounding makes others of, too."""
+    """Write values even if rounding changes them."""
 
 
 NO_OPTIONS = Options()
@@ -43,13 +43,13 @@ NO_OPTIONS = Options()
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """The drive as it is now."""
+    """The drive's present values."""
 
     raws: Mapping[str, int]
     absent: Mapping[str, str] = field(default_factory=dict)
-    """Codes that cannot be read, and why."""
+    """Reason by code, for parameters that cannot be read."""
     lacking: Collection[str] = ()
-    """Codes that the drive said it does not have."""
+    """Codes that the drive reported as missing."""
     reference: str = ""
     """Reference reported by the drive; empty if unknown."""
 
@@ -62,7 +62,7 @@ class RestoreItem:
     kind: ItemKind
     reason: SkipReason = ""
     text: str = ""
-    """Why it is left out, or what is to be known of it."""
+    """Why it is not written, or a remark."""
     old: str = ""
     new: str = ""
 
@@ -76,12 +76,11 @@ class RestorePlan:
     same_rating: bool | None
     """None if one side does not report its model."""
     needs_stop: bool
-    """True if some of it is written with the motor stopped only."""
+    """True if at least one write requires the motor stopped."""
     across: bool
     """True if the set is of another family: only common quantities are carried over."""
 
     def items_of_kind(self, kind: ItemKind) -> list[RestoreItem]:
-        """The items of one kind."""
         return [item for item in self.items if item.kind == kind]
 
     def count(self, kind: ItemKind) -> int:

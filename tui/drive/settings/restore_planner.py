@@ -1,4 +1,4 @@
-"""Sorts what a parameter set holds: what a drive is to be written, what it holds, and the rest."""
+"""Planning of a restore: the values of a set to write, those the drive has, and the rest."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ACROSS: tuple[Quantity, ...] = (
     "preset_speed_6",
     "preset_speed_7",
 )
-"""Quantities that mean the same on every family and can be carried from one to another."""
+"""Quantities with the same meaning in every family, which can be transferred between families."""
 
 
 def plan_restore(
@@ -56,7 +56,7 @@ def plan_restore(
     source_profile: Profile,
     options: Options = NO_OPTIONS,
 ) -> RestorePlan:
-    """Plan the writes that make a drive hold a parameter set.
+    """Plan the writes that restore a parameter set to a drive.
 
     `profile` and `held` are the drive's, `source_profile` is the set's. Values of another family
     are carried over by quantity, in engineering values.
@@ -101,7 +101,7 @@ class _Planner:
         self._wanted: dict[str, Edit] = {}
 
     def add_codes(self) -> None:
-        """Every parameter of a set of the same family."""
+        """Add every parameter of a set of the same family."""
         sources = scale_sources(self.profile)
         for parameter in sorted(self.profile.parameters, key=lambda p: p.code not in sources):
             raw = self.source.raws.get(parameter.code)
@@ -148,7 +148,7 @@ class _Planner:
             self._skip(key, "no counterpart", text, value.display)
 
     def _typed(self, profile: Profile, parameter: Parameter, raw: int) -> str:
-        """The value of the set as it is typed: it holds under every scale."""
+        """Return the set's value as text with its unit, which is valid for every scale."""
         absent = lacking(profile, self.source.raws)
         number = number_of(profile, parameter, raw, self.source.raws, absent)
         if raw in profile.names(parameter) or number is None:
@@ -156,7 +156,7 @@ class _Planner:
         return f"{number:f} {parameter.unit}".rstrip()
 
     def _consider(self, parameter: Parameter, typed: str, raw: int) -> None:
-        """Take a parameter among those to write, or say why not."""
+        """Plan the write of a parameter, or note why it is skipped."""
         code = parameter.code
         if (reason := self._reason_against(parameter)) is not None:
             new = self._new_text(parameter, typed, raw)
@@ -188,7 +188,7 @@ class _Planner:
         return shown(self.profile, parameter, raw, self.source.raws).display
 
     def _holds(self, parameter: Parameter, text: str) -> bool:
-        """Return True if the drive shows the same value, so that nothing is left out."""
+        """Return True if the drive has the same value, so that skipping it changes nothing."""
         held = self.held
         raw = held.raws.get(parameter.code)
         if raw is None:
@@ -213,7 +213,7 @@ class _Planner:
         return None
 
     def settle(self) -> None:
-        """Make edits of the values to be written, in range of each other, and report the rest."""
+        """Turn planned values into edits within each other's limits; note the rest as skipped."""
         while True:
             self.edits = Edits().stage_many(
                 self.profile, self._wanted.values(), self.held.raws, self.held.lacking
@@ -233,7 +233,7 @@ class _Planner:
         )
 
     def _lossy(self) -> dict[str, str]:
-        """By code, what a value would be rounded to that makes another one of it."""
+        """Return, by code, the remark on each value that rounding would change."""
         by_hand = {} if self._across else {c: self.source.notes[c] for c in self.source.lossy}
         changed = {edit.code for edit in self.edits}
         found = {edit.code: edit.loss for edit in self.edits if edit.lossy}

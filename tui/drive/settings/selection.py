@@ -1,4 +1,4 @@
-"""Which parameters a list shows: search, filters, groups; pure functions."""
+"""Selection of the parameters that a list shows: search, filters, groups. Pure functions."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ FILTERS: tuple[FilterId, ...] = (
 
 
 HOME_QUANTITIES: tuple[Quantity, ...] = ("acceleration", "high_speed", "line_address")
-"""Quantities that a person looks for first: the group of the first one is shown at the start."""
+"""Quantities in common use; the list opens with the group of the first one that exists."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Contents of a list: all that passes a filter, or one group of the profile."""
+    """Contents of a list: all parameters that pass a filter, or one group of the profile."""
 
     filter: FilterId = "all"
     group: str = ""
@@ -54,7 +54,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class FilterContext:
-    """Facts by which a filter decides."""
+    """Facts that the filters use."""
 
     profile: Profile
     raws: Mapping[str, int] = field(default_factory=dict)
@@ -63,13 +63,13 @@ class FilterContext:
     favorites: Collection[str] = ()
     recent: tuple[str, ...] = ()
     other: Mapping[str, int] = field(default_factory=dict)
-    """Raw values of the parameter set that the drive is compared with."""
+    """Raw values of the parameter set to compare the drive with."""
     absent: Collection[str] = ()
     """Codes that the drive does not have."""
 
 
 def group_order(profile: Profile) -> list[str]:
-    """The profile's groups in its order, those with settings before those that are only read."""
+    """Return the profile's groups; those with settings come before read-only ones."""
     settings = {p.group for p in profile.parameters if is_setting(profile, p)}
     return sorted(profile.groups, key=lambda group: group not in settings)
 
@@ -80,22 +80,22 @@ def start_up_codes(profile: Profile) -> list[str]:
 
 
 def home_group(profile: Profile) -> str:
-    """The group that a person most often looks for, as the keypad's menu of settings."""
+    """Return the group to open first: usually the keypad's menu of settings."""
     found = (profile.quantity(quantity) for quantity in HOME_QUANTITIES)
     return next((p.group for p in found if p is not None), group_order(profile)[0])
 
 
 def chosen_codes(facts: FilterContext, choice: Choice) -> list[str]:
-    """Codes of what a choice shows."""
+    """Return the codes that a choice shows."""
     if choice.group:
         return [p.code for p in facts.profile.parameters if p.group == choice.group]
     return rows(facts, choice.filter)
 
 
 def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
-    """Codes of what is shown: the best matches first, settings among them, then by the profile.
+    """Return the codes to show: best matches first, settings before others, in profile order.
 
-    Of the recent ones the last edited comes first; a start-up keeps the order of its steps.
+    Recent ones begin with the last edited; a start-up keeps the order of its steps.
     """
     words = search.casefold().split()
     profile = facts.profile

@@ -1,4 +1,4 @@
-"""Parameter sets on disk: written whole or not at all, never over another file unasked."""
+"""Parameter set files: written completely or not at all, never over another file by default."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ USUAL_FILE_MODE, PRIVATE_FILE_MODE = 0o666, 0o600
 
 
 class FileThere(SetError):
-    """A file of this name exists and was not to be overwritten."""
+    """A file with this name already exists, and overwriting it was not requested."""
 
 
 def read_set(path: Path, name: str = "") -> ParameterSet:
-    """The parameter set in a file; raises SetError, UnknownProfile and ProfileError.
+    """Read a parameter set; raises SetError, UnknownProfile and ProfileError.
 
     `name` is what errors call the file, its path unless given.
     """
@@ -66,7 +66,7 @@ def write_file(
 
 
 def _put(part: Path, path: Path, *, force: bool) -> None:
-    """Give the file its name; without `force` in one step with seeing that it is free."""
+    """Give the file its name; without `force`, fail atomically if the name is in use."""
     if force:
         part.replace(path)
         return
@@ -77,12 +77,12 @@ def _put(part: Path, path: Path, *, force: bool) -> None:
             f"{path} already exists. Choose another name, or use --force to replace it."
         ) from error
     except (OSError, NotImplementedError):
-        # a file system without links; the name was free when it was looked at
+        # a file system without links; the name was free at the check before
         part.replace(path)
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the name last, where the system can do that."""
+    """Flush the folder to disk, so that the name survives a power loss, if supported."""
     if os.name != "posix":
         return
     with suppress(OSError):

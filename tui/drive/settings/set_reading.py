@@ -1,4 +1,4 @@
-"""Reading the text of a parameter set back, with the line of whatever is wrong in it."""
+"""Parsing of a parameter set's text; errors name the line."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class _Fault:
 
 
 def load_set(text: str, file: str, profile_of: Callable[[str], Profile]) -> ParameterSet:
-    """The parameter set in a text; `profile_of` gives a profile by its id.
+    """Parse a parameter set; `profile_of` returns a profile by its id.
 
     Raises SetError with file and line for what is cut short, foreign or contradicts itself,
     and what `profile_of` raises.
@@ -160,7 +160,7 @@ def _entries(tables: Mapping[str, Any], text: str, fault: _Fault) -> list[_Entry
 
 
 def _lines_of_codes(text: str) -> dict[tuple[str, str], int]:
-    """The line of each code, by group and code: a parameter takes one line."""
+    """Return the line numbers by group and code: each parameter is on one line."""
     found: dict[tuple[str, str], int] = {}
     group = ""
     for number, line in enumerate(text.splitlines(), start=1):
@@ -204,7 +204,7 @@ def _entry(code: str, line: int, fields: Any, fault: _Fault) -> _Entry:
 
 @dataclass(slots=True)
 class _Resolver:
-    """Makes raw values of lines, those that others' scales follow first."""
+    """Converts lines to raw values; sources of scales come first."""
 
     profile: Profile
     fault: _Fault

@@ -1,4 +1,4 @@
-"""True if a parameter may be written as a setting now, and if not why; pure functions."""
+"""Rules for writing a parameter as a setting, with the reasons against it. Pure functions."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ ORDER_QUANTITIES: frozenset[Quantity] = frozenset(
         "digital_outputs",
     }
 )
-"""Quantities that are orders: they have screens and commands of their own."""
+"""Quantities that are commands, which have their own screens and CLI commands."""
 AT_REST: frozenset[StateKind] = frozenset({"blocked", "ready", "stopped", "fault"})
-"""Kinds of state in which the motor surely is not commanded to turn."""
+"""Kinds of state in which the motor is certainly not commanded to turn."""
 CUTTING = frozenset({"address", "baud", "format", "parity", "protocol"})
-"""Roles of line settings that decide whether the drive hears this line at all."""
+"""Roles of line settings that decide whether the drive can communicate on this line."""
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Why a parameter is not written, as a sentence, and as a word for decisions."""
+    """Reason why a parameter is not written: a sentence, and a keyword for decisions."""
 
     reason: RefusalReason
     text: str
 
 
 def is_order(profile: Profile, parameter: Parameter) -> bool:
-    """Return True if a word is an order (command, reference, output) rather than a setting."""
+    """Return True if a word is a command, a reference or an output, and not a setting."""
     if (
         parameter.access == "w"
         or parameter.storage == "ram"
@@ -49,14 +49,14 @@ def is_order(profile: Profile, parameter: Parameter) -> bool:
         return True
     if parameter.holds == "command":
         return True
-    # who commands is chosen by a setting, though it stands among the commands
+    # the command channel is a setting, although profiles list it among the commands
     if group_holds(profile, parameter) == "commands" and parameter.quantity != "command_channel":
         return True
     return parameter.code in _order_codes(profile)
 
 
 def is_setting(profile: Profile, parameter: Parameter) -> bool:
-    """Return True if a parameter is a setting: kept by the drive, no measurement and no order."""
+    """Return True if a parameter is a setting: neither a measurement nor a command."""
     if parameter.access not in ("rw", "rw-stopped"):
         return False
     if group_holds(profile, parameter) == "measurements":
@@ -72,12 +72,12 @@ def needs_standstill(profile: Profile, parameter: Parameter) -> bool:
 
 
 def slot_of(profile: Profile, code: str) -> Block | None:
-    """The indirect block or scanner table in which a parameter chooses a place, or None."""
+    """Return the indirect block or scanner that has this parameter as a slot, or None."""
     return next((block for block in profile.data.blocks if code in block.slots), None)
 
 
 def line_setting(profile: Profile, code: str) -> LinkSetting | None:
-    """Return the setting of the drive's side of a line that a parameter makes, or None."""
+    """Return the line setting that a parameter represents, or None."""
     return next((s for s in profile.data.link.settings if s.parameter == code), None)
 
 
@@ -87,7 +87,7 @@ def write_refusal(
     state: StateKind | None,
     confirmed: Collection[str] = (),
 ) -> Refusal | None:
-    """Why a parameter must not be written as a setting now; None when it may.
+    """Return why a parameter must not be written as a setting now; None if it may be.
 
     `state` is the kind of the drive's state, None while it is not known; `confirmed` holds codes
     of unverified parameters that the user has confirmed.
@@ -126,14 +126,14 @@ _STORAGE = {
 
 
 def option_code(profile: Profile, parameter: Parameter) -> Parameter | None:
-    """The word that must hold its factory value before the parameter may be written, or None."""
+    """Return the word that must have its factory value before the parameter may be written."""
     group = group_by_id(profile).get(parameter.group)
     code = group.needs_factory if group is not None else ""
     return profile.get(code) if code != parameter.code else None
 
 
 def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
-    """Return remarks on a parameter before it is written, each in a few words."""
+    """Return short remarks to show before a parameter is written."""
     block = slot_of(profile, parameter.code)
     later = parameter.effective == "after-reset" or (
         block is not None and block.effective == "after-reset"
@@ -150,7 +150,7 @@ def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
 
 
 def cuts_line(profile: Profile, parameter: Parameter) -> bool:
-    """Return True if writing it at once ends the conversation at the present line settings."""
+    """Return True if a write takes effect immediately and cuts the present communication."""
     setting = line_setting(profile, parameter.code)
     return setting is not None and setting.role in CUTTING and parameter.effective == "at-once"
 
@@ -165,7 +165,7 @@ def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
 
 
 def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
-    """Why Drive Panel never writes a value; else empty."""
+    """Return why Drive Panel never writes this value; empty if it may."""
     watch = profile.data.communication_fault
     if watch is None or parameter.code != watch.reaction:
         return ""
@@ -193,10 +193,10 @@ def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
     return ""
 
 
-# a profile stays as it was loaded, and every row of a table asks
+# cached because every row of a table calls it, and a profile does not change
 @lru_cache(maxsize=32)
 def _order_codes(profile: Profile) -> frozenset[str]:
-    """Codes of command words, references, and of values that a block passes on."""
+    """Return the codes of command words, references, and values that a block writes."""
     codes = {reference.parameter for reference in profile.data.references}
     for chart in profile.data.charts:
         codes.add(chart.command)
@@ -204,6 +204,6 @@ def _order_codes(profile: Profile) -> frozenset[str]:
         codes.update(order.parameter for order in chart.orders)
     for block in profile.data.blocks:
         codes.update(block.values)
-    # who commands is chosen by a setting, though taking control writes it too
+    # the command channel is a setting, although the command to take control writes it too
     channel = profile.quantity("command_channel")
     return frozenset(codes - {"", channel.code if channel else ""})

@@ -11,14 +11,14 @@ from .limits import limit_pairs, multiple_limits, number_in
 from .writable import line_setting
 
 LAST_OF_THOSE = 9
-"""Highest rank of what changes other settings as it is written."""
+"""Highest rank of settings that change others when written."""
 
 
 def ordered(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> list[Edit]:
-    """The edits in the order in which they are written.
+    """Return the edits in the order of writing.
 
-    First what changes other settings, then scale sources, then the rest in the profile's order
-    with each limit moved out of the way before what it limits, and the line's own settings last.
+    Settings that change others come first, then scale sources, then the rest in profile order.
+    Limits are written before the values that they would block, and line settings come last.
     """
     places = {parameter.code: place for place, parameter in enumerate(profile.parameters)}
     sources = scale_sources(profile)
@@ -30,7 +30,7 @@ def ordered(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> list[Edi
     while waiting:
         left = {edit.code for edit in waiting}
         free = (edit for edit in waiting if not before.get(edit.code, set()) & left)
-        # a ring of limits can only come from values that contradict each other already
+        # a cycle of limits arises only if the present values contradict each other
         chosen = next(free, waiting[0])
         waiting.remove(chosen)
         done.append(chosen)
@@ -48,7 +48,7 @@ def _rank(profile: Profile, code: str, sources: Collection[str]) -> int:
 
 
 def _before(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, set[str]]:
-    """By code, which others must be written first."""
+    """Return, by code, the codes that must be written before it."""
     after = edits.after(raws)
     found: dict[str, set[str]] = {}
     for low, high in limit_pairs(profile):
@@ -69,7 +69,7 @@ def _before(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str
         else:
             found.setdefault(low, set()).add(high)
     for parameter, of in multiple_limits(profile):
-        # of two that share a sum the one that shrinks comes first
+        # if a sum limits two settings, the one that decreases comes first
         pair = (parameter.code, of.parameter)
         if of.times.startswith("-") and all(code in edits for code in pair):
             old, new = number_in(profile, pair[1], raws), number_in(profile, pair[1], after)
