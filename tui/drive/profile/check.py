@@ -1,4 +1,4 @@
-"""All faults of a profile: of its form, and of what its form cannot express."""
+"""Validation of a profile: its form, and the rules that a form cannot express."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .shared_rows import ProfileTables, read_tables
 from .toml_lines import TomlPath
 
 TOLD = 10
-"""Faults that are reported if a profile is requested; a check reports all."""
+"""Most faults to report when a profile is loaded; a check reports all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class ProfileFault:
 
 
 def checked_data(path: Path, packaged: Path) -> ProfileData:
-    """The data of a profile file; raises ProfileError with the first of its faults."""
+    """Load a profile file; raises ProfileError with its first faults."""
     data, faults = examined(path, packaged)
     if faults or data is None:
         lines = [str(fault) for fault in faults[:TOLD]]
@@ -58,7 +58,7 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
 
 
 def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
-    """Faults of form, and those of the rest as far as they can be known."""
+    """Return the faults of form, and the other faults that can still be found."""
     form, mended = form_faults(sources.tables)
     reported = [
         (path, f"{place_label(sources.tables, path)}: {text.rstrip('.')}.")
@@ -74,7 +74,7 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
 
 
 def _invented(path: TomlPath, invented: list[TomlPath]) -> bool:
-    """Return True if a place rests on a value that the file does not have."""
+    """Return True if a place depends on a value that the file does not have."""
     return any(path[: len(pair)] == pair or pair[: len(path)] == path for pair in invented)
 
 

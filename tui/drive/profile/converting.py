@@ -1,4 +1,4 @@
-"""Tables into forms, one thread at a time."""
+"""Conversion of tables to structs, in one thread at a time."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 import msgspec
 
 _ONE_AT_A_TIME = threading.RLock()
-"""msgspec works a form out when it meets it first; two threads that meet it at once crash the
-whole program (seen with 0.22: a segmentation fault while two profiles were loaded)."""
+"""msgspec prepares a type on its first use. Two threads that do so at once crash the program
+(version 0.22: a segmentation fault while two profiles were loaded)."""
 
 
 def converted(tables: object, form: Any) -> Any:
-    """The tables in a form; raises msgspec.ValidationError. For any thread."""
+    """Convert tables to a form; raises msgspec.ValidationError. Thread-safe."""
     with _ONE_AT_A_TIME:
         return msgspec.convert(tables, form)

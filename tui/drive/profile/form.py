@@ -1,4 +1,4 @@
-"""True if tables have the form of a profile: every fault of it, with what is allowed there."""
+"""Form check of a profile's tables: every fault, with the allowed values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .schema import ProfileData
 from .toml_lines import TomlPath
 
 TOLD_SINGLY = 12
-"""Allowed values that are listed one by one; of more the nearest are."""
+"""Most allowed values to list; of a longer list, only the nearest are named."""
 TEXT_FORMS = {
     r"^[0-9]+(\.[0-9]+)?$": 'a decimal number in quotes, such as "0.1"',
     r"^[a-z][a-z0-9_-]*$": "small letters, digits, - and _, a letter first",
@@ -29,7 +29,7 @@ class FormFaults:
 
     found: list[tuple[TomlPath, str]] = field(default_factory=list)
     invented: list[TomlPath] = field(default_factory=list)
-    """Places whose value had to be invented: nothing more can be said of them."""
+    """Places with a made-up value, which later checks must skip."""
 
 
 @lru_cache(maxsize=4)
@@ -41,14 +41,14 @@ def shape_of(form: type) -> shapes.Type:
 def form_faults(
     tables: dict[str, Any], form: type = ProfileData
 ) -> tuple[FormFaults, dict[str, Any]]:
-    """Every fault of form, and tables without them, so that the rest can be looked at too."""
+    """Return all faults of form, and tables without them, so that further checks can run."""
     faults = FormFaults()
     mended = _mended(shape_of(form), tables, (), faults)
     return faults, mended if isinstance(mended, dict) else {}
 
 
 def _mended(shape: shapes.Type, value: Any, path: TomlPath, faults: FormFaults) -> Any:
-    """The value where it has its form; else _ABSENT, with the fault noted."""
+    """Return the value if its form is correct; else note the fault and return _ABSENT."""
     if isinstance(shape, shapes.StructType) and isinstance(value, dict):
         return _struct(shape, value, path, faults)
     if isinstance(shape, shapes.ListType) and isinstance(value, list):
@@ -93,7 +93,7 @@ def _list(shape: shapes.ListType, value: list[Any], path: TomlPath, faults: Form
     for index, inner in enumerate(value):
         item = _mended(shape.item_type, inner, (*path, index), faults)
         if item is _ABSENT:
-            # the place is kept, so that those behind it keep their lines
+            # the place stays in the list, so that the following ones keep their lines
             faults.invented.append((*path, index))
             item = _invented(shape.item_type)
         kept.append(item)

@@ -10,23 +10,23 @@ from .schema import AlarmHelp, FaultHelp, HelpData, ProfileData
 
 
 class FaultGuide:
-    """Help of faults and alarms; its file is read once somebody asks, not with the profile."""
+    """Help of faults and alarms; its file is read on first use, not with the profile."""
 
     def __init__(self, profile: ProfileData, read: Callable[[], HelpData] | None = None) -> None:
         self._numbered = bool(profile.faults.codes)
         self._rows = HelpData(faults=list(profile.faults.help))
         self._read = read
         self.trouble = ""
-        """Why its file could not be read; empty where it could, or was not asked for yet."""
+        """Why its file could not be read; empty if it was read, or not needed yet."""
 
     @cached_property
     def data(self) -> HelpData:
-        """All that is known; raises ProfileError where the file is wrong."""
+        """All help; raises ProfileError if the file is wrong."""
         return self._read() if self._read is not None else self._rows
 
     @cached_property
     def _found(self) -> tuple[dict[int | None, FaultHelp], dict[tuple[str, int], AlarmHelp]]:
-        """Help by raw fault, and by word and bit; a file that is wrong hinders nobody at work."""
+        """Help by raw fault, and by word and bit; empty, without an error, if the file is wrong."""
         try:
             reported = self.data
         except ProfileError as error:

@@ -19,7 +19,7 @@ from ..errors import ProfileError
 from ..small_file import open_regular, read_small_text
 
 HEAD_BYTES = 4096
-"""Characters within which a head ends."""
+"""Most characters of a head."""
 _HEADER = re.compile(r"^\[+[ \t]*([\w-]+)[^\n]*", re.MULTILINE)
 _PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
 _CODE = re.compile(r"""^\[\[parameters\]\]\ncode = (["'])(.+)\1$""", re.MULTILINE)
@@ -33,7 +33,7 @@ class ProfileFileHead(NamedTuple):
     fault: str = ""
 
     def text(self, key: str) -> str:
-        """A text of the head; empty where there is none."""
+        """Return a text of the head; empty if there is none."""
         value = self.table.get(key, "")
         return value if isinstance(value, str) else ""
 
@@ -51,13 +51,13 @@ class AskedOf(NamedTuple):
     """Identification of a family's drives on a line."""
 
     prefixes: tuple[str, ...] = ()
-    """Beginnings of its reference."""
+    """Prefixes of the family's references."""
     functions: frozenset[int] = frozenset()
     version_digits: str = "as-told"
 
 
 def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
-    """The head of a file; a broken one says so in `fault`."""
+    """Return the head of a file; `fault` is set if the file is broken."""
     return _head(path, own, packaged, _stamp(path))
 
 
@@ -120,7 +120,7 @@ def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
 
 
 def shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
-    """The texts of a packaged file's shared rows; None where they are not there."""
+    """Return the texts of a packaged file's shared rows; None if they are missing."""
     names = head.get("rows_from")
     try:
         return [read_small_text(packaged / name) for name in names or ()]
@@ -168,7 +168,7 @@ def _whole(path: Path, packaged: Path) -> Mapping[str, Any]:
 
 
 def section(text: str, name: str) -> Any:
-    """A table of the top read alone; None where that cannot be done."""
+    """Parse one top-level table without the others; None if that is not possible."""
     import tomli
 
     from ..toml_text import toml_tables

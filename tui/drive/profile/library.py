@@ -1,4 +1,4 @@
-"""Finding and loading profiles: those that come with the panel and the user's own.
+"""Finding and loading profiles, both packaged ones and the user's own.
 
 A listing reads the first table of a packaged file and counts its parameters, no more: a large
 profile costs nothing until it is used. A file of the user's own is read as a whole.
@@ -33,13 +33,13 @@ class Listing(NamedTuple):
     own: bool
     """True for a profile of the user's own folder."""
     fault: str = ""
-    """Why the file cannot be used, where its head or its TOML is broken."""
+    """Why the file cannot be used, if its head or its TOML is broken."""
     hidden_by: Path | None = None
-    """The file that counts in its place, as it has the same id."""
+    """File with the same id that replaces this one; None if this one is used."""
 
 
 def packaged_folder() -> Path:
-    """The folder of the profiles that come with the panel, in a wheel or a checkout."""
+    """Return the folder of the packaged profiles, in a wheel or a checkout."""
     package = Path(__file__).resolve().parents[2]
     installed = package / "_profiles"
     return installed if installed.is_dir() else package.parent / "profiles"
@@ -78,7 +78,7 @@ def listings() -> list[Listing]:
 
 
 def all_files() -> list[Listing]:
-    """Every profile file by id, those that another with the same id hides too, behind it."""
+    """Return every profile file, sorted by id; a hidden file follows the one that hides it."""
     first: dict[str, Path] = {}
     found = []
     for path, own in profile_files():
@@ -132,7 +132,7 @@ def load_file(path: Path) -> Profile:
 
 
 def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
-    """All parameters of a profile as a file would list them; None where it shares none."""
+    """Return all parameters of a profile as rows of a file; None if it shares no rows."""
     from .shared_rows import parsed, read_tables, source_text
 
     if "rows_from" not in parsed(source_text(listing.path)).get("profile", {}):
@@ -142,7 +142,7 @@ def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
 
 
 def all_faults_of(path: Path) -> list[str]:
-    """Every fault of a profile file and of the help of its faults; it can do without the help."""
+    """Return all faults of a profile file and of its help file; a profile needs no help file."""
     from .check import examined
     from .help_file import read_help
 
@@ -160,7 +160,7 @@ def all_faults_of(path: Path) -> list[str]:
 
 
 def faults_of(path: Path) -> list[str]:
-    """Every fault of a profile file, each with file and line; none where it can be used."""
+    """Return all faults of a profile file, with file and line; empty if it can be used."""
     from .check import examined
 
     try:

@@ -22,7 +22,7 @@ IDENTIFIER = re.compile(r"[a-z][a-z0-9_-]*")
 def new_profile_text(
     source: str, old_id: str, new_id: str, rows: Iterable[Mapping[str, Any]] | None = None
 ) -> str:
-    """A profile's text under another id; no drive is recognized as it before somebody says so.
+    """Return a profile's text with another id, and without prefixes that recognize drives.
 
     `rows` are all its parameters where it shares some: a profile of one's own has them itself.
     Raises ProfileError for an id that cannot be one, and for a file without a plain head.

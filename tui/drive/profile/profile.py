@@ -37,11 +37,11 @@ def is_verified(parameter: Parameter) -> bool:
 
 
 LONGEST_UNPACKED = 1 << 24
-"""Bytes of a packed profile once it is unpacked."""
+"""Most bytes of an unpacked profile."""
 
 
 def unpacked_profile(packed: bytes) -> Profile:
-    """The profile that another process has packed. Raises ProfileError."""
+    """Unpack a profile that another process has packed. Raises ProfileError."""
     try:
         text = zlib.decompressobj().decompress(packed, LONGEST_UNPACKED)
         return Profile(msgspec.json.decode(text, type=ProfileData))
@@ -63,7 +63,7 @@ class Profile:
         self.read_help = read_help
         self.guide = FaultGuide(data, read_help)
         self.taught: Mapping[str, TaughtScale] = taught or {}
-        """By code, what a person has taught of this one drive; no file of a family says it."""
+        """Learned scales of one drive, by code; the family's file does not have them."""
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
@@ -116,7 +116,7 @@ class Profile:
         return self._by_address.get((function, address))
 
     def quantity(self, quantity: Quantity) -> Parameter | None:
-        """The parameter that carries a quantity on this family, or None."""
+        """Return the family's parameter for a quantity, or None."""
         return self._by_quantity.get(quantity)
 
     def function(self, code: int) -> Function | None:
@@ -124,12 +124,12 @@ class Profile:
         return self._functions.get(code)
 
     def fault(self, raw: int) -> FaultCode | None:
-        """The fault a raw fault code stands for, or None if the profile does not know it."""
+        """Return the fault of a raw fault code; None if the profile does not list it."""
         return self._faults.get(raw)
 
     @cached_property
     def packed(self) -> bytes:
-        """All that it says but its help, for another process; see `unpacked_profile`."""
+        """The profile without its help as bytes, for another process; see `unpacked_profile`."""
         return zlib.compress(msgspec.json.encode(self.data), 1)
 
     @cached_property
@@ -138,12 +138,12 @@ class Profile:
         return tuple(dict.fromkeys(p.group for p in self.parameters))
 
     def names(self, parameter: Parameter) -> Mapping[int, str]:
-        """Names of a parameter's raw values, its own before those of a shared enumeration."""
+        """Return the names of a parameter's raw values; its own override the enumeration's."""
         own = {int(raw): text for raw, text in parameter.values.items()}
         return {**self._enumerations.get(parameter.enumeration, {}), **own}
 
     def find(self, text: str) -> Parameter:
-        """The parameter a person means by a code, a manual's number or a wire address.
+        """Find a parameter by typed text: a code, a number of the manual or a wire address.
 
         Codes in any case come first (`acc`, `1.05`, `F875`), then numbers of the manual
         (`W9001`, `16#FD00`), then a wire address in decimal or hexadecimal. Raises
@@ -191,7 +191,7 @@ class Profile:
         return Decimal(text) if text is not None else None
 
     def unit(self, parameter: Parameter, raws: Mapping[str, int]) -> str:
-        """The unit of a parameter, given raw values by code; `raw` where it is not known."""
+        """Return the unit of a parameter, from raw values by code; `raw` if it is not known."""
         reported = parameter.unit_by
         if reported is None:
             return parameter.unit
@@ -208,10 +208,10 @@ def mark_of(profile: Profile, parameter: Parameter) -> str:
     return "" if is_verified(parameter) else "?"
 
 
-# a profile stays as it was loaded, and every row of a table asks
+# cached because every row of a table calls it, and a profile does not change
 @lru_cache(maxsize=32)
 def group_by_id(profile: Profile) -> Mapping[str, ParameterGroup]:
-    """By name, the groups of which the profile says what they hold."""
+    """Return, by name, the groups whose contents the profile describes."""
     return {group.name: group for group in profile.data.groups}
 
 
@@ -222,7 +222,7 @@ def group_holds(profile: Profile, parameter: Parameter) -> str:
 
 
 def parse_address(text: str) -> int | None:
-    """A wire address from `W9001`, `16#2329`, `0x2329` or `9001`; None if it is none of these."""
+    """Parse a wire address: `W9001`, `16#2329`, `0x2329` or `9001`; None for other text."""
     if match := _HEX.match(text):
         address = int(match[1], 16)
     elif match := _WORD.match(text):
@@ -240,7 +240,7 @@ def notations(parameter: Parameter) -> tuple[str, str, str]:
 
 
 def _unique(parameters: Iterable[Parameter]) -> dict[str, Parameter]:
-    """Parameters by folded code and number; a folded name that two share is left out."""
+    """Return parameters by case-folded code and number, without ambiguous names."""
     found: dict[str, Parameter] = {}
     shared: set[str] = set()
     for parameter in parameters:

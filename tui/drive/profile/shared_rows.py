@@ -51,7 +51,7 @@ class SourceText:
 
     @cached_property
     def lines(self) -> Mapping[TomlPath, int]:
-        """Line by path; worked out where somebody asks."""
+        """Line by path; computed on first use."""
         return toml_lines(self.text)
 
 
@@ -60,7 +60,7 @@ RowOrigin = tuple[SourceText, TomlPath]
 
 @dataclass(frozen=True)
 class ProfileTables:
-    """The tables of a profile as they count, with the file that each row came from."""
+    """Merged tables of a profile, with the origin of each row."""
 
     tables: dict[str, Any]
     origins: Mapping[TomlPath, list[RowOrigin]] = field(default_factory=dict)
@@ -106,7 +106,7 @@ def read_tables(path: Path, packaged: Path) -> ProfileTables:
 
 
 def source_text(path: Path) -> SourceText:
-    """The text of a file; raises ProfileError."""
+    """Read a file; raises ProfileError."""
     try:
         return SourceText(str(path), read_small_text(path))
     except OSError as error:
@@ -116,7 +116,7 @@ def source_text(path: Path) -> SourceText:
 
 
 def parsed(source: SourceText) -> dict[str, Any]:
-    """The tables of a text; raises ProfileError with the line if it is not valid TOML."""
+    """Parse a text; raises ProfileError with the line if it is not valid TOML."""
     try:
         return toml_tables(source.text)
     except tomli.TOMLDecodeError as error:
@@ -135,7 +135,7 @@ def _shared_file(own: SourceText, path: Path, packaged: Path, name: object) -> P
 
 
 def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables, with the family's order of words at each 32-bit value that has none."""
+    """Return the tables; 32-bit values without a word order get that of the family."""
     reading, rows = tables.get("reading"), tables.get("parameters")
     order = reading.get("low_word_first") if isinstance(reading, dict) else None
     if isinstance(order, bool) and isinstance(rows, list):
@@ -165,7 +165,7 @@ class _Merging:
         at: TomlPath,
         there: TomlPath,
     ) -> None:
-        """Put one file's table over what there is, at the same path."""
+        """Merge one file's table over the present ones, at the same path."""
         self.origins.setdefault(at, []).insert(0, (source, there))
         for key, value in tables.items():
             path = (*at, key)
@@ -204,7 +204,7 @@ class _Merging:
         self._reorder(rows, at, order)
 
     def drop(self, whole: dict[str, Any], codes: list[Any], own: SourceText) -> None:
-        """Leave out shared parameters."""
+        """Remove shared parameters by code."""
         rows = whole.get("parameters")
         held = [r.get("code") for r in rows] if isinstance(rows, list) else []
         for code in codes:
@@ -217,7 +217,7 @@ class _Merging:
         self._reorder(rows, ("parameters",), kept)
 
     def _reorder(self, rows: list[Any], at: TomlPath, order: list[int]) -> None:
-        """Keep these rows, in this order, and know on where each came from."""
+        """Keep only these rows, in this order, with their origins."""
         rows[:] = [rows[place] for place in order]
         moved = {old: new for new, old in enumerate(order)}
         length = len(at)
