@@ -74,7 +74,7 @@ def test_the_motor_of_a_frozen_script_is_stopped_and_not_restarted() -> None:
         output, error = program.process.communicate(timeout=PATIENCE)
         assert program.process.returncode == 1
         assert "MotorStopped: Device 1" in error
-        assert "a stop while this program stood still" in error
+        assert "a stop while this program was suspended" in error
         assert "left" not in output
         assert simulation.drive(1).raw("CMD") == before
 
@@ -88,12 +88,23 @@ def test_a_signal_stops_the_motor_before_the_script_ends(
     kind: str, number: signal.Signals, status: int
 ) -> None:
     with motor_of_a_script(SCRIPTS[kind]) as (simulation, _, program):
-        for _ in range(3):
+        for _ in range(2 if (kind, number) == ("async", signal.SIGINT) else 3):
             program.process.send_signal(number)
             time.sleep(0.05)
         program.process.communicate(timeout=PATIENCE)
         assert stopped_by_commands(simulation)
         assert program.process.returncode == status
+        wait_until(lambda: on_record() == [], "the record is removed")
+
+
+def test_a_third_ctrl_c_ends_an_async_script_and_its_motor_is_stopped() -> None:
+    """With that, asyncio no longer waits for its tasks."""
+    with motor_of_a_script(ASYNC) as (simulation, _, program):
+        for _ in range(5):
+            program.process.send_signal(signal.SIGINT)
+            time.sleep(0.1)
+        program.process.communicate(timeout=PATIENCE)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops on its ramp", 15.0)
         wait_until(lambda: on_record() == [], "the record is removed")
 
 
