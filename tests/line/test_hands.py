@@ -117,7 +117,7 @@ def test_a_paste_with_brackets_does_nothing_at_all(panel: PtyPanel) -> None:
 
 def test_keys_that_were_not_taken_are_reported(fresh_panel: PtyPanel) -> None:
     fresh_panel.type("bar")
-    fresh_panel.shows("3 keys came at once and were not")
+    fresh_panel.shows("3 keys came together and were")
 
 
 def test_a_key_alone_runs_the_motor_and_arrows_at_once_are_one_step(fresh_panel: PtyPanel) -> None:

@@ -144,7 +144,7 @@ def test_a_stop_behind_earlier_keys_is_the_last_word_on_a_running_motor(far: Far
     far.type_while_hung((1.0, key), (2.5, "Space"))
     wait_until(lambda: len(far.log.writes) > before, "the stop")
     wait_until(lambda: far.simulation.drive(1).motor.frequency == 0, "the motor stands")
-    far.terminal.wait_for("a arms")
+    far.terminal.wait_for("press a, then r")
     time.sleep(1.0)
     assert far.moved(before) == []
 
@@ -156,14 +156,14 @@ def test_a_line_that_is_open_when_the_link_hangs_runs_nothing_behind_a_stop(far:
     far.terminal.wait_for("RUN FORWARD at")
     far.type_while_hung((1.0, "3"), (1.3, "0"), (2.0, "Enter"), (4.0, "Space"))
     wait_until(lambda: bool(far.log.writes), "the stop")
-    far.terminal.wait_for("a arms")
+    far.terminal.wait_for("press a, then r")
     time.sleep(1.0)
     assert far.moved(0) == []
 
 
 def test_keys_far_apart_that_a_link_lets_through_at_once_are_a_message(far: Far) -> None:
     far.type_while_hung((0.0, "a"), (1.5, "r"), (3.0, "r"), (4.5, "v"))
-    far.terminal.wait_for("4 keys came at once and were not")
+    far.terminal.wait_for("4 keys came together and were")
     time.sleep(1.0)
     assert far.log.writes == []
     assert not far.armed

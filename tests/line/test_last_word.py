@@ -134,7 +134,7 @@ def leave_questions(panel: PtyPanel) -> None:
 def test_keys_two_seconds_apart_on_a_link_that_hangs_are_a_message(panel: PtyPanel) -> None:
     before = len(panel.log.writes)
     panel.type("arrv")  # typed 2 s apart, let through at once
-    panel.shows("4 keys came at once and were not")
+    panel.shows("4 keys came together and were")
     panel.settle()
     assert panel.log.writes[before:] == []
     assert not panel.armed

@@ -223,7 +223,7 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
 
     shows("Space stops it, T takes it over.", "Open it: Space stops it")
     terminal.press("6")
-    terminal.wait_for("So it works")
+    terminal.wait_for("Signal path of the selected configuration")
     shows("Space stops it; T on Monitor takes it over.")
     terminal.press("m")
     shows("1: Runs since", "Open it: Space stops it, T takes it over.")

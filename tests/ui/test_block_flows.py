@@ -86,7 +86,7 @@ async def test_pick_move_write_and_verify() -> None:
         await made.pilot.press("w")
         await until(made.pilot, lambda: "Write 1 slot?" in picture(made.app))
         await made.pilot.press("escape", "A", "minus")
-        await message(made, "2 slots proposed otherwise")
+        await message(made, "2 slots proposed")
         assert made.drive().raw("NMA2") == 8604
         await made.pilot.press("w")
         await message(made, "Not armed")
@@ -103,7 +103,7 @@ async def test_pick_move_write_and_verify() -> None:
         await made.pilot.press("V")
         await message(made, "3 slots bring the same as direct reads")
         await press(made.pilot, "(factory)")
-        await message(made, "2 slots proposed otherwise")
+        await message(made, "2 slots proposed")
         await made.pilot.press("u", "escape")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
 
@@ -288,10 +288,10 @@ async def test_p_names_the_keys_that_write_the_proposal_in_this_state(
         await until(made.pilot, lambda: "FORWARD" in shown(made.app, "strip"))
         await made.pilot.press("p")
         await message(
-            made, "Proposed: Monitor's cycle", "motor stopped only", "Press u to drop it."
+            made, "Proposed: Monitor's cycle", "motor stopped only", "Press u to discard it."
         )
         assert "w to write" not in shown(made.app, "said")
-        await until(made.pilot, lambda: "w once the motor is stopped" in shown(made.app, "detail"))
+        await until(made.pilot, lambda: "Stop the motor, then press w" in shown(made.app, "detail"))
         await made.pilot.press("space", "u")
         await until(made.pilot, lambda: made.speed() == 0)
         watched = block_editor(made).monitor
@@ -300,11 +300,13 @@ async def test_p_names_the_keys_that_write_the_proposal_in_this_state(
         await message(made, "Stopped")
         await made.pilot.press("p")
         await message(made, "Press a to arm, then w to write it.")
-        await until(made.pilot, lambda: "a arms, w writes" in shown(made.app, "detail"))
+        await until(made.pilot, lambda: "Press a to arm, then w" in shown(made.app, "detail"))
         await arm(made.pilot)
         await made.pilot.press("u", "p")
         await message(made, "Press w to write it.")
-        await until(made.pilot, lambda: ": w writes, u drops" in shown(made.app, "detail"))
+        await until(
+            made.pilot, lambda: "Press w to write, u to discard" in shown(made.app, "detail")
+        )
         # on another screen u and w are other keys
         await made.pilot.press("3")
         await until(made.pilot, lambda: "Proposed" in shown(made.app, "said"))

@@ -85,7 +85,7 @@ async def test_bundle_of_a_line_that_could_not_be_opened(tmp_path: Path) -> None
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: app.connection.refused is not None)
         await begin(app, pilot, tmp_path / "a.zip")
-        await until(pilot, lambda: "Could not get" in shown(app, "progress"))
+        await until(pilot, lambda: "Not collected" in shown(app, "progress"))
     files = unzipped(tmp_path / "a.zip")
     assert json.loads(files["drive-1/why.json"])["rung"] == "no-port"
     assert "screens/1-line.txt" in files
@@ -150,7 +150,7 @@ def test_picture(
     async def looked_at(pilot: Pilot[None]) -> None:
         await pilot.pause()
         app.push_screen(BundleScreen(Path("/var/lib/drivepanel-ttyUSB0-20261123-1730.zip"), made))
-        words = "Collecting 7" if state == "collecting" else "Could not get"
+        words = "Collecting 7" if state == "collecting" else "Not collected"
         await until(pilot, lambda: words in shown(app, "progress"))
         app.events = EventLog()  # its message has a time
         assert isinstance(app.screen, BundleScreen)

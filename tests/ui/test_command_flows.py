@@ -68,7 +68,7 @@ class Bench(NamedTuple):
 
     async def refer(self, text: str) -> None:
         await self.pilot.press("f")
-        await self.message("REFERENCE", "Enter gives it")
+        await self.message("REFERENCE", "Enter set")
         await self.pilot.press(*text, "enter")
         await until(self.pilot, lambda: "REFERENCE" not in shown(self.app, "message"))
         await self.message("Reference")
@@ -77,7 +77,7 @@ class Bench(NamedTuple):
         """Open the line of `r` or `v`: until Enter the motor does what it did."""
         before, speed = time.monotonic(), self.speed()
         await self.pilot.press(key)
-        await self.message("RUN FORWARD" if key == "r" else "RUN REVERSE", "Enter runs")
+        await self.message("RUN FORWARD" if key == "r" else "RUN REVERSE", "Enter run")
         await self.pilot.pause(0.3)
         assert writes(self.app, before) == []
         assert (self.speed() > 0) is (speed > 0)

@@ -180,7 +180,7 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
         await pilot.resize_terminal(80, 24)
         await pilot.pause(0.4)
         assert "FAULT" in str(app.screen.query_one("#state", Lines).lines[1])
-        assert "5 says what to do" in str(app.screen.query_one("#state", Lines).lines[5])
+        assert "press 5 for what to do" in str(app.screen.query_one("#state", Lines).lines[5])
 
 
 async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:

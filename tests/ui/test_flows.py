@@ -135,7 +135,7 @@ async def test_a_lost_line_is_shown_and_comes_back() -> None:
         assert app.opened.simulation is not None
         app.opened.simulation.unplug()
         await until(pilot, lambda: "LINE LOST" in shown(app, "said"))
-        await until(pilot, lambda: "NOT KNOWN NOW" in shown(app, "state"))
+        await until(pilot, lambda: "STATE UNKNOWN" in shown(app, "state"))
         app.opened.simulation.replug()
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
@@ -230,7 +230,7 @@ async def test_a_line_and_a_device_on_the_command_line_open_its_monitor() -> Non
     app = DrivePanelApp(start="sim:atv71@2", device=2)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
-        await until(pilot, lambda: "a arms, r runs" in shown(app, "state"))
+        await until(pilot, lambda: "press a, then r" in shown(app, "state"))
 
 
 def test_every_action_has_a_method_and_words() -> None:

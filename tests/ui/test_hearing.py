@@ -74,7 +74,7 @@ async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
             app.connection.lines.offer(f"{peer.path},19200,8E1")
             await pilot.press("H")
             await heard(app, pilot, peer)
-            assert "only listened to" in shown(app, "strip")
+            assert "listening" in shown(app, "strip")
             # who commands, and by what margin
             await pilot.press("tab", "tab")
             await until(pilot, lambda: "Device 6: Altivar 71" in shown(app, "frames"))
@@ -82,7 +82,7 @@ async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
             assert "commanded by the master: LFR 30.0 Hz once" in page
             assert "TTO 10 s" in page
             # there is no stop, and that is said
-            assert "no stop here" in shown(app, "keys")
+            assert "cannot stop here" in shown(app, "keys")
             await pilot.press("space")
             await until(pilot, lambda: "gets no stop" in output(app))
             await pilot.press("escape")
@@ -143,7 +143,7 @@ async def test_another_master_on_opening_is_offered_to_be_listened_to() -> None:
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             talk(peer)
             await until(pilot, lambda: "Another master polls" in output(app))
-            await until(pilot, lambda: "H listens to it" in shown(app, "message"))
+            await until(pilot, lambda: "Press H to listen" in shown(app, "message"))
             await pilot.press("H")
             await heard(app, pilot, peer)
             assert not app.panel_lines

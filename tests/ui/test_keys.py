@@ -247,7 +247,7 @@ async def stage(made: Bench) -> None:
     await made.pilot.press("minus", "4")
     await until(made.pilot, lambda: "ACC" in shown(made.app, "second"))
     await made.pilot.press("delete")
-    await until(made.pilot, lambda: "proposed otherwise" in shown(made.app, "detail"))
+    await until(made.pilot, lambda: "slots proposed" in shown(made.app, "detail"))
 
 
 SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}
@@ -298,7 +298,7 @@ async def back_to(made: Bench, screen: str) -> None:
         await made.pilot.press("2")
         await until(made.pilot, lambda: app.place == "monitor")
     await until(made.pilot, lambda: bool(shown(app, "state")))
-    if "Esc no" in " ".join(shown(app, "message").split()):
+    if "Esc cancel" in " ".join(shown(app, "message").split()):
         await made.pilot.press("escape")
     console = app.chosen
     assert console is not None

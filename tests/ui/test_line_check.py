@@ -262,7 +262,7 @@ async def test_a_named_line_is_offered_and_opens_its_drive(simulation: Simulatio
         assert (chosen.name, chosen.device) == ("fan", 5)
         rows = [str(option.prompt) for option in app.connection.lines.options]
         assert rows[0].strip() == "Named"
-        assert any("wrong: settings.toml" in row for row in rows)
+        assert any("error in settings.toml" in row for row in rows)
         assert any("settings.toml:6: lines.old.line" in event.text for event in app.events.events)
         await pilot.press("enter")
         await until(pilot, lambda: app.connection.drives.option_count == 1)

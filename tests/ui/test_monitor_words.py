@@ -41,9 +41,9 @@ TURNING_ROUND = {**fakes.RUNNING, "FRH": -500, "ETA": 0x0237}
         (SLOWING, None, "decelerating"),
         (TURNING_ROUND, None, "reversing"),
         (AT_ZERO, None, "enabled, at 0 Hz"),
-        (fakes.READY, None, "a arms, r runs"),
-        (fakes.READY, 50.0, "r runs it"),
-        (AT_TERMINALS, 50.0, "no command given"),
+        (fakes.READY, None, "press a, then r"),
+        (fakes.READY, 50.0, "press r to run"),
+        (AT_TERMINALS, 50.0, "not commanded"),
         (NO_SUPPLY, 50.0, "not ready"),
         (fakes.FAULT, None, " FAULT ObF "),
     ],
@@ -58,7 +58,7 @@ def test_a_fault_says_when_and_where_it_is_informed_what_to_do() -> None:
     view = replace(view_of(ATV71, fakes.FAULT), fault_at="seen since 16:28:05")
     text = "\n".join(line.plain for line in state_lines(view, 22))
     assert "seen since 16:28:05" in text
-    assert "5 says what to do" in text
+    assert "press 5 for what to do" in text
 
 
 def test_commander_and_reference_source_are_distinguished() -> None:

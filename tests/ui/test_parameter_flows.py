@@ -181,7 +181,9 @@ async def test_reports_on_edits_are_true_while_motor_runs() -> None:
         await message(made, "TFR is no longer staged; 1 is staged now.")
         await made.pilot.press("u")
         await message(made, "ACC is no longer staged; nothing is staged now.")
-        await until(made.pilot, lambda: "u stages the old value" in shown(made.app, "detail"))
+        await until(
+            made.pilot, lambda: "Press u to stage the old value" in shown(made.app, "detail")
+        )
 
 
 async def test_a_parameter_is_found_from_every_screen() -> None:
@@ -320,7 +322,7 @@ async def test_back_up_change_compare_stage_and_write(
         made.drive().set("HSP", 400)
         await find(made, "HSP")  # a search of before hides nothing of what differs
         await open_file(made, file)
-        await message(made, "pump.toml: 2 differ")
+        await message(made, "pump.toml: 2 differences")
         await until(made.pilot, lambda: "Differs 1 of 2" in shown(made.app, "status"))
         await made.pilot.press("i")
         await until(made.pilot, lambda: "2 staged" in shown(made.app, "status"))
@@ -477,7 +479,7 @@ async def test_files_tell_their_drive_and_what_differs(
         assert "1 differs" in reported["own.toml"]
         assert "Altivar 71" in reported["alien.toml"]
         assert "other family" in reported["alien.toml"]
-        assert "not a set" in reported["none.toml"]
+        assert "not a parameter set" in reported["none.toml"]
         assert writes(made.app) == []
 
 

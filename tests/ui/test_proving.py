@@ -17,7 +17,7 @@ async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         assert "It takes about 5 s" in str(made.app.screen.query("#follows").first().render())
         await made.pilot.press("escape")
-        await until(made.pilot, lambda: "not proved" in shown(made.app, "now"))
+        await until(made.pilot, lambda: "not tested" in shown(made.app, "now"))
         await made.pilot.press("P")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")

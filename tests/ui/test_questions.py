@@ -295,12 +295,12 @@ def test_motor_state_is_shown_in_one_line() -> None:
     assert now_text(fakes.snapshot_of(profile, fakes.READY)).index("Hz") == place
     # three cycles later it is not the present any more
     assert "▶" in now_text(running, passed=1.3)
-    assert now_text(running, passed=5.0) == "? not known now   5s ago: running forward"
+    assert now_text(running, passed=5.0) == "? state unknown   5s ago: running forward"
     lost = fakes.snapshot_of(profile, fakes.RUNNING, error="No answer.", age=2.0)
-    assert now_text(lost).startswith("? not known now   2s ago")
+    assert now_text(lost).startswith("? state unknown   2s ago")
     unplugged = fakes.snapshot_of(profile, fakes.RUNNING, line=fakes.LOST)
-    assert now_text(unplugged).startswith("? not known now")
-    assert now_text(None) == "? not known now"
+    assert now_text(unplugged).startswith("? state unknown")
+    assert now_text(None) == "? state unknown"
 
 
 def test_unwatched_line_shows_state_from_its_checks() -> None:
@@ -308,7 +308,7 @@ def test_unwatched_line_shows_state_from_its_checks() -> None:
     state = fakes.snapshot_of(profile, fakes.RUNNING).state
     look = Look(state, "", fakes.NOW, None)
     assert now_text(None, look).strip() == "▶ running forward"
-    assert now_text(None, look, 20.0).startswith("? not known now   20s ago: running")
+    assert now_text(None, look, 20.0).startswith("? state unknown   20s ago: running")
     old = fakes.snapshot_of(profile, fakes.READY, age=60)
     assert now_text(old, look).strip() == "▶ running forward"
 

@@ -108,7 +108,7 @@ async def ready() -> AsyncIterator[Bench]:
 
 
 def open_lines(made: Bench) -> Callable[[], bool]:
-    return lambda: "Esc no" in output(made.app)
+    return lambda: "Esc cancel" in output(made.app)
 
 
 async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,7 +195,7 @@ async def test_arrows_edit_the_line_and_step_a_reference_without_one() -> None:
         assert made.drive().raw("LFR") == 300
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 270)
-        await until(made.pilot, lambda: "Esc no" not in output(made.app))
+        await until(made.pilot, lambda: "Esc cancel" not in output(made.app))
         await made.pilot.press("down")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 260)
 
@@ -206,7 +206,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
         made.drive().set("LSP", 280)
         await made.pilot.press("pageup")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 330)
-        await until(made.pilot, lambda: "Esc no" not in output(made.app))
+        await until(made.pilot, lambda: "Esc cancel" not in output(made.app))
         await made.pilot.press("pagedown")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 280)
 
@@ -266,7 +266,7 @@ async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_th
         await made.message("No effect: The drive", "Esc, then 6 opens Control")
         before = writes(made.app)
         await made.pilot.press("enter")
-        await until(made.pilot, lambda: "Esc no" not in output(made.app))
+        await until(made.pilot, lambda: "Esc cancel" not in output(made.app))
         await made.message("The drive is not commanded by Modbus: active command channel")
         assert writes(made.app) == before
 

@@ -132,20 +132,20 @@ def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
     assert "30.0  Hz" in first.plain
     assert "0 .. HSP 50.0" in first.plain
     assert "ramp 3.0 s" in first.plain
-    assert "there in 1.8 s" in first.plain
-    assert second.plain.split()[:2] == ["Enter", "runs"]
-    assert "Space stops" in second.plain
+    assert "reached in 1.8 s" in first.plain
+    assert second.plain.split()[:2] == ["Enter", "run"]
+    assert "Space stop" in second.plain
     assert max(len(first.plain), len(second.plain)) <= width
 
 
 @pytest.mark.parametrize(
     ("purpose", "output", "seconds"),
     [
-        ("forward", "0", "there in 1.8 s"),
-        ("forward", "30.0", "there in 0.0 s"),
-        ("forward", "40.0", "there in 1.0 s"),
-        ("forward", "-10.0", "there in 2.8 s"),
-        ("reverse", "35.0", "there in 5.3 s"),
+        ("forward", "0", "reached in 1.8 s"),
+        ("forward", "30.0", "reached in 0.0 s"),
+        ("forward", "40.0", "reached in 1.0 s"),
+        ("forward", "-10.0", "reached in 2.8 s"),
+        ("reverse", "35.0", "reached in 5.3 s"),
         ("forward", None, ""),
     ],
 )
@@ -160,4 +160,4 @@ def test_how_long_it_takes_begins_at_what_the_motor_does(
     now = None if output is None else Decimal(output)
     _, first, _ = run_lines(line, profile, readings, 200.0, 80, output=now)
     assert seconds in first.plain
-    assert ("there in" in first.plain) is bool(seconds)
+    assert ("reached in" in first.plain) is bool(seconds)

@@ -67,7 +67,7 @@ async def test_a_drive_is_opened_while_the_search_for_others_goes_on() -> None:
         await until(pilot, lambda: app.connection.drives.option_count == 2)
         assert app.connection.search is search
         assert search.goes_on
-        assert f"Search {search.requested} of" in shown(app, "search")
+        assert f"Scan {search.requested} of" in shown(app, "search")
         await pilot.press("escape")
         await until(pilot, lambda: "stopped, 2 found" in shown(app, "search"))
         assert not search.goes_on

@@ -76,9 +76,9 @@ async def test_keys_that_were_not_taken_are_reported_without_markup() -> None:
         app.ignored_keys_text(2, late=True)
         await pilot.pause()
         assert [event.text for event in app.events.events] == [
-            "3 keys came at once and were not taken.",
-            "1 key did not come alone and was not taken.",
-            "2 keys came too late and were not taken.",
+            "3 keys came together and were ignored.",
+            "A key was ignored: it did not come alone.",
+            "2 keys came too late and were ignored.",
         ]
         assert not app._notifications, "a toast is for a motor that does not stop"
 

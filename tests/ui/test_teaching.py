@@ -145,7 +145,7 @@ async def test_a_taught_preset_is_proposed_confirmed_and_run_by() -> None:
         await made.answer("t", "y")
         await made.message("Control by Modbus")
         await pilot.press("r")
-        await made.message("RUN FORWARD", "rpm", "Enter runs")
+        await made.message("RUN FORWARD", "rpm", "Enter run")
         await pilot.press(*"1200")
         await pilot.pause(0.4)
         await pilot.press("enter")

@@ -53,6 +53,8 @@ WHOLE_KINDS = frozenset({"fault", "failed", "error", "refused", "alarm", "told",
 WHOLE_FOR = 15.0
 """Seconds for which such a message takes more lines than its own."""
 WHOLE_LINES = 6
+NOT_STOPPED_HEAD = "NOT STOPPED"
+"""Head of a message about a motor that a stop did not stop: it stays whole until the next one."""
 NOT_STOPPED_LINES = 6
 """Rows of the motors that a stop does not stop; more are named in one sentence."""
 NOT_STOPPED_MANY = "NOT STOPPED: {} drives. Stop them at the machine. Press m for the reasons."
@@ -84,6 +86,8 @@ class Framed(Screen[Any]):
         self._frame_parts = {place: Lines(id=place) for place in parts}
         for place, part in self._frame_parts.items():
             part.show(parts[place])
+            if place == "said":
+                part.styles.height = len(parts[place])  # the first picture cuts nothing off
             yield part
 
     def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
@@ -201,7 +205,7 @@ def message_lines(message: Said | None, width: int, *, lead: bool = True) -> lis
     room = width - 12
     if (
         message.kind in WHOLE_KINDS
-        and message.age < WHOLE_FOR
+        and (message.age < WHOLE_FOR or NOT_STOPPED_HEAD in message.text)
         and len(plain(message.text)) > room - 12
     ):
         parts = wrapped(message.text, max(10, room), WHOLE_LINES)
@@ -213,7 +217,7 @@ def message_lines(message: Said | None, width: int, *, lead: bool = True) -> lis
         return lines
     hint = "m messages" if width >= 60 and lead else ""
     if lead and message.there and message.kind == "fault" and width >= 72:
-        hint = "[ ] there"
+        hint = "[ ] go there"
     return [message_line(message.when, message.text, style, hint, width)]
 
 

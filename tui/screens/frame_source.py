@@ -71,13 +71,13 @@ class FrameSource:
     def _line(self, fleet: Fleet | None) -> str:
         if not self._app.line_label:
             hearing = self._app.hearing
-            return f"{hearing} · only listened to" if hearing else ""
+            return f"{hearing} · listening" if hearing else ""
         count = len(fleet.found) if fleet else 0
         parts = [self._app.line_label]
         if count:
             parts.append(f"{count} drive{'' if count == 1 else 's'}")
         if fleet is not None and fleet.search is not None and fleet.search.goes_on:
-            parts.append(f"search {fleet.search.text}")
+            parts.append(f"scan {fleet.search.text}")
         if len(self._app.panel_lines) > 1:
             parts.append(f"1 of {len(self._app.panel_lines)} lines")
         if fleet is not None and (others := fleet.line.facts.others):
@@ -143,7 +143,7 @@ class FrameSource:
             return f"CONNECTING for {since}. {state.reason}".rstrip()
         again = ""
         if state.next_try is not None:
-            again = f" Tried again in {max(0.0, state.next_try - now):.0f} s."
+            again = f" Retrying in {max(0.0, state.next_try - now):.0f} s."
         return f"LINE LOST for {since}: {state.reason}{again}"
 
     def _not_heard(self, other: Fleet | None = None) -> str:
@@ -156,8 +156,8 @@ class FrameSource:
         does = f": {reaction.name.lower()}" if reaction else ""
         when = f"in {first.left:.1f} s" if first.left > 0 else "by now"
         return (
-            f"Drive {first.device} NOT HEARD for {first.silent:.1f} s: it acts on its communication"
-            f" timeout {when}{does}."
+            f"Drive {first.device}: NO ANSWER for {first.silent:.1f} s. It reacts to its"
+            f" communication timeout {when}{does}."
         )
 
 

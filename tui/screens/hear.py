@@ -76,7 +76,7 @@ async def _ask_to_hear(app: Panel, text: str, profile: str) -> None:
             return
         app.show_line(here)
         about = f"{here.opened.label} is closed for the panel. {CLOSES}" if here.fleet.found else ""
-        if not await app.may_let_go("Listen to the line?", yes="listen", no="stay", always=about):
+        if not await app.may_let_go("Listen to the line?", yes="Listen", no="Cancel", always=about):
             return
         if why := why_not_hear(here.fleet):  # it may have changed while that was asked
             app.notify(why, severity="warning")

@@ -39,6 +39,10 @@ UNREACHED = (
     " its profile on Line, then s."
 )
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
+TOGETHER_KEYS = "{count} keys came together and were ignored."
+TOO_LATE_KEYS = "{count} keys came too late and were ignored."
+NOT_ALONE_KEY = "A key was ignored: it did not come alone."
+TOO_LATE_KEY = "A key was ignored: it came too late."
 IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
 TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it again."
 
@@ -125,9 +129,11 @@ class KeyDispatcher(Panel):
 
     def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
         """Report that keys came at once, or too late, and did nothing."""
-        came = "came too late" if late else "came at once" if count > 1 else "did not come alone"
-        keys = f"{count} keys {came} and were" if count > 1 else f"1 key {came} and was"
-        self.notify(f"{keys} not taken.", severity="warning")
+        if count > 1:
+            text = TOO_LATE_KEYS if late else TOGETHER_KEYS
+        else:
+            text = TOO_LATE_KEY if late else NOT_ALONE_KEY
+        self.notify(text.format(count=count), severity="warning")
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""
@@ -250,7 +256,7 @@ class KeyDispatcher(Panel):
 
     def _tell_canceled(self) -> None:
         if self.opening.connected:
-            self.say_first("The search was canceled.", "The line stays open: press s to search.")
+            self.say_first("The scan was canceled.", "The line stays open: press s to scan.")
         else:
             canceled = f"Opening {self.opening.text} was canceled."
             self.say_first(canceled, "Choose a line and press Enter.")

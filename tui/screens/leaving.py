@@ -45,7 +45,7 @@ class Leaving(Panel):
             return
         if self._requested in self.screen_stack:
             return
-        self._requested = self._question(self.fleets, "Leave the panel?", yes="leave", no="stay")
+        self._requested = self._question(self.fleets, "Leave the panel?", yes="Leave", no="Stay")
         if self._requested is None:
             self.exit()
         else:

@@ -102,8 +102,8 @@ class LineCheck(Panel):
         requested = Confirm(
             QUESTION,
             "\n".join((*changed, FOLLOWS)),
-            yes="accept it as it is",
-            no="keep it read-only",
+            yes="Accept",
+            no="Keep read-only",
             loses=True,
             by_itself=by_itself,
         )

@@ -75,7 +75,7 @@ def _state(headline: str, kind: str) -> Text:
 
 
 def _not_known(was: str, age: float | None) -> Text:
-    text = Text("? not known now", ALARM, no_wrap=True)
+    text = Text("? state unknown", ALARM, no_wrap=True)
     if was and age is not None:
         text.append(f"   {age_text(age)} ago: {was}", STALE)
     return text

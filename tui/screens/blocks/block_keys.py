@@ -45,7 +45,7 @@ class BlockKeys(ArmingKeys):
 
         try:
             about = (
-                f"CODE=VALUE for one or more output slots in use, as now {block_editor.example()}"
+                f"CODE=VALUE for one or more output slots. Present values: {block_editor.example()}"
             )
         except DriveError as refused:
             self._refuse(str(refused))
@@ -69,9 +69,9 @@ class BlockKeys(ArmingKeys):
 
             question = "Write through the outputs?"
             work = partial(block_editor.exchange, agreed)
-            self._ask(question, agreed.follows, "write, read back", "write nothing", work)
+            self._ask(question, agreed.follows, "Write", "Cancel", work)
 
-        requested = Ask("Write through the outputs", wrong, about=about, takes="continue")
+        requested = Ask("Write through the outputs", wrong, about=about, takes="Continue")
         self.app.push_screen(requested, given)
 
     # Files and user words
@@ -92,7 +92,7 @@ class BlockKeys(ArmingKeys):
         proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
         about = "The assignment shown, proposals included; one slot a line (TOML)."
         text = str(Path.cwd() / proposed)
-        requested = Ask("Save to", fault_of_new, text=text, about=about, takes="write the file")
+        requested = Ask("Save to", fault_of_new, text=text, about=about, takes="Save")
         self.app.push_screen(requested, given)
 
     def _save(self, path: Path) -> None:
@@ -161,7 +161,7 @@ class BlockKeys(ArmingKeys):
 
         about = (
             "Four, with commas between: a code or address and hex, signed or unsigned."
-            " -----: not assigned, not known to the drive, or protected."
+            " ----- means: not assigned, unknown to the drive, or protected."
         )
         text = ", ".join(spelled(word) for word in self.block_editor.words)
         self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)

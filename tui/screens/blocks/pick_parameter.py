@@ -23,7 +23,7 @@ from ..dialogs.question import Question, hint
 LISTED_MOST = 100
 """Parameters that are listed at once; a search brings the others."""
 NAME_WIDTH = 30
-PICK_HINT = hint(("Up, Down", "choose"), ("Enter", "proposes it"), ("Esc", "proposes nothing"))
+PICK_HINT = hint(("Up, Down", "choose"), ("Enter", "propose"), ("Esc", "cancel"))
 
 
 class PickParameter(Question[str | None]):
@@ -67,8 +67,8 @@ class PickParameter(Question[str | None]):
         unused = [] if search else [Text(" none      the slot is unused", FAINT)]
         options.add_options([entry(line) for line in (*unused, *lines)])
         options.highlighted = 0 if options.option_count else None
-        more = f", the first {LISTED_MOST} shown" if len(every) > LISTED_MOST else ""
-        text = f"{len(every)} fit{more}" if every else "Nothing fits; clear some letters."
+        more = f", first {LISTED_MOST} shown" if len(every) > LISTED_MOST else ""
+        text = f"{len(every)} matches{more}" if every else "No match. Delete some letters."
         self.query_one("#count", Plain).update(text)
 
     def _line(self, parameter: Parameter) -> Text:

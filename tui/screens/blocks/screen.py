@@ -112,15 +112,15 @@ class BlocksScreen(BlockKeys):
         slots = "slot" if count == 1 else "slots"
         if not count:
             return self.block_editor.trouble
-        return f"{count} {slots} proposed otherwise: {self._keys_now()}, u drops"
+        return f"{count} {slots} proposed. {self._keys_now()}, u to discard"
 
     def _keys_now(self) -> str:
         """Name the keys that write the proposal in the present state, in a few words."""
         if self.session.arming.hindrance:
-            return "not to be written now"
+            return "cannot be written now"
         if self._why_not_now():
-            return "w once the motor is stopped"
-        return "w writes" if self._armed() else "a arms, w writes"
+            return "Stop the motor, then press w"
+        return "Press w to write" if self._armed() else "Press a to arm, then w"
 
     def _why_not_now(self) -> str:
         """Why what is proposed cannot be written in the present state; empty if it can."""
@@ -130,7 +130,7 @@ class BlocksScreen(BlockKeys):
 
     def _show_neighbors(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
-        head = rule("Neighbors of the monitoring set, one request each", width)
+        head = rule("Adjacent words of the monitoring set, one request each", width)
         room = max(3, self.size.height - len(why) - 8)
         stretches = monitoring_stretches(self.session)
         found = stretch_lines(self.block_editor, stretches, width, room)
@@ -196,11 +196,11 @@ class BlocksScreen(BlockKeys):
         if found and found[0] is not None:
             before, after = found[0].before.microseconds, found[0].after.microseconds
             self.app.tell(
-                f"Proposed: Monitor's cycle takes {after / 1000:.1f} ms in place of"
+                f"Proposed: Monitor's cycle takes {after / 1000:.1f} ms instead of"
                 f" {before / 1000:.1f} ms."
             )
             how = self._why_not_now() or self.how_to_write("it")
-            self.hint_keys(f"{how} Press u to drop it.")
+            self.hint_keys(f"{how} Press u to discard it.")
         elif found:
             self.app.tell("Nothing to propose: no other slots make Monitor's cycle shorter.")
 
@@ -254,7 +254,7 @@ class BlocksScreen(BlockKeys):
                 for c in found
             ]
             if found and block.effective == "after-reset":
-                reported.append("It counts after the drive's next reset or switch-on.")
+                reported.append("It takes effect after the drive's next reset or power-up.")
             if found and any(profile[s].storage == "ram-until-saved" for s in block.slots):
                 reported.append("Lost at power-off until saved (S).")
             if found and block.direction == "write":
@@ -262,6 +262,6 @@ class BlocksScreen(BlockKeys):
                     "What a master writes to these outputs goes elsewhere from then on."
                 )
         reported.append(
-            "Another master on this line may rely on today's assignment: its program must follow."
+            "Another master on this line may use the present assignment. Change its program, too."
         )
         return "\n".join([*lines[:8], *([" …"] if len(lines) > 8 else []), "", *reported])

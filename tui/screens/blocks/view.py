@@ -191,9 +191,9 @@ def _force_text(slot: Slot) -> str:
     if slot.force is Force.ACTIVE:
         return "Active: only this parameter can have brought that value; it cannot be read."
     if slot.force is Force.PENDING:
-        brings = f"; until then it brings {slot.brings}" if slot.brings else ""
-        return f"Pending: it counts after the drive's next reset or switch-on{brings}."
-    return "Configured. Whether it is in force cannot be read, nor seen from the present values."
+        brings = f" Until then it returns {slot.brings}." if slot.brings else ""
+        return f"Pending: takes effect after the drive's next reset or power-up.{brings}"
+    return "Configured. It cannot be read if this mapping is active."
 
 
 def cost_lines(
@@ -208,7 +208,7 @@ def cost_lines(
     lines = [rule("On the wire", width)]
     text = Text(" ", no_wrap=True)
     if saving is None:
-        text.append("not known until the slots were read", FAINT)
+        text.append("not known: slots not read yet", FAINT)
     else:
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
         text.append(f" in {saving.before.requests}", FAINT)
@@ -227,7 +227,7 @@ def cost_lines(
     sent = block_request(
         profile, block_editor.session.device, inputs, outputs, _output_words(block_editor)
     )
-    hexes = wrapped(hex_text(sent) or "none: no slot is in use", width - 8, 2)
+    hexes = wrapped(hex_text(sent) or "none: no slot is used", width - 8, 2)
     frames = [
         Text(f" {'frame' if not line else '':<6}{hexes[line] if line < len(hexes) else ''}", PLAIN)
         for line in range(2)
@@ -294,7 +294,7 @@ def stretch_lines(
         lines.append(head)
         lines += [Text(f"    {t}", PLAIN) for t in wrapped(", ".join(stretch.brings), width - 5, 2)]
         if stretch.beside:
-            text = f"beside them: {', '.join(stretch.beside)}"
+            text = f"also read: {', '.join(stretch.beside)}"
             lines += [Text(f"    {t}", FAINT) for t in wrapped(text, width - 5, 1)]
     if not found:
         lines = [Text(" No two values of the monitoring set lie close enough together.", FAINT)]

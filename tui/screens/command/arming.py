@@ -139,8 +139,8 @@ class ArmingKeys(PanelScreen):
             f"Request drive {device}?",
             f"It is commanded by {other.text}. The question is answered there; without an answer"
             " it is a no while the motor runs.",
-            "ask",
-            "cancel",
+            "Request",
+            "Cancel",
             ask,
         )
 
@@ -159,8 +159,8 @@ class ArmingKeys(PanelScreen):
             f"Give drive {device} away?",
             f"{request.program.text} requests it. Its motor continues unchanged; from then on"
             " that program commands it.",
-            "give it",
-            "keep it",
+            "Give",
+            "Cancel",
             give,
             refused=lambda: fleet.handover.answer(request, yes=False),
         )

@@ -23,7 +23,7 @@ SHOWN_REFUSED = 20.0
 STOPS_THAT_ASK = {
     "freewheel": (
         "Coast to a stop?",
-        "The output is switched off: nothing brakes the motor, and a hoist falls.",
+        "The output is switched off: nothing brakes the motor; a hoist load falls.",
         "coast",
     ),
     "dc-braking": (
@@ -88,7 +88,7 @@ class OrderKeys(TeachKeys):
             self.commander.run(order, reference, stamp)
 
         question, why = f"Run {order} unrecorded?", str(outcome.error)
-        self._ask(question, why, "run it", "cancel", run, by_itself=True)
+        self._ask(question, why, "Run", "Cancel", run, by_itself=True)
 
     def _refuse(self, text: str) -> None:
         self.commander.refuse(text)
@@ -107,7 +107,7 @@ class OrderKeys(TeachKeys):
             return
         follows = f"The cause must be gone. {reset_follows(profile, raws, {})}"
         work = partial(self.commander.order, "reset")
-        question = self._ask("Reset the fault?", follows, "reset it", "leave it", work)
+        question = self._ask("Reset the fault?", follows, "Reset", "Cancel", work)
 
         async def look_at_inputs() -> None:
             try:
@@ -124,11 +124,11 @@ class OrderKeys(TeachKeys):
         """Take the control from the terminals, after saying what that means."""
         if self._require_armed():
             follows = (
-                "The terminals and the keypad command the drive no longer, their stop included;"
-                " the drive must be locked."
+                "The stop of the terminals and the keypad will have no effect."
+                " The drive must be locked."
             )
             work = partial(self.commander.order, "take-control")
-            self._ask("Take the control?", follows, "take it", "leave it", work)
+            self._ask("Take control?", follows, "Take control", "Cancel", work)
 
     def action_step_reference(self, steps: int) -> None:
         """Raise or lower the reference by so many Hz; arrows that came at once are one step."""
@@ -144,7 +144,7 @@ class OrderKeys(TeachKeys):
                 " the keypad: a run command active there starts it."
             )
             work = partial(self.commander.order, "hand-back")
-            self._ask("Give the control back?", follows, "give it back", "keep it", work)
+            self._ask("Return control?", follows, "Return control", "Cancel", work)
 
     def action_stop_as(self, id: OrderId) -> None:
         """Stop the drive in another way than on its ramp; needs no arming."""

@@ -20,7 +20,7 @@ from ..dialogs.question import KeyQuestion, hint
 if TYPE_CHECKING:
     from ..dialogs.now import MotorStates
 
-OPTION_HINT = hint(("Up, Down", "choose"), ("y", "write it"), ("Esc or q", "write nothing"))
+OPTION_HINT = hint(("Up, Down", "choose"), ("y", "write"), ("Esc or q", "cancel"))
 
 
 class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
@@ -44,7 +44,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
     def dialog(self) -> ComposeResult:
         """The list and its keys."""
         with Vertical(id="dialog"):
-            yield Plain("Options of the commands", id="question")
+            yield Plain("Command options", id="question")
             yield from self.now_lines()
             yield OptionList(
                 *(entry(line, id=str(at)) for at, (_, _, line) in enumerate(self._choices)),

@@ -55,7 +55,7 @@ class TeachKeys(ArmingKeys):
             f"What does the drive's display show for {code}, {name}?",
             fault_of_look,
             about=f"{_known(self.console, code)} {HOW}",
-            takes="read the word and learn",
+            takes="Read and learn",
             number=True,
             now=self.motor_state_text(),
         )
@@ -89,7 +89,7 @@ class TeachKeys(ArmingKeys):
 
         follows = reference_asks(self.session.family, code)
         question = f"Give the reference by {code}?"
-        self._ask(question, follows, "use it", "cancel", confirm, by_itself=by_itself)
+        self._ask(question, follows, "Use", "Cancel", confirm, by_itself=by_itself)
 
     def ask_no_reference(self, code: str) -> None:
         """Ask whether a taught parameter shall take the reference no longer."""
@@ -102,7 +102,7 @@ class TeachKeys(ArmingKeys):
             self.run_worker(self._settle(drop))
 
         follows = "Commands to run no longer choose it. The drive keeps what it holds."
-        self._ask(f"No reference by {code} any more?", follows, "end it", "keep it", confirmed)
+        self._ask(f"No reference by {code} any more?", follows, "End", "Cancel", confirmed)
 
     async def _settle(self, change: Callable[[], str]) -> None:
         """Make a change that waits for the disk, and report its result."""

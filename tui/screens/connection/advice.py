@@ -15,7 +15,7 @@ ADVICE = 4
 """Lines at most for what happened, and for what to do next, while no drive is found."""
 FAMILIES = 7
 """Lines at most for the families that watch the line."""
-READ_ONLY = "Read-only: nothing is written to a drive, no stop either."
+READ_ONLY = "Read-only: nothing is written to a drive, not even a stop."
 ADVICE_INDENT = 3
 
 

@@ -86,7 +86,7 @@ def groups(
     return [
         *_named(settings),
         Group("Serial ports", serial, "none found"),
-        Group("Recent", lately, "none yet: n types one"),
+        Group("Recent", lately, "none yet (n: type one)"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in simulated_lines()[:2])),
     ]
 
@@ -95,7 +95,7 @@ def _named(settings: LineSettings | None) -> list[Group]:
     """The lines with a name, and that the file that names them has faults; nothing without one."""
     if settings is None or not (settings.lines or settings.faults):
         return []
-    fault = f"wrong: {settings.path.name}" if settings.faults else ""
+    fault = f"error in {settings.path.name}" if settings.faults else ""
     lines = tuple(
         LineChoice(line.line, _without_settings(line.line), name=line.name, device=line.device)
         for line in settings.lines.values()

@@ -45,7 +45,7 @@ class LineKeys(Scanning):
 
         about = "\n".join(line_forms())
         dialog = Ask(
-            "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="open it"
+            "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="Open"
         )
         self.app.push_screen(dialog, typed)
 
@@ -81,7 +81,7 @@ class LineKeys(Scanning):
         asks = here is not None or self.scanning
         always = f"{self._what_is_here()} It is closed, and {text} is opened." if asks else ""
         question = "Close the line for another?"
-        if await self.app.may_let_go(question, yes="close it", no="keep it", always=always):
+        if await self.app.may_let_go(question, yes="Close", no="Cancel", always=always):
             # drives may have answered while that was asked
             self._open_next(text, device, beside=here is None and bool(self.found))
 
@@ -141,7 +141,7 @@ class LineKeys(Scanning):
 
     def _what_is_here(self) -> str:
         count = len(self.found)
-        search = "a search going on" if self.scanning else "no drive found"
+        search = "a scan in progress" if self.scanning else "no drive found"
         drives = f"{count} drive{'s' if count > 1 else ''} found" if count else search
         return f"{self.app.line_label} is open, with {drives}."
 
@@ -220,7 +220,7 @@ class LineKeys(Scanning):
     @work(exclusive=True, group="line", exit_on_error=False)
     async def action_disconnect(self) -> None:
         """Close the line; where that trips a running drive, only after saying so."""
-        if not await self.app.may_let_go("Close the line?", yes="close it", no="keep it"):
+        if not await self.app.may_let_go("Close the line?", yes="Close", no="Cancel"):
             return
         self.forget_drives()
         await self.app.disconnect()

@@ -43,7 +43,7 @@ class OtherSettings(LineKeys):
         self.end_search()
         always = self._what_is_here() if self.found else self._who_is_unclear()
         question = "Try other baud rates and formats?"
-        if not await self.app.may_let_go(question, yes="try them", no="stay", always=always):
+        if not await self.app.may_let_go(question, yes="Scan", no="Cancel", always=always):
             return
         await self.name_families()
         if not await self.hears_another_master(link):
@@ -70,7 +70,9 @@ class OtherSettings(LineKeys):
         if opened is None:
             self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
         elif not isinstance(link, SerialLink) or opened.simulation is not None:
-            self.say("This line has no baud or format of its own.", "s searches it.", ALARM_KIND)
+            self.say(
+                "This line has no baud or format of its own.", "Press s to scan it.", ALARM_KIND
+            )
         elif others := opened.line.facts.others:
             who = ", ".join(other.text for other in others)
             next_step = "Other settings need the line for the panel alone."
@@ -132,7 +134,7 @@ class OtherSettings(LineKeys):
                     self.app.opening.end()
                 await self.scan(devices, once=True).wait()
             except WorkerError:
-                self.say(f"The search is ended at {far}.", "")
+                self.say(f"The scan ended at {far}.", "")
                 return
             except PortRefused as error:
                 self.app.events.add("told", f"{setting} is not tried: {error}")

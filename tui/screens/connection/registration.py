@@ -15,7 +15,7 @@ REGISTERED = (
         mark_cells=2,
         actions=key_rows(
             ("open_chosen", "enter", "open", "Open the line or drive under the cursor."),
-            ("scan", "s", "search", "Scan the addresses for drives; drives already found stay."),
+            ("scan", "s", "scan", "Scan the addresses for drives; drives already found stay."),
             ("addresses", "c", "range", "Change the addresses to scan: 1-31, or 1,3,5-7."),
             (
                 "type_line",

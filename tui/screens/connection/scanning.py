@@ -42,7 +42,7 @@ class Scanning(LineView):
         try:
             wanted = self.form.addresses()
         except LineError as error:
-            self.say(str(error), "c changes the addresses, Enter searches them.", ALARM_KIND)
+            self.say(str(error), "Press c to change the addresses, then Enter to scan.", ALARM_KIND)
             return False
         self._led = False
         self.scan(wanted, self.form.addresses_text)
@@ -81,7 +81,7 @@ class Scanning(LineView):
             await search.run(fleet.line, self._take)
         except OtherMaster as error:
             self.say(
-                str(error), "The search has ended. H listens to it; s looks again.", ALARM_KIND
+                str(error), "The scan has ended. Press H to listen, s to scan again.", ALARM_KIND
             )
             return
         except LineError as error:
@@ -133,7 +133,7 @@ class Scanning(LineView):
         self.advise("Listening for another master.", "Then the line is scanned.")
         text = (await other_masters.listen_first(opened.line, other_masters.LISTEN)).text
         if text:
-            self.say(text, "Nothing was sent. H listens to it; s looks again.", ALARM_KIND)
+            self.say(text, "Nothing was sent. Press H to listen, s to scan again.", ALARM_KIND)
         return bool(text)
 
     def tell_search(self) -> None:
@@ -150,23 +150,20 @@ class Scanning(LineView):
             return  # that something came, and why it is no drive, was told
         if not self.found:
             self.say(
-                f"No drive answered at address {addresses_text(devices)}, asked twice.",
+                f"No drive answered at address {addresses_text(devices)} (2 attempts).",
                 "Press N to diagnose, c to change the addresses, s to scan again; Ctrl+P for other"
-                " baud"
-                " rates.",
+                " baud rates.",
                 ALARM_KIND,
             )
             return
         there = len(self.search.answered) if self.search else len(self.found)
-        self.say(f"Search done: {there} of {len(devices)} addresses answered.", "")
+        self.say(f"Scan done: {there} of {len(devices)} addresses answered.", "")
 
     async def _take(self, result: ScanResult) -> None:
         """Keep a drive that answered, with its profile and state."""
         if result.error:
             self.unclear |= {result.device}
-            self.say(
-                f"{result.error} The address is taken.", "Press s to search again.", ALARM_KIND
-            )
+            self.say(f"{result.error} The address is taken.", "Press s to scan again.", ALARM_KIND)
         if result.identity is None:
             return
         if not result.error:
@@ -244,7 +241,7 @@ class Scanning(LineView):
 
             known = ", ".join(listing.id for listing in library.listings())
             self.say(
-                f"Device {device} does not say which drive it is.",
+                f"Device {device} does not identify itself.",
                 f"Type its profile beside Profile: {known}.",
                 ALARM_KIND,
             )
@@ -264,7 +261,7 @@ class Scanning(LineView):
             self.look()
 
     def end_search(self) -> None:
-        """Nobody is asked any more."""
+        """End the scan: no more addresses are polled."""
         self.workers.cancel_group(self, "scan")
 
     def action_addresses(self) -> None:

@@ -218,11 +218,11 @@ class LineView(PanelScreen):
 
     def _how_far(self, width: int) -> list[Text]:
         """Return the progress of the search."""
-        label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Search ")
-        far = "no line" if self.app.fleet is None else "s begins"
+        label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Scan ")
+        far = "no line open" if self.app.fleet is None else "press s"
         if self.search is not None:
             far = far_text(self.search, self.later, width - label)
-        return [pair(" Search", far, PLAIN, label)]
+        return [pair(" Scan", far, PLAIN, label)]
 
     # What happened
 

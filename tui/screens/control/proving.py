@@ -40,16 +40,16 @@ def silence_line(
 ) -> Text:
     """Return the drive's timeout reaction, whether it was tested, and how the drive is reached."""
     rules, link = session.profile.data.communication_fault, session.line.link
-    reported = Text("  On silence    ", FAINT, no_wrap=True)
+    reported = Text("  Timeout       ", FAINT, no_wrap=True)
     if rules is None:
         reported.append("no communication timeout is known", PLAIN)
     elif watch is None:
         reported.append(f"{rules.timeout or 'timeout'} off, or not read yet", ALARM)
     else:
         does = watch.reaction.name if watch.reaction else "its own reaction"
-        reported.append(f"{rules.timeout} {watch.timeout:g} s, ", STRONG)
+        reported.append(f"{rules.timeout} {watch.timeout:g} s, then ", STRONG)
         reported.append(does, STRONG if watch.trips else ALARM)
-        reported.append(f" · {proved or 'not proved'}", PLAIN if proved else FAINT)
+        reported.append(f" · {proved or 'not tested'}", PLAIN if proved else FAINT)
     reported.append(f" · address {session.device}", FAINT)
     if isinstance(link, SerialLink):
         reported.append(f" · {link.baud} {link.format}", FAINT)
@@ -87,8 +87,8 @@ def ask_to_prove(
     ask(
         f"Prove the communication loss of drive {session.device}?",
         (PROOF_ON_THE_RUN if turning else "") + how,
-        "test it",
-        "leave it",
+        "Test",
+        "Cancel",
         partial(work, turning=turning),
     )
 

@@ -42,7 +42,7 @@ REGISTERED = (
         refusal=no_sources,
         actions=(
             *ARMING,
-            *key_rows(("prove", "P", "prove", PROVE)),
+            *key_rows(("prove", "P", "test", PROVE)),
             Action("write_chosen", "enter", "write", WRITE_SOURCE, bound=False),
             *key_rows(("leave", "escape", "back", "Go back to Monitor.")),
         ),

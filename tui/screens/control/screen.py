@@ -86,7 +86,7 @@ class ControlSourceScreen(OrderKeys):
             text = Text(no_wrap=True)
             text.append(" ● " if source is today else " · ", STRONG if source is today else FAINT)
             text.append(source.name, STRONG if source is today else PLAIN)
-            text.append("   today" if source is today else "", FAINT)
+            text.append("   active" if source is today else "", FAINT)
             options.add_option(entry(text))
         options.highlighted = at
 
@@ -102,13 +102,13 @@ class ControlSourceScreen(OrderKeys):
         """Show the chosen configuration, and who commands now."""
         super().draw(width)
         found = source_changes(self.session.profile, self._chosen, self._raws)
-        lines = [rule("So it works", width), *diagram(self._chosen)]
-        lines.append(rule("It would write", width))
+        lines = [rule("Signal path of the selected configuration", width), *diagram(self._chosen)]
+        lines.append(rule("Enter writes", width))
         if self._raws:
             lines += change_lines(self.session.profile, found, width)
         lines += [Text(""), *note_lines(self._chosen, found, width)]
         if warnings := warning_lines(self.session, width):
-            lines += [Text(""), rule("When the line falls silent", width), *warnings]
+            lines += [Text(""), rule("On a communication loss", width), *warnings]
         self.put("detail", lines)
         self.put_all("now", self._now(width))
         outcome = self.commander.outcome
@@ -166,10 +166,10 @@ class ControlSourceScreen(OrderKeys):
         elif self._require_armed():
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
-                f"Writes {codes}, each read back. A run command that waits at the new source"
+                f"Writes {codes}, each read back. A run command present at the new source"
                 " starts the motor."
             )
             work = partial(self.commander.configure, self._chosen)
             name = self._chosen.name
-            self._ask(f"{name}?", follows, "write", "change nothing", work)
+            self._ask(f"{name}?", follows, "Write", "Cancel", work)
         self.look()

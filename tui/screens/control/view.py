@@ -41,7 +41,7 @@ def now_lines(
     if trouble:
         text.append(f"   {trouble}", ALARM)
     elif today is None:
-        text.append("   today's setting is none of these", ALARM)
+        text.append("   the active setting is none of these", ALARM)
     else:
         text.append(f"   set up: {today.name}", FAINT)
     text.truncate(width, overflow="ellipsis")

@@ -55,7 +55,7 @@ class Ask(Question[str | None]):
             yield self._field(self._text, id="answer")
             yield Plain("", id="fault")
             yield Plain(self._about, id="about")
-            yield Plain(hint(("Enter", self._takes), ("Esc", "cancel")), id="hint")
+            yield Plain(hint(("Enter", self._takes), ("Esc", "Cancel")), id="hint")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Give the text back if nothing is wrong with it."""

@@ -137,7 +137,7 @@ def result_lines(bundle: Bundle, path: Path, width: int) -> Iterator[Text]:
     yield from _sentence(str(path), width, STRONG)
     if bundle.missing:
         yield Text("")
-        yield Text("Could not get", ALARM)
+        yield Text("Not collected", ALARM)
     for name, why in bundle.missing.items():
         yield from _sentence(f"{name}: {why}", width, PLAIN)
     yield Text("")

@@ -41,9 +41,9 @@ class Leave(KeyQuestion[LeaveChoice]):
                 yield Plain(self._follows, id="follows")
             yield Plain(
                 hint(
-                    ("s or Enter", "stop and leave"),
-                    ("l", "leave it running"),
-                    ("Esc or q", "stay"),
+                    ("s or Enter", "Stop and leave"),
+                    ("l", "Leave running"),
+                    ("Esc or q", "Stay"),
                 ),
                 id="hint",
             )

@@ -22,7 +22,7 @@ NAME_WIDTH, PLACE_WIDTH, KEY_WIDTH = 48, 14, 5
 """Columns; where an action can be done here, its name has those of the place too."""
 
 
-MORE = "Typed words find what other screens can do, too."
+MORE = "Typing also searches the other screens."
 
 
 class Palette(Question[FoundAction | None]):
@@ -44,8 +44,8 @@ class Palette(Question[FoundAction | None]):
     def dialog(self) -> ComposeResult:
         """A field, and what fits what is typed there."""
         with Vertical(id="dialog"):
-            yield Plain("What shall be done?", id="question")
-            yield Field(placeholder="words of it: eeprom, ramp, frames ...", id="search")
+            yield Plain("Find an action", id="question")
+            yield Field(placeholder="Type a word, for example eeprom, ramp, frames", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
             yield Plain("", id="hint")
@@ -66,10 +66,10 @@ class Palette(Question[FoundAction | None]):
         options.add_options([entry(self._line(found)) for found in self._found])
         ready = bool(self._found) and self._found[0].ready
         options.highlighted = 0 if ready else None
-        count = "Nothing fits; clear some letters."
+        count = "No match. Delete some letters."
         if self._found:
             many = len(self._found)
-            count = f"{many} {'fits' if many == 1 else 'fit'}" if query else MORE
+            count = f"{many} match" if many == 1 else f"{many} matches" if query else MORE
         self.query_one("#count", Plain).update(count)
         self._tell_keys()
 
@@ -99,7 +99,7 @@ class Palette(Question[FoundAction | None]):
         keys = [("Up, Down", "choose")] if self._found else []
         if at is not None:
             found = self._found[at]
-            keys.append(("Enter", "do it" if found.here else f"go to {found.screen.capitalize()}"))
+            keys.append(("Enter", "run" if found.here else f"go to {found.screen.capitalize()}"))
         self.tell_keys(hint(*keys, ("Esc", "cancel")))
 
     def on_input_submitted(self) -> None:

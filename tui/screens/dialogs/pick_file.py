@@ -78,7 +78,7 @@ class PickFile(KeyQuestion[str | None]):
             yield OptionList(*entries, id="choices", compact=True)
             if not self._found:
                 yield Plain(f"No {SUFFIX} file in this folder, nor where backups are kept.")
-            yield Plain(hint(("Enter", "open it"), ("Esc or q", "cancel")), id="hint")
+            yield Plain(hint(("Enter", "Open"), ("Esc or q", "Cancel")), id="hint")
 
     def on_mount(self) -> None:
         """The last file is the one at hand; what the files are is found out meanwhile."""

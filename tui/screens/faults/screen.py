@@ -247,9 +247,7 @@ class FaultsScreen(OrderKeys):
                 self._write(Path(name).expanduser(), record)
 
         about = "Markdown, with the values, what the drive stored, and what was written."
-        requested = Ask(
-            "Save the trip as", fault_of_new, text=proposed, about=about, takes="write the file"
-        )
+        requested = Ask("Save the trip as", fault_of_new, text=proposed, about=about, takes="Save")
         self.app.push_screen(requested, reported)
 
     def _write(self, path: Path, record: FaultRecord) -> None:

@@ -100,8 +100,8 @@ class CounterKeys(PanelScreen):
         requested = Confirm(
             f"Reset the counters of drive {device}?",
             RESETS_NOTHING_ELSE,
-            yes="reset them",
-            no="leave them",
+            yes="Reset",
+            no="Cancel",
             loses=True,
             now=MotorStates(self.app, [self.session]),
         )

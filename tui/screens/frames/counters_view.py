@@ -21,7 +21,7 @@ TALL, TALL_BARS, LOW_BARS = 30, 6, 1
 """Rows from which on the bars are tall; the rows of both."""
 LOAD_CELLS = 20
 MOST_LINES_OF_ONE = 4
-RESET_KEYS = "C counts from now, Z resets the drive's"
+RESET_KEYS = "C restart counts, Z reset drive's"
 BAD = frozenset({"never-arrived", "not-answered", "damaged-there", "damaged-here", "no-answer"})
 """Differences that are frames lost."""
 
@@ -35,7 +35,7 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
     lines.append(rule("Turnaround of the drive, in ms", width, "since the line was opened"))
     tall = TALL_BARS if height >= TALL else LOW_BARS
     lines += bar_lines(bars(found.total.turnarounds), tall)
-    lines.append(rule("What differs", width, RESET_KEYS))
+    lines.append(rule("Differences", width, RESET_KEYS))
     lines += message(found, width, max(1, height - len(lines)))
     return lines[:height]
 
@@ -43,19 +43,19 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
 def our_lines(found: CountersNow) -> list[Text]:
     """Return the counts of this program: since the line was opened, and since the last reset."""
     total, since = found.total, found.since
-    head = Text(f" {'Ours':<15}{'since open':>12}{time_text(found.seconds):>12}", FAINT)
+    head = Text(f" {'This panel':<15}{'since open':>12}{time_text(found.seconds):>12}", FAINT)
     rows = [
         ("frames sent", total.requests, since.requests),
         ("answered", total.replies, since.replies),
         ("timeouts", total.timeouts, since.timeouts),
         ("damaged", total.checksum, since.checksum),
-        ("strange", total.wrong, since.wrong),
+        ("unexpected", total.wrong, since.wrong),
         ("refused", sum(total.exceptions.values()), sum(since.exceptions.values())),
-        ("sent again", total.repeats, since.repeats),
+        ("repeated", total.repeats, since.repeats),
         ("bytes sent", total.bytes_out, since.bytes_out),
         ("bytes received", total.bytes_in, since.bytes_in),
     ]
-    lost = {"timeouts", "damaged", "strange"}
+    lost = {"timeouts", "damaged", "unexpected"}
     lines = [head]
     for name, all_of_them, lately in rows:
         text = Text(f" {name:<15}", FAINT, no_wrap=True)
@@ -82,7 +82,7 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
     if not found.drive:
         none = Text("None reported or read yet.", FAINT)
         return [Text("The drive's own", FAINT), none, *codes]
-    lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'of':>8}", FAINT)]
+    lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'sent':>8}", FAINT)]
     for name, comparison in found.drive:
         lines += _pair(name, comparison)
     return [*lines, *codes]

@@ -127,7 +127,8 @@ class _Words:
                 "0x", "16#"
             )
         more = len(found) - CODES_TOLD
-        return " ".join(c or "?" for c in found[:CODES_TOLD]) + (f" and {more}" if more > 0 else "")
+        codes = " ".join(code or "?" for code in found[:CODES_TOLD])
+        return f"{codes} + {more} more" if more > 0 else codes
 
     def values(self, address: int, raws: Sequence[int], sign: str = "") -> str:
         """The parameters with their values, each at most once."""

@@ -113,12 +113,12 @@ class FrameListScreen(PanelScreen):
         room, columns, few = self._room, width, ""
         if self.app.low_bandwidth and self._held is None:
             # all of them anew each time is more than a slow link carries
-            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h shows all, "
+            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h show all, "
         places = self._places(frames)
         self._up = min(self._up, max(0, len(places) - room))
         end = len(places) - self._up
         count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
-        lines = [rule(self._title(), width, f"{few}j finds, {count} kept")]
+        lines = [rule(self._title(), width, f"{few}{count} frames, j find")]
         shown = places[max(0, end - room) : end]
         self.put("frames", lines + self._lines(frames, shown, columns))
 
@@ -221,7 +221,7 @@ class FrameListScreen(PanelScreen):
         """Those of the filter, or of what is looked for."""
         if self._asking == "find":
             return ("Enter", "older one"), ("Esc", "end")
-        return ("Enter", "keep it"), ("Esc", "all frames")
+        return ("Enter", "keep"), ("Esc", "all frames")
 
     def _end_asking(self) -> None:
         self._asking = ""

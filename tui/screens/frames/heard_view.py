@@ -26,13 +26,14 @@ def heard_lines(
     shown = lines[top : top + room]
     drives = sum(bool(drive.tally.device) for drive in summary.drives)
     more = "" if len(lines) <= room else f"{top + 1} to {top + len(shown)} of {len(lines)}"
-    heading = f"Heard of {drives} drive{'' if drives == 1 else 's'}"
+    heading = f"Traffic of {drives} drive{'' if drives == 1 else 's'}"
     return [rule(heading, width, more), *shown], top
 
 
 def _here(text: str) -> str:
-    """In the words of the panel, which has a field in the place of an option."""
-    return text.replace("-p names it", "Profile on Line names it").replace("as -p says", "as typed")
+    """In the words of the panel, which has a field instead of an option."""
+    text = text.replace("-p names it", "enter it as Profile on Line")
+    return text.replace("as -p says", "as typed")
 
 
 def _sentence(text: str, width: int) -> list[Text]:

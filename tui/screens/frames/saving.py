@@ -53,7 +53,7 @@ def ask_where(app: Panel, kept: KeptFrames) -> None:
         fault_of_new,
         text=str(state_folder() / name),
         about=SAVED_AS,
-        takes="write the file",
+        takes="Save",
     )
     app.push_screen(requested, reported)
 

@@ -21,18 +21,19 @@ from .table import screen_actions
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
     ("▶", "green", "the motor runs"),
-    ("□", "white", "it is at standstill; STANDBY: the next command of this panel runs it"),
-    ("▼", "cyan", "a stop is on its way"),
-    ("■", "red", "a drive is in fault; on Line: another one than that of the strip"),
-    ("?", "amber", "state not known, or (behind a name) not confirmed by a manual"),
+    ("□", "white", "the motor is at standstill; STANDBY: the next run command starts it"),
+    ("▼", "cyan", "the motor is stopping"),
+    ("■", "red", "a drive is in fault; on Line: another drive than in the status bar"),
+    ("?", "amber", "state unknown, or (after a name) not confirmed by a manual"),
     ("-----", "grey", "no value: not read yet, or the drive does not have it"),
-    ("12s", "amber", "an old value, with its age in place of its unit"),
+    ("12s", "amber", "an old value, with its age instead of its unit"),
     ("│", "white", "on a bar: the reference"),
-    ("●", "white", "a bit that is 1"),
-    ("● 2", "cyan", "behind Parameters or Scanner: so much is staged, not yet written"),
-    ("■", "amber", "of a setting: not its factory value"),
-    ("S", "amber", "of a setting: lost when the drive is off, until S keeps it in its EEPROM"),
-    ("R", "amber", "of a setting: in force only after a reset of the drive"),
+    ("→", "white", "in the status bar: output frequency, then reference"),
+    ("●", "white", "the text of this bit is true"),
+    ("● 2", "cyan", "after Parameters or Scanner: the number of staged values"),
+    ("■", "amber", "a setting that differs from its factory setting"),
+    ("S", "amber", "a setting that is lost at power-off until S saves it in the EEPROM"),
+    ("R", "amber", "a setting that takes effect after a reset of the drive"),
 )
 HELP_WIDTH, BESIDE_HELP = 76, 6
 """Columns of the list at most, and those of its border, its margin and its scroll bar."""

@@ -30,7 +30,7 @@ WHILE_TYPING: tuple[KeyLabel, ...] = (
     ("quit", "^q", "leave"),
 )
 """Keys of the whole panel other than letters."""
-STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
+STOPS_ALL, STOPS_NOBODY = "STOP ALL", "cannot stop here"
 """Labels of the stop key if it stops every drive, or none."""
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
 OPEN = "Open a file: compare a parameter set, or propose an assignment."

@@ -36,5 +36,5 @@ class InputKeys(RunKeys):
 
         question = f"Inputs of the simulated drive {device}"
         about = f"{simulation.drive(device).terminals.reported()}\n{LOOKS_LIKE}"
-        requested = Ask(question, fault, about=about, takes="set them", number=True)
+        requested = Ask(question, fault, about=about, takes="Set", number=True)
         self.app.push_screen(requested, reported)

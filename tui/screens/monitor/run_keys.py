@@ -90,14 +90,14 @@ class RunKeys(OrderKeys):
     def run_line_keys(self, now: float) -> Text:
         """The keys that mean something while the line is open."""
         line = self._line
-        does = "give" if line is not None and line.purpose == "reference" else "run"
+        does = "set" if line is not None and line.purpose == "reference" else "run"
         counts = line is not None and line.counts(now)
 
         def styles(action: str) -> tuple[Style, Style]:
             return (FAINT, FAINT) if action == "enter" and not counts else key_styles(action)
 
         keys = [("stop_by_space", "Space", self.app.stop_target_text), ("enter", "Enter", does)]
-        return key_line([*keys, ("close", "Esc", "no")], styles)
+        return key_line([*keys, ("close", "Esc", "cancel")], styles)
 
     def on_key(self, event: Key) -> None:
         """While the line is open every key but a stop's is the line's; an unknown one closes it."""

@@ -211,7 +211,7 @@ def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Styl
     elif hindrance and line.purpose != "reference":
         message, style = f"No effect: {hindrance}", ALARM
     elif line.is_zero and line.purpose != "reference":
-        message, style = "The reference is 0: type the one to run at.", ATTENTION
+        message, style = "The reference is 0. Type a reference.", ATTENTION
     else:
         return []
     return [(part, style) for part in wrapped(message, width, 2)]
@@ -235,14 +235,14 @@ def _second(line: RunLine, now: float) -> Text:
     """The keys of the line."""
     second = Text(" ")
     second.append("Enter", KEY if line.counts(now) else FAINT)
-    second.append(" gives it   " if line.purpose == "reference" else " runs   ", FAINT)
+    second.append(" set   " if line.purpose == "reference" else " run   ", FAINT)
     if line.unit:
         second.append("↑ ↓", KEY)
         second.append(f" {step_in(line.unit)} {line.unit}   ", FAINT)
     second.append("Esc", KEY)
-    second.append(" no   ", FAINT)
+    second.append(" cancel   ", FAINT)
     second.append("Space", STOP_KEY)
-    return second.append(" stops", FAINT)
+    return second.append(" stop", FAINT)
 
 
 def _around(
@@ -280,4 +280,4 @@ def _there_in(
     slower = max(Decimal(0), abs(output) - abs(wanted)) if same else abs(output)
     if not rated or up is None or (slower and down is None):
         return []
-    return [f"there in {(faster * up + slower * (down or 0)) / rated:.1f} s"]
+    return [f"reached in {(faster * up + slower * (down or 0)) / rated:.1f} s"]

@@ -36,7 +36,7 @@ HEADS = {
     Phase.STOPPED: ("STOPPED", STRONG),
     Phase.FAILED: (" NOT STOPPED ", FAULT_BLOCK),
 }
-SAYS_WHY = "N says why"
+SAYS_WHY = "press N"
 """Told where there is room for it."""
 
 
@@ -47,7 +47,7 @@ def state_lines(view: View, width: int) -> list[Text]:
         _channel(view, "Command", "command_channel", width),
         _channel(view, "Reference", "reference_channel", width),
         _pair("Timeout", *_timeout(view, width), width),
-        _pair("Fed" if _is_fed(view) else "Heard", *_heard(view), width),
+        _pair("Polled", *_heard(view), width),
     ]
     lines = [head, *more[:4], *rows[len(more[:4]) :]]
     for line in lines:
@@ -71,7 +71,7 @@ def _head(view: View, width: int) -> tuple[Text, list[Text]]:
         why = "in each word: check the byte order of the gateway or converter"
         return Text("BYTES SWAPPED", ALARM), [Text(line, PLAIN) for line in wrapped(why, width, 4)]
     if view.lost:
-        return _lost(view, "NOT HEARD", width)
+        return _lost(view, "NO ANSWER", width)
     if view.stop is not None and snapshot.state.kind != "fault":
         return _stop(view.stop, width)
     return _present(view, snapshot.state, width)
@@ -90,7 +90,7 @@ def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
     """Nothing here is the present: since when, what it was, and what the drive does about it."""
     age = age_text(view.age or 0.0)
     was = view.was or (view.snapshot.state.headline if view.snapshot else "")
-    known = f"NOT KNOWN NOW for {age}"
+    known = f"STATE UNKNOWN for {age}"
     reported = f"{known}, {SAYS_WHY}"
     lines = [Text(short(reported if len(reported) <= width else known, width), ALARM)]
     lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
@@ -109,14 +109,14 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
         return Text("stopped", STRONG), [Text(short(state.name, width), FAINT)]
     hindrance = view.control.hindrance
     if view.stands_by and hindrance is None:
-        if why := "read-only: runs nothing" if view.read_only else view.control.barred:
+        if why := "read-only: no commands" if view.read_only else view.control.barred:
             return Text("standby", STRONG), [Text(line, FAINT) for line in wrapped(why, width, 2)]
         armed = view.control.armed_for is not None
-        return Text("r runs it" if armed else "a arms, r runs", STRONG), []
+        return Text("press r to run" if armed else "press a, then r", STRONG), []
     if hindrance is None:
         return Text(state.headline, STRONG), []
     if hindrance.by_channel:
-        return Text("no command given", STRONG), []
+        return Text("not commanded", STRONG), []
     return Text("not ready", STRONG), [
         Text(line, PLAIN) for line in wrapped(hindrance.text, width, 2)
     ]
@@ -152,7 +152,9 @@ def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]
     lines = [Text(line, STRONG) for line in name]
     lines.append(Text(view.fault_at, FAINT))
     lines += [Text("")] * (3 - len(lines))
-    lines.append(Text.assemble(("5", "bold #7fb0dc"), (" says what to do", PLAIN)))
+    lines.append(
+        Text.assemble(("press ", PLAIN), ("5", "bold #7fb0dc"), (" for what to do", PLAIN))
+    )
     return Text(f" FAULT {code} ", FAULT_BLOCK), lines
 
 
@@ -199,9 +201,9 @@ def _timeout(view: View, width: int) -> tuple[str, Style]:
         return text, PLAIN
     if not watch.acts:
         return "off", FAINT
-    begins = ", once commanded"
+    begins = ", starts when commanded"
     return (
-        text + begins if width >= STATE_LABEL_CELLS + len(text + begins) else f"{text}, idle"
+        text + begins if width >= STATE_LABEL_CELLS + len(text + begins) else f"{text}, off"
     ), FAINT
 
 
@@ -225,4 +227,4 @@ def countdown(view: View) -> str:
     if left is None or view.watch is None:
         return ""
     does = view.watch.reaction.name.lower() if view.watch.reaction else "its own reaction"
-    return f"acts in {left:.0f} s: {does}" if left > 0 else f"has acted by now: {does}"
+    return f"reacts in {left:.0f} s: {does}" if left > 0 else f"has reacted by now: {does}"

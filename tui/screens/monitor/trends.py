@@ -30,7 +30,7 @@ def trend_lines(view: View, width: int, height: int) -> list[Text]:
     if height <= 1:
         return [Text("")] * height
     if view.low_bandwidth:
-        off = Text("  The trend is left out: low bandwidth.", FAINT)
+        off = Text("  No trend at low bandwidth.", FAINT)
         return [off, *[Text("")] * (height - 1)]
     if width < 110:
         return one_trend(view, "output_frequency", width, height)

@@ -102,15 +102,15 @@ def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
     if parameter.access != "r" and number:
         limits, step = range_text(editor, parameter), step_text(editor, parameter)
         by = step.partition(" ")[0]  # its unit stands there already
-        text.append(f"{limits} by {by}" if limits else f"in steps of {step}", PLAIN)
+        text.append(f"{limits}, step {by}" if limits else f"step {step}", PLAIN)
         text.append(" · ", FAINT)
     text.append(" · ".join(_effect(editor, parameter)), FAINT)
     if parameter.storage == "ram-until-saved" and parameter.access != "r":
-        until = " · lost when off until kept: "
+        until = " · lost at power-off until saved: "
         if text.cell_len + len(until) < width:
             text.append(until, FAINT).append("S", KEY)
         else:
-            text.append(" · ", FAINT).append("S", KEY).append(" keeps it", FAINT)
+            text.append(" · ", FAINT).append("S", KEY).append(" save", FAINT)
     factory = f" · factory {factory_text(editor, parameter)}"
     if factory_text(editor, parameter) and text.cell_len + len(factory) < width:
         text.append(factory, FAINT)  # stands in the list too
@@ -122,12 +122,14 @@ def _effect(editor: Editor, parameter: Parameter) -> list[str]:
     if parameter.access == "r":
         return ["can only be read"]
     later = waits_for_reset(profile, parameter)
-    found = ["in force after a reset"] if later else []
+    found = ["takes effect after a reset"] if later else []
     if needs_standstill(profile, parameter):
-        found.append("at standstill only")
+        found.append("only at standstill")
     elif not later:
-        found.append("effective at once")
-    found += {"ram": ["lost when off"], "eeprom": ["kept at once"]}.get(parameter.storage, [])
+        found.append("takes effect immediately")
+    found += {"ram": ["lost at power-off"], "eeprom": ["saved immediately"]}.get(
+        parameter.storage, []
+    )
     return found
 
 
@@ -141,11 +143,11 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
         staged = f" → {edit.new}" if edit is not None else ""
         word = f" = 16#{_word(edit.new if edit is not None else raw)}" if width >= 80 else ""
         parts.append(f"raw {raw}{staged}{word}")
-    text = Text(f" {' · '.join(parts)} · from ", FAINT, no_wrap=True)
+    text = Text(f" {' · '.join(parts)} · source: ", FAINT, no_wrap=True)
     words = CONFIDENCE_WORDS[parameter.confidence]
     sure = parameter.confidence not in ("analogy", "unverified")
     sure = sure or parameter.code in editor.marks.confirmed
-    text.append(words if sure else f"{words}: unverified", FAINT if sure else ALARM)
+    text.append(words if sure else f"{words} (unverified)", FAINT if sure else ALARM)
     return text
 
 
@@ -160,7 +162,8 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     if code in editor.staging.changed_elsewhere:
         before = text_of(editor, parameter, editor.staging.changed_elsewhere[code])
         message = (
-            f"Changed by another program: it was {before}. Delete drops your edit, y keeps it."
+            f"Changed by another program: it was {before}."
+            " Press Delete to drop your edit, y to keep it."
         )
         return Text(message, ALARM)
     if result is not None and not result.done:
@@ -174,12 +177,12 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         message = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; {keys}."
         return Text(f"{message} {edit.remark}".strip(), ALARM if edit.remark else ATTENTION)
     if code in editor.waits_for_reset:
-        return Text("In force only after a reset of the drive.", ALARM)
+        return Text("Takes effect after a reset of the drive.", ALARM)
     if old := old_text(editor, code):
         message = f"Now {value_text(editor, code)}, was {old}"
         # u takes back what is staged first
-        u = "" if len(editor.staging.edits) else ": u stages the old value"
-        return Text(f"{message}{u}.", PLAIN)
+        u = "" if len(editor.staging.edits) else " Press u to stage the old value."
+        return Text(f"{message}.{u}", PLAIN)
     if code not in editor.values.raws:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
     if refused is not None and refused.reason != "read-only":
@@ -193,8 +196,8 @@ def _keys_to_write(editor: Editor, what: str) -> str:
     """The keys that write what is staged, in a few words; or that none does now."""
     arming = editor.session.arming
     if arming.hindrance:
-        return "not to be written now"
-    return f"w writes {what}" if arming.armed else f"a arms, w writes {what}"
+        return "cannot be written now"
+    return f"press w to write {what}" if arming.armed else "press a to arm, then w"
 
 
 def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
@@ -218,10 +221,10 @@ def status_line(editor: Editor, where: str, width: int) -> Text:
         text.append(": S", KEY)
     if editor.waits_for_reset:
         text.append(" · ", LINE)
-        text.append("RESET THE DRIVE: " + ", ".join(sorted(editor.waits_for_reset)), ALARM)
+        text.append(", ".join(sorted(editor.waits_for_reset)) + " after a drive reset", ALARM)
     done, whole = editor.values.progress
     if done < whole:
-        where = f"read {done} of {whole} · {where}"
+        where = f"reading {done} of {whole} · {where}"
     text.truncate(max(8, width - len(where) - 5), overflow="ellipsis")
     text.append(" ")
     text.append("─" * max(1, width - text.cell_len - len(where) - 3), LINE)

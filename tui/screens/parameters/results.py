@@ -26,7 +26,7 @@ OUTCOME_WORDS = {
     EditOutcome.DONE: "written",
     EditOutcome.SENT: "sent",
     EditOutcome.HELD_BACK: "HELD BACK",
-    EditOutcome.WAITS: "waits",
+    EditOutcome.WAITS: "not yet written",
 }
 """Results of an edit in a word; any other was not written."""
 
@@ -83,7 +83,7 @@ class RestQuestion(KeyQuestion[bool]):
             yield from self.now_lines()
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
-            keys = (("y", "write it" if item else "write them"), ("Esc or q", "write no more"))
+            keys = (("y", "Write"), ("Esc or q", "Stop here"))
             yield Plain(hint(*keys), id="hint")
 
     def action_yes(self) -> None:
@@ -95,7 +95,7 @@ def results_head(applied: Applied) -> str:
     """Return how many were written, and how many were not."""
     done, failed = len(applied.written), len(applied.results) - len(applied.written)
     head = f"Wrote {done}, all verified" if done else "Nothing written"
-    return f"{head}; {failed} not written, still staged" if failed else head
+    return f"{head}. {failed} not written, still staged" if failed else head
 
 
 def results_table(applied: Applied) -> Table:

@@ -125,7 +125,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def _empty(self) -> str:
         if self.query_one("#search", Input).value:
-            return " Nothing is called so. Esc clears the search."
+            return " No match. Press Esc to clear the search."
         return " Nothing here. Tab chooses another group."
 
     # Keys that move
@@ -163,7 +163,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """Those of the search."""
-        return ("Enter", "to the list"), ("Esc", "clears it")
+        return ("Enter", "to the list"), ("Esc", "clear")
 
     def on_input_changed(self) -> None:
         """Search as one types; the best match is chosen."""

@@ -76,7 +76,7 @@ class SetKeys(ParameterKeys):
                 self.run_worker(work, exclusive=True, group="sets")
 
         proposed = str(Path.cwd() / name)
-        requested = Ask(question, fault_of_new, text=proposed, about=about, takes="write the file")
+        requested = Ask(question, fault_of_new, text=proposed, about=about, takes="Save")
         self.app.push_screen(requested, reported)
 
     async def _read_to_file(
@@ -126,7 +126,7 @@ class SetKeys(ParameterKeys):
             for console in consoles
             if console is not self.console
         ]
-        question = "Compare with; what it has otherwise can be staged"
+        question = "Compare with a file. Press i to stage its differences."
         folders = [Path.cwd(), state_folder()]
         profile, raws = self.session.profile, dict(self.editor.values.raws)
 
@@ -144,7 +144,7 @@ class SetKeys(ParameterKeys):
         try:
             if typed.casefold() == "factory":
                 editor.other, editor.other_label = {}, "factory"
-                self.note("Compared with the factory settings: Changed lists what differs.")
+                self.note("Compared with the factory settings. Changed lists the differences.")
                 return
             if typed.isdecimal():
                 await self._compare_drive(int(typed))
@@ -192,10 +192,10 @@ class SetKeys(ParameterKeys):
         if not editor.other:
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
-        differ = "differs" if writes == 1 else "differ"
+        differ = "difference" if writes == 1 else "differences"
         self.note(
-            f"{editor.other_label}: {writes} {differ} and can be staged, {plan.count('equal')}"
-            f" are equal, {skips} left out.",
+            f"{editor.other_label}: {writes} {differ} can be staged, {plan.count('equal')}"
+            f" are equal, {skips} skipped.",
             "Press i to stage." if writes else "",
         )
         self.listed.choose(Choice("differs"))

@@ -136,8 +136,8 @@ class StageKeys(ParameterKeys):
         requested = Confirm(
             f"Confirm {code}?",
             follows,
-            yes="the keypad shows the same",
-            no="not confirmed",
+            yes="The keypad shows the same",
+            no="Not confirmed",
             loses=True,
             now=self.motor_state_text(),
         )
@@ -186,8 +186,8 @@ class StageKeys(ParameterKeys):
         requested = Confirm(
             "Undo all edits?",
             follows,
-            yes="drop them",
-            no="keep them",
+            yes="Discard",
+            no="Cancel",
             loses=True,
             now=self.motor_state_text(),
         )

@@ -15,7 +15,7 @@ CONFIDENCE_WORDS: dict[Confidence, str] = {
     "public-x2": "two public files",
     "public": "one public file",
     "analogy": "a sister family",
-    "unverified": "no document",
+    "unverified": "none",
 }
 """Source of the knowledge about a parameter."""
 

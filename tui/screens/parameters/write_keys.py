@@ -64,7 +64,7 @@ class WriteKeys(ParameterKeys):
             self._refuse(str(refused))
             return
         if self._require_armed():
-            self._ask(question, order.does, "do it", "change nothing", work)
+            self._ask(question, order.does, "Continue", "Cancel", work)
 
     def show_results(self) -> None:
         """Report once the result of each edit; where one failed, ask before the rest."""
@@ -114,8 +114,8 @@ class WriteKeys(ParameterKeys):
         requested = Confirm(
             "Follow the drive?",
             moved.text,
-            yes="follows it",
-            no="stay",
+            yes="Follow",
+            no="Stay",
             loses=len(self.app.fleet.sessions if self.app.fleet else ()) > 1,
             now=self.motor_state_text(),
             by_itself=True,
