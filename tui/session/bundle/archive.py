@@ -36,13 +36,13 @@ class Bundle:
     """The zip."""
     files: tuple[str, ...]
     missing: dict[str, str]
-    """Why a file is not in it, by its name."""
+    """Why a file is missing, by its name."""
     omitted: dict[str, int]
     """Number of omissions by kind."""
 
 
 def archive(results: Sequence[PartResult], redaction: Redaction, stem: str) -> Bundle:
-    """The bundle of what was collected; `stem` is its folder in the zip."""
+    """Return the bundle of the collected parts; `stem` is its folder in the zip."""
     dynamic = [result.missing for result in results]
     dynamic += [result.file.note for result in results if result.file is not None]
     for content in (*dynamic, *(item for name, item in _files(results) if _reveals(name))):
@@ -66,7 +66,7 @@ def archive(results: Sequence[PartResult], redaction: Redaction, stem: str) -> B
 
 
 def _reveals(name: str) -> bool:
-    """True for a file whose texts may reveal names: profiles are texts of everyone."""
+    """Return True if the texts of a file may reveal names; those of profiles are public."""
     return not name.startswith("profiles/")
 
 
@@ -122,7 +122,7 @@ def _head(
 
 
 def _indented(text: str) -> Iterator[str]:
-    """A text broken at words, but for commands."""
+    """Yield the lines of a text wrapped at words; commands stay whole."""
     for line in text.splitlines():
         parts = [line] if line.startswith("tshark ") else textwrap.wrap(line, README_WIDTH)
         yield from (f"    {part}" for part in parts)

@@ -1,4 +1,4 @@
-"""The parts of a bundle about one drive: it is read, behind all other requests, never written."""
+"""Bundle parts about one drive: it is read at the lowest priority, never written."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .parts import Missing, Part, PartFile, in_own_thread
 from .subject import NOT_OPEN, BundleSubject
 
 ECHOES = 20
-"""Frames that are sent to be counted, as by `counters`."""
+"""Number of frames sent to compare counts, as by `counters`."""
 WHY_WITHIN, COUNTERS_WITHIN, READ_WITHIN = 60.0, 30.0, 120.0
-"""Seconds for one drive."""
+"""Limits in seconds for the diagnosis, the counters and the reading of one drive."""
 BESIDE_READING = 30.0
-"""Seconds for the identification of a drive, and for writing down what was read."""
+"""Additional seconds for the identification of a drive, and for writing the files."""
 
 
 def drive_parts(subject: BundleSubject, device: int) -> Iterator[Part]:
@@ -59,17 +59,17 @@ def drive_parts(subject: BundleSubject, device: int) -> Iterator[Part]:
 
 
 class _Drive:
-    """One drive of the bundle; its parameters are read once."""
+    """Drive of the bundle; its parameters are read once."""
 
     def __init__(self, subject: BundleSubject, device: int) -> None:
         self._subject = subject
         self._device = device
         self._read: ParameterSet | None = None
         self._withheld = ""
-        """Why nothing is sent to the drive: what the diagnosis says before its first request."""
+        """Why nothing is sent to the drive: set by the diagnosis before its first request."""
 
     async def why(self) -> PartFile:
-        """The diagnosis."""
+        """Return the diagnosis as a file."""
         subject = self._subject
         found = await self._diagnosis()
         if subject.opened is not None and not found.sight.heard.requested:
@@ -101,7 +101,7 @@ class _Drive:
         return await self._subject.session(self._device)
 
     async def counters(self) -> PartFile:
-        """Both sides of the counts."""
+        """Return the frame counts of the line and of the drive."""
         session = await self._session()
         watch = CounterWatch(session)
         await watch.look()
@@ -112,7 +112,7 @@ class _Drive:
         return PartFile(document(self._subject.text, session, watch.now(), sent))
 
     async def settings(self) -> PartFile:
-        """All parameters; those that were not read in time are named."""
+        """Return all parameters; those not read in time are named."""
         session = await self._session()
         upload = Upload(session)
         why = ""
@@ -139,7 +139,7 @@ class _Drive:
         return self._read
 
     async def report(self) -> PartFile:
-        """The report on what was read."""
+        """Return the report on the values read."""
         session = await self._session()
         values = self._values
 

@@ -1,4 +1,4 @@
-"""The parts of a bundle that send nothing: port, adapter, versions, log, journal, profiles."""
+"""Bundle parts that send nothing: port, adapter, versions, log, journal, profiles."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from .redaction import PASSWORD_VARIABLE
 from .subject import BundleSubject
 
 LOG_MOST = 2_000_000
-"""Bytes of the log in a bundle, the last ones."""
+"""Maximum bytes of the log in a bundle, taken from its end."""
 JSON_SCHEMA_OF_JOURNAL = 1
 SYSTEM_DRIVER = "/sys/class/tty/{}/device/driver"
 
 
 def line_parts(subject: BundleSubject) -> Iterator[Part]:
-    """The line, its port and adapter; versions."""
+    """Yield the line, its port and adapter, and the versions."""
     yield Part(
         "line.json",
         "The line: its port and adapter, its state, its counters, the programs on it, and the"
@@ -131,7 +131,7 @@ def _remembered(link: Link) -> dict[str, Any] | None:
 
 
 def remembered_devices(link: Link) -> tuple[int, ...]:
-    """The addresses of the drives that were on the line when it was used last."""
+    """Return the addresses of the drives at the last use of the line."""
     mark = load_memory().lines.get(line_name(link).key)
     return tuple(mark.drives) if mark is not None else ()
 
@@ -203,7 +203,7 @@ def _profiles_file(subject: BundleSubject) -> PartFile:
 
 
 def _profiles_used(subject: BundleSubject) -> set[str]:
-    """Ids of the profiles of the drives, also of those that do not answer."""
+    """Return the profile ids of the drives, also of those that do not answer."""
     used = {session.family.id for session in subject.sessions}
     silent = set(subject.devices) - {session.device for session in subject.sessions}
     expected = (subject.expected_profile(device) for device in silent)
@@ -224,7 +224,7 @@ def _log_file() -> PartFile:
 
 
 def _end_of(path: Path) -> bytes:
-    """The end of a file; nothing if it does not exist."""
+    """Return the end of a file; empty if it does not exist."""
     try:
         with os.fdopen(open_regular(path), "rb") as file:
             file.seek(max(0, os.fstat(file.fileno()).st_size - LOG_MOST))

@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 Content = str | bytes | dict[str, Any] | list[Any]
-"""A text, a file as it is, or a JSON document."""
+"""A text, the bytes of a file, or a JSON document."""
 PartProgress = Callable[[int, int, str], None]
 """Called with the number of finished parts, of all parts, and the name of the current one."""
 
@@ -48,7 +48,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class PartResult:
-    """A part that was collected, or the reason why it was not."""
+    """Result of a collected part, or the reason for its absence."""
 
     part: Part
     file: PartFile | None
@@ -78,13 +78,13 @@ async def _collected(part: Part) -> PartResult:
     except Missing as error:
         return PartResult(part, None, str(error))
     except Exception as error:
-        # whatever fails here, the other parts are wanted even more
+        # after a failure of any kind, the other parts matter even more
         log.info("a part of a bundle failed: %s", part.name, exc_info=True)
         return PartResult(part, None, str(error) or type(error).__name__)
 
 
 async def in_own_thread(work: Callable[[], T]) -> T:
-    """Wait for blocking work in a thread that no end of the program waits for: a disk may hang."""
+    """Run blocking work in a daemon thread, so that a hanging disk does not delay the exit."""
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[T] = loop.create_future()
 

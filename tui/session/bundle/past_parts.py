@@ -1,4 +1,4 @@
-"""The parts of a bundle about the last minutes: frames and messages; screens of the panel."""
+"""Bundle parts about the last minutes: frames and messages; screens of the panel."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LinePastSeen = tuple[tuple[Frame, ...], tuple[LineNote, ...]]
 
 
 def past_parts(subject: BundleSubject) -> Iterator[Part]:
-    """Frames, messages and screens."""
+    """Yield frames, messages and screens."""
     past = _Past(subject)
     yield Part(
         "frames.pcapng",
@@ -73,13 +73,13 @@ async def _screen_file(text: str) -> PartFile:
 
 
 class _Past:
-    """Frames and notes of one line, requested once."""
+    """Recent frames and notes of one line, requested once."""
 
     def __init__(self, subject: BundleSubject) -> None:
         self._subject = subject
         self._seen: LinePastSeen | None = None
         self._before: tuple[Frame, ...] = ()
-        """Those of this program before the bundle: its own requests may displace them."""
+        """Frames of this program before the bundle: its own requests may displace them."""
         if subject.opened is not None:
             self._before = tuple(subject.opened.line.trace)
         self._note = ""
@@ -90,7 +90,8 @@ class _Past:
         return self._seen
 
     def _look(self) -> LinePastSeen:
-        """The past from the process that holds the line, else from the line in this program."""
+        """Return the recent frames and notes from the process that holds the line, else from this
+        program."""
         subject = self._subject
         opened = subject.opened
         place = share_place(subject.text) if opened is None or not opened.simulation else None
@@ -107,7 +108,7 @@ class _Past:
         return (*older, *frames), opened.line.facts.notes.all
 
     async def frames_file(self, *, raw: bool) -> PartFile:
-        """A capture of the frames."""
+        """Return a capture of the frames."""
         frames, _ = await self._past()
         if not frames:
             raise Missing("No frame was seen on the line.")
@@ -119,7 +120,7 @@ class _Past:
         return PartFile(content, note)
 
     async def messages(self) -> PartFile:
-        """The messages of the panel, else those that programs have left on the line."""
+        """Return the messages of the panel, else those that programs have left on the line."""
         events, note = self._subject.events, ""
         if events is None:
             _, notes = await self._past()

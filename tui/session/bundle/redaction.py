@@ -35,10 +35,10 @@ COMMON_NAMES = frozenset(
         "broker", "ubuntu", "debian", "node", "vagrant",
     }
 )  # fmt: skip
-"""Names that many computers have: they identify no one."""
+"""Names that many computers have: they identify nobody."""
 SHORTEST_SECRET = 4
 PASSWORD_VARIABLE = re.compile(r"PASS(WORD|WD|PHRASE)|SECRET|TOKEN|CREDENTIAL|API_?KEY", re.I)
-"""A part of the names of environment variables that hold a password."""
+"""Pattern in the names of environment variables that contain a password."""
 _SECRET_WORD = (
     r"(?:pass(?:word|wd|phrase)|secret|credentials?|(?:auth|access|api)[_-]?(?:token|key)|token)"
 )
@@ -82,7 +82,7 @@ class Redaction:
         """Number of removals, by the text that replaces them."""
 
     def learn(self, content: object) -> None:
-        """Note the names and passwords that a text, or the texts of a JSON document, reveal."""
+        """Record the names and passwords that a text, or the texts of a JSON document, reveal."""
         self._pattern = None
         for text in _texts(content):
             for match in _IN_URL.finditer(text):
@@ -103,7 +103,7 @@ class Redaction:
             self._users |= {item for item in _HOME_PATH.findall(text) if _is_own(item)}
 
     def clean(self, content: Any) -> Any:
-        """A text, or a JSON document, without them; the keys of a document stay."""
+        """Return a text, or a JSON document, without them; the keys of a document stay."""
         if isinstance(content, str):
             return self._clean_text(content)
         if isinstance(content, Mapping):
@@ -143,7 +143,7 @@ class Redaction:
         return by
 
     def _made(self) -> re.Pattern[str]:
-        """One pattern of all that is known, the longest first: a host may contain a user."""
+        """Return one pattern of all known secrets, the longest first: a host may contain a user."""
         self._instead = {}
         for by, names in ((USER, self._users), (HOST, self._hosts), (HOME, self._homes)):
             self._instead |= {name.casefold(): by for name in names}
@@ -157,7 +157,7 @@ class Redaction:
 
 
 def _forms(secret: str) -> Iterator[str]:
-    """A secret as it is, and as JSON, Python and URLs write it."""
+    """Yield a secret as plain text, and as JSON, Python and URLs write it."""
     yield secret
     yield json.dumps(secret)[1:-1]
     yield repr(secret)[1:-1]
@@ -165,7 +165,7 @@ def _forms(secret: str) -> Iterator[str]:
 
 
 def _part(name: str) -> str:
-    """A pattern of a name; a short one only as a whole word."""
+    """Return a pattern of a name; a short one only as a whole word."""
     escaped = re.escape(name)
     return escaped if len(name) > 4 else rf"(?<![A-Za-z0-9]){escaped}(?![A-Za-z0-9])"
 

@@ -1,4 +1,4 @@
-"""The line that a bundle is about, as far as it could be opened, and its drives."""
+"""The line of a bundle, open if possible, and its drives."""
 
 from __future__ import annotations
 
@@ -41,21 +41,21 @@ class DriveDocuments(NamedTuple):
 
 @dataclass(eq=False)
 class BundleSubject:
-    """The line, its drives, and what only the caller can provide."""
+    """The line, its drives, and data that only the caller has."""
 
     text: str
-    """The LINE as it was typed."""
+    """The LINE as typed."""
     link: Link | None
     """None for simulated drives on a line that is not open."""
     opened: OpenLine | None
     trouble: LineError | None
-    """The reason why it is not open."""
+    """Error that prevented opening; None if it is open."""
     devices: Sequence[int]
     open_drive: OpensDrive
-    """Gives the session with a drive, identified; raises LineError, DriveError, Missing."""
+    """Returns the session with an identified drive; raises LineError, DriveError, Missing."""
     documents: DriveDocuments
     expected_profile: Callable[[int], Profile | None]
-    """The profile of a drive as far as it is known without a request; may read files."""
+    """Returns a drive's profile as far as it is known without a request; may read files."""
     events: Sequence[Event] | None = None
     """The messages of the panel; None if there is no panel."""
     screens: Mapping[str, str] | None = None
@@ -64,7 +64,8 @@ class BundleSubject:
     _sessions: dict[int, DriveSession | Exception] = field(default_factory=dict)
 
     async def session(self, device: int) -> DriveSession:
-        """The session with a drive; a failure is kept, so that it is not requested again."""
+        """Return the session with a drive; a failure is stored, so that it is not requested
+        again."""
         if self.opened is None:
             raise Missing(f"{NOT_OPEN} {self.trouble or ''}".strip())
         known = self._sessions.get(device)
@@ -81,19 +82,19 @@ class BundleSubject:
         return known
 
     def known_session(self, device: int) -> DriveSession | None:
-        """The same, if it was requested before."""
+        """Return the session if it was requested before."""
         known = self._sessions.get(device)
         return None if isinstance(known, Exception) else known
 
     @property
     def sessions(self) -> list[DriveSession]:
-        """The sessions with the drives that were identified."""
+        """Return the sessions with the identified drives."""
         found = (self.known_session(device) for device in self.devices)
         return [session for session in found if session is not None]
 
 
 def bundle_name(link: Link | None, when: datetime) -> str:
-    """The name of a bundle without its ending: line and time, but no host name."""
+    """Return the name of a bundle without extension: line and time, but no host name."""
     return f"drivepanel-{_line_part(link)}-{when:%Y%m%d-%H%M%S}"
 
 

@@ -1,4 +1,4 @@
-"""Making a bundle: all its parts in their order, then the zip."""
+"""Creation of a bundle: all its parts in their order, then the zip."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ async def make_bundle(
 
 
 def _programs(subject: BundleSubject) -> tuple[Program, ...]:
-    """The programs on the line, whose users are named in messages."""
+    """Return the programs on the line; messages name their users."""
     if subject.opened is None:
         return ()
     facts = subject.opened.line.facts

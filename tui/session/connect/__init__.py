@@ -1,1 +1,1 @@
-"""Opening a line and finding out who is on it."""
+"""Opening of lines, and identification of the drives on them."""

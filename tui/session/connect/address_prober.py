@@ -1,4 +1,4 @@
-"""Requests to addresses that may be empty: by the profiles, for one line."""
+"""Requests to addresses that may be empty, derived from the profiles."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tui.drive.profile.profile import Profile
 PATIENCE = 2.0
 """Factor of the wait for a device that is present, compared with an empty address."""
 JITTER = 0.002
-"""Seconds by which this computer, or an adapter on USB, is late with what came."""
+"""Seconds by which this computer, or an adapter on USB, reports received bytes late."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,15 +30,15 @@ class AddressProber:
 
     probes: tuple[PresenceProbe, ...]
     within: float | None
-    """Seconds in which a reply begins; None where the way of the line takes longer than a drive."""
+    """Seconds within which a reply begins; None if the transport takes longer than a drive."""
     patience: float
-    """The same for what somebody who is there perhaps does not answer at all."""
+    """The same for an identity request, which a device that is present may not answer."""
     cost: float
-    """Seconds that an address costs at which nobody is."""
+    """Seconds that an empty address costs."""
 
 
 def known_profiles() -> list[Profile]:
-    """Every profile that can be used; one that cannot is reported when it is chosen."""
+    """Every valid profile; an invalid one is reported when it is chosen."""
     found = []
     for listing in library.listings():
         try:
@@ -51,8 +51,8 @@ def known_profiles() -> list[Profile]:
 def probers_of(link: Link, network_wait: float, *, patient: bool = False) -> AddressProber:
     """Return the first requests for the addresses of a line; reads files.
 
-    A line over a network, or one whose timeout a person has set, is waited for `network_wait`
-    seconds, as are all where that is to be `patient`.
+    The wait is `network_wait` seconds on a network, on a line whose timeout a person has set, and
+    on every line if `patient`.
     """
     profiles = known_profiles()
     probes = presence_probes(profiles)
@@ -66,9 +66,9 @@ def probers_of(link: Link, network_wait: float, *, patient: bool = False) -> Add
 
 
 def settings_worth_a_try(first: LineSetting, *, parity: bool = True) -> list[LineSetting]:
-    """The setting that a line is open at, then all that families can have, likely ones first.
+    """The open setting of a line, then all settings that families can have, likely ones first.
 
-    Without `parity`, as on a pseudo-terminal, those that differ in nothing else are one.
+    Without `parity`, as on a pseudo-terminal, settings that differ only in parity are one.
     """
     profiles = known_profiles()
     links = [profile.data.link for profile in profiles]

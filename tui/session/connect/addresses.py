@@ -8,7 +8,7 @@ from tui.bus.errors import LinkSyntaxError
 
 FIRST, LAST = 1, 247
 LONGEST_SPAN_END = 9
-"""Digits of a number that is looked at."""
+"""Digits of the longest number that is parsed."""
 
 
 def parse_addresses(text: str) -> list[int]:
@@ -19,7 +19,7 @@ def parse_addresses(text: str) -> list[int]:
         if not low.isdecimal() or (dash and not high.isdecimal()):
             raise LinkSyntaxError(f"{text!r} is not a list of addresses. Write 1-10 or 1,2,31.")
         ends = (low, high) if dash else (low, low)
-        # a long one is past the last in any case, and longer ones than int() takes can be pasted
+        # a longer one is above the limit, and a pasted one may be too long for int()
         first, last = (int(end) if len(end) <= LONGEST_SPAN_END else LAST + 1 for end in ends)
         if not FIRST <= first <= last <= LAST:
             raise LinkSyntaxError(f"Slave addresses go from {FIRST} to {LAST}; {part!r} does not.")

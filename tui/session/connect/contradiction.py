@@ -1,4 +1,4 @@
-"""True if a drive says of itself that it is another than the profile it is taken by."""
+"""Comparison of the identity that a drive reports with its assumed profile."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from .identify import DriveIdentity, confirmed_identity
 from .identifying import Askable, ask_identification, intact
 
 BRIEFLY = 0.4
-"""Seconds in which a drive answers that has the function although its family lacks it."""
+"""Seconds within which a drive that has the function answers, although its family lacks it."""
 SILENCES = 2
-"""Requests without a reply after which a drive of a family that has the function has said nothing,
-or is absent."""
+"""Requests without a reply after which a drive whose family has the function counts as nameless or
+absent."""
 
 
 class Contradiction(DriveError):
-    """A drive that says it is another than the profile named for it."""
+    """The drive's reported identity contradicts the profile named for it."""
 
 
 async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdentity | None:
     """Return the identity that a drive reports; None if it reports none.
 
-    Silence and refusals are not contradictions: families without function 43 do either. One that
-    was silent is asked for its status word, so that it does not count as absent. Raises
-    ChecksumFault or WrongReply if its reply only comes damaged, or is lost on a line that loses
-    frames, and the errors of a line that is lost.
+    A missing reply and a refusal are not contradictions: drives of families without function 43
+    give them too. After a missing reply, the status word is read so that the drive does not count
+    as absent. Raises ChecksumFault or WrongReply if the reply arrives only damaged, or is lost on a
+    line that loses frames, and the errors of a lost line.
     """
-    # a family that has the function is waited for as always; the others are silent
+    # only a family that has the function gets the full wait; the others do not answer
     has_it = profile.function(IDENTIFY) is not None
     priority, within = (Priority.OPERATOR_READ, None) if has_it else (Priority.BACKGROUND, BRIEFLY)
     silences = SILENCES if has_it else 1
@@ -67,8 +67,8 @@ async def read_status(line: Askable, device: int, profile: Profile, priority: Pr
 def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
     """Return how a drive contradicts its profile, for a person; empty if it does not.
 
-    A drive that names nothing contradicts nothing, nor does one of a kind that no profile knows,
-    where the profile names no kinds itself or its own begin alike.
+    No contradiction: a drive without names, and one of a kind that no profile knows if the profile
+    names no kinds or its kinds begin alike.
     """
     if identity is None or not identity.reference or profile.id in identity.candidates:
         return ""

@@ -1,6 +1,6 @@
-"""The computer of a host's name or number, as far as this machine knows it without others.
+"""Address of a host, as far as this computer knows it without a name server.
 
-No name server is asked: one that is away would hold up a stop. Names are those of the hosts file.
+A name server that is unreachable would delay a stop. Names are those of the hosts file.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ HOSTS = Path("/etc/hosts")
 
 
 def host_key(host: str) -> str:
-    """The host without its spelling: a number, in brackets where it is one of IPv6, or a name."""
+    """The host in one spelling: an IP address, in brackets if it is IPv6, or a name."""
     name = host.casefold().rstrip(".")
     number = _number(name) or _number(_names().get(name, ""))
     if number is None:
@@ -33,7 +33,8 @@ def _number(text: str) -> IPv4Address | IPv6Address | None:
 
 
 def _short_number(text: str) -> IPv4Address | None:
-    """Return an address that the system accepts as a number, too: 127.1 is 127.0.0.1."""
+    """Return an address that the system accepts as a number, also in short form: 127.1 is
+    127.0.0.1."""
     if not text[:1].isdigit():
         return None
     try:
@@ -43,7 +44,7 @@ def _short_number(text: str) -> IPv4Address | None:
 
 
 def _names() -> dict[str, str]:
-    """Numbers by name, of the hosts file as it is now."""
+    """IP addresses by name, from the present hosts file."""
     try:
         found = os.stat(HOSTS)
     except OSError:
@@ -64,7 +65,7 @@ def _read(path: Path, _changed: int, _size: int) -> dict[str, str]:
         number, *called = line.partition("#")[0].split() or [""]
         for name in called:
             key = name.casefold().rstrip(".")
-            # a name with a number of each kind is reached by the older kind, as most devices are
+            # a name with an IPv4 and an IPv6 address is reached by IPv4, as most devices are
             if key not in names or (":" in names[key] and ":" not in number):
                 names[key] = number
     return names

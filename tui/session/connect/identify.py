@@ -1,4 +1,4 @@
-"""Finding out which drive answers at an address, and which profile fits it."""
+"""Identification of the drive at an address, and the profiles that fit it."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ class DriveIdentity:
     version: str
     name: str
     profile: str | None
-    """The one profile that fits best, or None."""
+    """Id of the profile that fits best, or None."""
     candidates: tuple[str, ...]
-    """Every profile that may fit, best first."""
+    """Ids of all profiles that may fit, best first."""
 
     @property
     def version_text(self) -> str:
-        """The version as a person reads it."""
+        """The version as shown to a person."""
         return library.version_shown(self.profile, self.version)
 
 
 @dataclass(frozen=True, slots=True)
 class ScanResult:
-    """Result for one address: a drive, or a fault other than silence."""
+    """Result for one address: a drive, or a fault other than a missing reply."""
 
     device: int
     identity: DriveIdentity | None
@@ -62,13 +62,12 @@ async def identify_drive(
 ) -> DriveIdentity:
     """Request a drive's identity by function 43.
 
-    A drive that refuses the function is there, but nameless. One that stays silent, or of which
-    it is known that it has no function 43 (its limits came from a profile before), is asked for
-    the status word of each family without that function. Raises NoAnswer where nothing answers
-    at all, ChecksumFault or WrongReply where frames were lost or damaged so that nothing is
-    decided, and the line's other errors.
+    A drive that refuses the function is present, but nameless. A drive that does not answer, or
+    whose limits exclude function 43, gets a read of the status word of each family without that
+    function. Raises NoAnswer if nothing answers, ChecksumFault or WrongReply if lost or damaged
+    frames leave it open, and the line's other errors.
     """
-    # a person's question is asked again once: a lost reply is no absent drive
+    # a person's request is repeated once: a lost reply does not mean an absent drive
     there = _Presence(damaged=True)
     left = TRIES
     for _ in range(1 if priority >= Priority.BACKGROUND else 2):
@@ -95,8 +94,7 @@ async def identify_drive(
 
 
 async def confirmed_identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
-    """Return a drive's identity from its answer to function 43; finds fitting profiles in a
-    thread."""
+    """Return a drive's identity from its answer to function 43; matches profiles in a thread."""
     return await asyncio.to_thread(identity_from, device, answer)
 
 
@@ -112,12 +110,12 @@ async def find_drive(
     within: float | None,
     patience: float | None = None,
 ) -> ScanResult:
-    """Find out whether anybody is at an address, by the fewest requests, and then who.
+    """Probe an address with minimal requests, then identify the drive.
 
-    An empty address costs one request a probe, and `within` seconds for each; None leaves that to
-    the line. A drive that reports its state, as a family does that cannot identify itself, gets an
-    identity request with so much `patience`, in seconds. Raises NoAnswer where nothing answers, and
-    the line's other errors.
+    An empty address costs one request for each probe, and `within` seconds each; None applies the
+    line's own wait. A drive that answers the status word of a family without identification gets an
+    identity request with a wait of `patience` seconds. Raises NoAnswer if nothing answers, and the
+    line's other errors.
     """
     there = await _present(line, device, probes, priority, within)
     try:
@@ -141,7 +139,7 @@ async def _identified(
             )  # fmt: skip
         if answer is not None and (answer.objects.get(REFERENCE) or function == IDENTIFY):
             return ScanResult(device, await confirmed_identity(device, answer), by=how)
-    # that it has no such functions makes it no silent one: its last answer is what counts
+    # a drive without these functions is not absent: its last answer counts
     if there.families and not await control():
         raise NotIdentified(device)
     by = f"read of register {there.register}" if there.families else ""
@@ -154,10 +152,10 @@ class _Presence:
 
     register: int = 0
     families: tuple[str, ...] = ()
-    """Ids of those that report their state by the read that was answered."""
+    """Ids of the families whose status read was answered."""
     objects: IdentificationObjects | None = None
     damaged: bool = False
-    """True if nothing of what came was intact."""
+    """True if no reply was intact."""
 
 
 async def _is_intact(
@@ -167,7 +165,7 @@ async def _is_intact(
     priority: Priority,
     within: float | None = None,
 ) -> bool:
-    """True if a device answers once more what has shown that it is there."""
+    """True if a device answers the request that showed its presence again."""
     if there.damaged:
         return False
     return await intact(line.read(device, there.register, 1, priority=priority, within=within))
@@ -180,7 +178,7 @@ async def _present(
     priority: Priority,
     within: float | None,
 ) -> _Presence:
-    """Return how a device answers at an address, be it with a refusal. Raises NoAnswer."""
+    """Return how a device answers at an address, including by refusal. Raises NoAnswer."""
     refused = damaged = False
     register = 0
     for probe in probes:
@@ -207,7 +205,7 @@ def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
 
 
 def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
-    """Return the identity as text that never controls a terminal."""
+    """Return the identity as text without terminal control characters."""
     texts = {
         number: plain(value.decode("ascii", errors="replace").strip("\0 "))
         for number, value in answer.objects.items()
@@ -226,9 +224,9 @@ def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
 
 
 async def _nameless_families(line: Askable, device: int, priority: Priority) -> _Presence:
-    """Profiles without function 43 whose status word the device lets be read.
+    """Profiles without function 43 whose status word the device returns.
 
-    None of them where it only refuses: it is there. Raises NoAnswer where nothing answers.
+    Empty if it only refuses, since it is present. Raises NoAnswer if nothing answers.
     """
     found = await asyncio.to_thread(status_words_without_identification)
     probes = tuple(PresenceProbe(address, profiles) for address, profiles in found.items())
@@ -243,7 +241,7 @@ def status_words_without_identification() -> dict[int, tuple[str, ...]]:
         try:
             profile = library.load(listing.id)
         except DriveError:
-            # a profile that cannot be used is told where it is chosen; it ends no search
+            # an invalid profile is reported when it is chosen; it does not end the search
             continue
         status = profile.quantity("status_word")
         if status is not None and status.function == 3:

@@ -1,4 +1,4 @@
-"""Asking a drive for its identification until it is clear what its answer is, or that none is."""
+"""Identification requests to a drive, until the answer or its absence is certain."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from tui.bus.errors import (
 from tui.bus.expectation import IDENTIFY
 
 TRIES = 3
-"""Requests for one identification whose replies are lost or damaged."""
+"""Number of requests for one identification if replies are lost or damaged."""
 
 ControlRead = Callable[[], Awaitable[bool]]
-"""Asks the device something that it answers; False if nothing intact came back."""
+"""Sends a request that the device is known to answer; False if no intact reply arrived."""
 
 
 class Askable(Protocol):
-    """As much of a line as it takes to ask who is there."""
+    """The part of a line that identification uses."""
 
     @property
     def counters(self) -> LineCounters:
@@ -45,7 +45,7 @@ class Askable(Protocol):
         within: float | None = None,
         function: int = IDENTIFY,
     ) -> IdentificationObjects:
-        """Function 43, or 17."""
+        """Request the identification by function 43 or 17."""
         ...
 
     async def read(
@@ -57,12 +57,12 @@ class Askable(Protocol):
         priority: Priority,
         within: float | None = None,
     ) -> Reply:
-        """Function 3."""
+        """Read holding registers by function 3."""
         ...
 
 
 class NotIdentified(ChecksumFault):
-    """Frames were lost or damaged while a device was identified: nothing is decided."""
+    """Lost or damaged frames left the identity of a device open."""
 
     def __init__(self, device: int, function: int = IDENTIFY) -> None:
         text = (
@@ -84,11 +84,11 @@ async def ask_identification(
     silences: int = TRIES,
     healthy: bool = False,
 ) -> IdentificationObjects | None:
-    """The identification of a device that is there; None if it has none.
+    """The identification of a device that is present; None if it has none.
 
-    It has none if it refuses the function, or is silent `silences` times on a line that carried
-    all other frames intact. With `healthy`, it must have done so for the last minute.
-    Raises ChecksumFault or WrongReply if nothing is decided.
+    It has none if it refuses the function, or leaves `silences` requests unanswered on a line that
+    carried all other frames intact. With `healthy`, the line must have done so for the last minute.
+    Raises ChecksumFault or WrongReply if the result is uncertain.
     """
     damage = _damage(line)
     unclear: ExchangeError | None = None
@@ -113,7 +113,7 @@ async def ask_identification(
 
 
 async def intact(request: Awaitable[object]) -> bool:
-    """True if a device answers a request, were it with a refusal."""
+    """True if a device answers a request, also if it refuses it."""
     try:
         await request
     except (DeviceException, RequestRefused):
@@ -124,14 +124,14 @@ async def intact(request: Awaitable[object]) -> bool:
 
 
 def _damage(line: Askable) -> int:
-    """Replies on the line that came damaged, or that were another's."""
+    """Number of replies on the line that were damaged or from another device."""
     return line.counters.checksum + line.counters.wrong
 
 
 def _is_sick(line: Askable, device: int) -> bool:
-    """True if the last minute of the line explains a silence of this device otherwise.
+    """True if faults of the line in its last minute may explain this device's missing reply.
 
-    What the device itself missed does not count: one without the function misses each request.
+    Replies missed by the device itself do not count: without the function it misses each request.
     """
     counted = line.counters
     own = counted.devices.get(device, DeviceCounters()).minute.lost

@@ -1,7 +1,7 @@
-"""True if an open line is still the one that it was: its adapter, and the drives on it.
+"""Comparison of an open line with its stored identity: its adapter, and the drives on it.
 
-Another adapter under the same name, or another drive at an address, holds all writes to the line
-but stops back until a person says that it is right.
+Another adapter under the same name, or another drive at an address, blocks all writes to the line
+except stops until a person accepts the change.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ BY_OPTION = "If that is right, --accept-line takes the line as it is now."
 
 
 class KnownLine:
-    """One open line, compared with what is remembered of it; for any thread."""
+    """Open line checked against its stored identity. Thread-safe."""
 
     def __init__(self, line: ModbusLine, *, way: str = BY_OPTION) -> None:
         self._line = line
@@ -42,23 +42,23 @@ class KnownLine:
         """Differences by device, with None for the adapter; replaced as a whole."""
         self._accepts = False
         self.way = way
-        """Way for a person to accept it."""
+        """Step by which a person accepts the change, as a sentence."""
         self._name = LineName("")
         self.look()
 
     @property
     def changed(self) -> tuple[str, ...]:
-        """Differences from the stored line, a sentence each; empty if there are none. Waits for
-        nothing."""
+        """Differences from the stored line, one sentence each; empty if there are none. Does not
+        block."""
         return tuple(self._changed.values())
 
     @property
     def text(self) -> str:
-        """All of that in one text."""
+        """The differences as one text."""
         return " ".join(self.changed)
 
     def look(self) -> None:
-        """See which adapter is there now: at the opening, and when a lost line came back."""
+        """Compare the present adapter: when the line is opened, and after it was reconnected."""
         with self._lock:
             self._name = line_name(self._line.link)
             self._say(None, self._adapter_changed(load_memory()) if self._name.key else "")
@@ -66,7 +66,7 @@ class KnownLine:
                 self._keep()
 
     def note(self, identity: DriveIdentity | None, device: int, profile: str = "") -> None:
-        """A drive answered: compare it with the one that was at its address."""
+        """Compare a drive that answered with the stored drive at its address."""
         with self._lock:
             if not self._name.key:
                 return
@@ -85,9 +85,9 @@ class KnownLine:
                 self._keep()
 
     def accept(self, *, all_that_comes: bool = False) -> None:
-        """A person says that it is right: it is remembered as it is now.
+        """Accept the present line and store it.
 
-        With `all_that_comes` what differs later is right as well.
+        With `all_that_comes`, later differences are accepted too.
         """
         with self._lock:
             self._accepts = all_that_comes
@@ -96,7 +96,8 @@ class KnownLine:
             self._keep()
 
     def _say(self, what: int | None, reported: str) -> None:
-        """Record the state of the adapter or a device; the line is held while anything differs."""
+        """Record the difference of the adapter or a device; writes are held while anything
+        differs."""
         others = {key: text for key, text in self._changed.items() if key != what}
         self._changed = {**others, what: reported} if reported and not self._accepts else others
         reason = f"Nothing is written to this line: {self.text} {self.way}"
@@ -106,7 +107,7 @@ class KnownLine:
         return load_memory().lines.get(self._name.key, LineMark())
 
     def _adapter_changed(self, memory: LinesMemory) -> str:
-        """Return how the adapter differs, as a sentence; else nothing."""
+        """Return how the adapter differs, as a sentence; empty if it does not."""
         name = self._name
         before = memory.names.get(name.typed)
         if name.typed and before is not None and before != name.key:
@@ -124,7 +125,7 @@ class KnownLine:
         return ""
 
     def _keep(self) -> None:
-        """Remember the line as it is now, but for what differs; that it fails ends nothing."""
+        """Store the present line except for differences; a failure is ignored."""
         if not self._name.key:
             return
         memory, name = load_memory(), self._name
@@ -161,7 +162,7 @@ def _mark_of(identity: DriveIdentity | None, profile: str) -> DriveMark:
 
 
 def _fuller(before: DriveMark | None, now: DriveMark) -> DriveMark:
-    """Return the known identity of a drive that reported less of it this time."""
+    """Return the more complete of the stored and the present identity of a drive."""
     if before is not None and any(before.stated) and not any(now.stated) and before.fits(now):
         return before
     return now

@@ -1,7 +1,7 @@
 """Stored facts about lines: the adapter and drives of each at its last use.
 
-One file in the state folder. A port is called by its adapter's lasting name where it has one; what
-a person types for it, such as /dev/ttyUSB0, is remembered with the port that it led to.
+They are in one file in the state folder. A port is stored by its adapter's permanent name if it has
+one. A typed name, such as /dev/ttyUSB0, is stored with the port that it led to.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from .line_key import line_key
 LINES_KEPT = 60
 NAMES_KEPT = 100
 LONGEST_MEMORY = 2_000_000
-"""Bytes of a file that may be one of these."""
+"""Maximum size of the file in bytes."""
 LONGEST_SAID = 200
-"""Characters that are kept of what a drive says of itself."""
+"""Maximum length of a stored identity text in characters."""
 NO_PORT = PortName("")
 _TERMINALS = "/dev/pts/"
 
 
 @dataclass(frozen=True, slots=True)
 class DriveMark:
-    """By what a drive is known again: what it says of itself, or the profile it was taken by."""
+    """Stored identity of a drive: the one that it reports, or its assumed profile."""
 
     vendor: str = ""
     reference: str = ""
@@ -43,19 +43,19 @@ class DriveMark:
 
     @property
     def stated(self) -> tuple[str, ...]:
-        """Its reported identity; all texts are empty if it reports none."""
+        """The reported identity; all texts are empty if it reports none."""
         return self.vendor, self.reference, self.version, self.name
 
     def fits(self, now: DriveMark) -> bool:
-        """Return True if it may be the same drive; by the profile where one of them says
-        nothing."""
+        """Return True if it may be the same drive; compares profiles if one has no reported
+        identity."""
         if any(self.stated) and any(now.stated):
             return self.stated == now.stated
         return not (self.profile and now.profile) or self.profile == now.profile
 
     @property
     def text(self) -> str:
-        """The drive in a few words."""
+        """Short description of the drive."""
         name_text = " ".join(part for part in (self.reference or self.vendor, self.name) if part)
         shown = version_shown(self.profile, self.version)
         version = f"version {shown}" if shown else ""
@@ -72,7 +72,7 @@ class LineMark:
 
 @dataclass(frozen=True, slots=True)
 class LinesMemory:
-    """All that is remembered: lines by their key, and where each typed name led."""
+    """All stored lines by key, and the line that each typed name led to."""
 
     lines: Mapping[str, LineMark] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
@@ -83,8 +83,8 @@ class LineName:
     """Stored name of a line."""
 
     key: str
-    """The same for as long as it is the same adapter, host or port; empty for a line that
-    nobody finds again, such as the number of a pseudo-terminal."""
+    """Constant while adapter, host or port are the same; empty for a line that cannot be found
+    again, such as a numbered pseudo-terminal."""
     typed: str = ""
     """Typed name of a serial port if that may later mean another port; else empty."""
     port: PortName = NO_PORT
@@ -97,13 +97,13 @@ def line_name(link: Link) -> LineName:
     path = os.path.abspath(link.path) if os.name == "posix" else link.path
     port = lasting_name(link.path)
     if port.path.startswith(_TERMINALS):
-        # a number that the next program gets; a link to it is a name that somebody has given
+        # the next program may get this number; a link to it is a name chosen by a person
         return LineName("" if path.startswith(_TERMINALS) else f"serial:{path}")
     return LineName(line_key(label(link)), path if path != port.path else "", port)
 
 
 def remembered_text(text: str) -> str:
-    """A LINE as it is remembered: a port by its lasting name, where its adapter has one."""
+    """Stored form of a LINE: a port by its permanent name if its adapter has one."""
     from tui.bus.errors import LinkSyntaxError
     from tui.bus.link import parse_link
 
@@ -120,7 +120,7 @@ def remembered_text(text: str) -> str:
 
 
 def memory_file() -> Path:
-    """Return the path of the file."""
+    """Return the path of the file of stored lines."""
     return state_folder() / "known-lines.json"
 
 
@@ -138,7 +138,7 @@ def load_memory() -> LinesMemory:
 
 
 def keep_memory(memory: LinesMemory) -> None:
-    """Put it on the disk, whole or not at all; the latest lines come first. Raises OSError."""
+    """Write the stored lines to disk atomically, the latest first. Raises OSError."""
     lines = {
         key: {
             "adapter": mark.adapter,

@@ -1,4 +1,4 @@
-"""From a profile to the limits that the shared line keeps for its device."""
+"""Limits that the shared line enforces for a device, from its profile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which line is meant, however it was typed: two texts of one line have the same key."""
+"""Key of a line, equal for all spellings of the line."""
 
 from __future__ import annotations
 

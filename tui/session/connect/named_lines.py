@@ -35,7 +35,7 @@ LINES_TABLE = "lines"
 MOST_NAMED = 200
 _NAME = re.compile(r"(?!COM\d+$)[A-Za-z][A-Za-z0-9_-]{0,31}", re.IGNORECASE)
 _TAKEN = frozenset({"factory"})
-"""Words with another meaning in the place of a LINE."""
+"""Words with another meaning at the position of a LINE."""
 _KEYS = ("line", "device", "profile")
 _DEVICES = range(1, 248)
 NO_LINES: Mapping[str, NamedLine] = MappingProxyType({})
@@ -47,7 +47,7 @@ class SettingsError(LinkSyntaxError):
 
 
 class NamedLine(NamedTuple):
-    """A line with its name; `device` and `profile` of the drive that is meant, if told."""
+    """Named line; `device` and `profile` of its drive, if given."""
 
     name: str
     line: str
@@ -60,22 +60,22 @@ class LineSettings(NamedTuple):
 
     path: Path
     lines: Mapping[str, NamedLine] = NO_LINES
-    """By name in small letters, in the order of the file."""
+    """By lowercase name, in the order of the file."""
     faults: tuple[str, ...] = ()
-    """File, line, key and fault; the lines that they are about are not among the others."""
+    """File, line, key and fault of each error; the lines concerned are omitted from `lines`."""
     text: str = ""
-    """The file unchanged; empty where it cannot be read."""
+    """Content of the file; empty if it cannot be read."""
     places: Mapping[str, str] = NO_PLACES
     """File, line and key by name."""
 
 
 def settings_file() -> Path:
-    """The settings file in the configuration folder, beside the profiles of the user's own."""
+    """The settings file in the configuration folder, next to the user's own profiles."""
     return user_folder().parent / "settings.toml"
 
 
 def named_lines() -> Mapping[str, NamedLine]:
-    """The lines that have a name, by that name in small letters; raises nothing."""
+    """The named lines by lowercase name; raises nothing."""
     return line_settings().lines
 
 
@@ -90,14 +90,14 @@ def line_settings() -> LineSettings:
 
 
 def is_name(text: str) -> bool:
-    """Return True if a text can be the name of a line at all."""
+    """Return True if a text is a valid name of a line."""
     return _NAME.fullmatch(text) is not None and text.casefold() not in _TAKEN
 
 
 def line_named(text: str) -> NamedLine | None:
-    """The line of a name; None where the text is a LINE, or no name of any.
+    """The line of a name; None if the text is a LINE or an unknown name.
 
-    Raises SettingsError if the name is in a part of the file that cannot be used.
+    Raises SettingsError if the name is in an invalid part of the file.
     """
     if not is_name(text):
         return None
@@ -110,9 +110,9 @@ def line_named(text: str) -> NamedLine | None:
 
 
 def line_to_stop(text: str) -> NamedLine | None:
-    """The line of a name, even where the rest of the file is broken: a stop has to get through.
+    """The line of a name, even if the rest of the file is invalid, so that a stop is sent.
 
-    Raises SettingsError if it is not clear which line or which drive it means.
+    Raises SettingsError if its line or its drive is ambiguous.
     """
     try:
         return line_named(text)
@@ -123,7 +123,7 @@ def line_to_stop(text: str) -> NamedLine | None:
 
 
 def profile_named(line_key_of: str, device: int) -> str | None:
-    """The profile that the settings give the drive at an address of a line, by the line's key."""
+    """The profile in the settings for the drive at an address of a line, by the line's key."""
     from .line_key import line_key
 
     for line in named_lines().values():
@@ -133,7 +133,7 @@ def profile_named(line_key_of: str, device: int) -> str | None:
 
 
 def profiles_of_line(line_key_of: str) -> dict[int, str]:
-    """By device, the profiles that the settings give drives of a line, by the line's key."""
+    """The profiles in the settings for the drives of a line, by device."""
     from .line_key import line_key
 
     return {
@@ -228,7 +228,7 @@ _HEAD = re.compile(r"""\s*\[\s*(?:lines\s*\.\s*)?["']?([\w-]+)["']?\s*\]""")
 
 
 def _salvaged(text: str, name: str) -> NamedLine | None:
-    """The line of a name out of a broken file, by its lines of text.
+    """The line of a name, recovered from an invalid file by its lines of text.
 
     Raises SettingsError if the line is clear and its address is not.
     """

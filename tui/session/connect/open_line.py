@@ -1,6 +1,6 @@
-"""Opening a line from what a person typed: serial, TCP, RTU over TCP, or simulated.
+"""Opening of a line from the text of a person: serial, TCP, RTU over TCP, or simulated.
 
-What a line is made of is imported when one is opened: the panel shows itself before that.
+The modules of a line are imported when one is opened, so that the panel appears first.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Farewell(Protocol):
     """Report on a drive before its line is closed."""
 
     async def tell(self) -> None:
-        """Say it; never raises the line's errors."""
+        """Deliver the report; never raises the line's errors."""
         ...
 
 
@@ -36,19 +36,19 @@ class OpenLine:
     """A line with its address part."""
 
     text: str
-    """As it was typed."""
+    """The LINE as typed."""
     line: ModbusLine
     simulation: Simulation | None = None
     devices: tuple[int, ...] = ()
-    """Addresses known to be taken: those of a simulated line, else none."""
+    """Addresses of the drives of a simulated line; otherwise empty."""
     profiles: Mapping[int, str] = field(default_factory=dict)
     """The profiles that the text of a simulated line names, by address."""
     known: KnownLine | None = None
-    """True if it is still what it was, where that is looked at; None for a simulated line."""
+    """Comparison with the stored line; None for a simulated line."""
     again: Callable[[SerialLink], ModbusLine] | None = None
     """Opens the line again at other settings, for this program alone."""
     farewells: dict[int, Farewell] = field(default_factory=dict)
-    """By address, what is to be said of each drive at the end."""
+    """By address, the report on each drive before the line is closed."""
 
     @property
     def label(self) -> str:
@@ -61,7 +61,7 @@ class OpenLine:
         return self.text if count == 1 else f"{SIMULATED_PREFIX}{count} drives"
 
     def close(self) -> None:
-        """Close the line, then what it was connected to."""
+        """Close the line, then its transport."""
         self.line.close()
         if self.simulation is not None:
             self.simulation.stop()
@@ -76,13 +76,13 @@ def open_line(
     program: str = "",
     keeper: bool = True,
 ) -> OpenLine:
-    """The line that a person means, opened; `usual` are serial settings where none are named.
+    """Open the line of a text; `usual` are the serial settings if it names none.
 
-    `program` is what others on the line call this one; a program without a name shares nothing.
-    Without `keeper` it holds a line itself that no other program holds.
+    `program` is the name of this program for others on the line; a program without a name shares
+    nothing. Without `keeper`, this process holds a line itself if no other program does.
 
-    With `wait` it returns connected, or raises the line's error after so many seconds; otherwise it
-    connects automatically. Raises LinkSyntaxError, UnknownProfile, ProfileError.
+    With `wait`, it returns connected, or raises the line's error after that many seconds; otherwise
+    it connects automatically. Raises LinkSyntaxError, UnknownProfile, ProfileError.
     """
     if text.casefold().startswith(SIMULATED_PREFIX):
         from tui.simulator import parse_drives
@@ -116,7 +116,7 @@ def open_line(
 
 
 def reopen(opened: OpenLine, baud: int, format: str, *, wait: float) -> None:
-    """The same serial line at another baud and format, for this program alone from now on.
+    """Reopen a serial line at another baud and format, from then on for this program alone.
 
     Raises the line's errors; then the line is closed.
     """
@@ -153,7 +153,7 @@ def serial_ports() -> list[tuple[str, str]]:
 
 
 def demo_line(drives: Mapping[str, float]) -> OpenLine:
-    """One simulated line whose motors already run, for a first look.
+    """Open a simulated line with running motors, for a demonstration.
 
     `drives` gives each profile's frequency in Hz; addresses count from 1.
     """
@@ -174,7 +174,7 @@ def _simulated(
     from tui.simulator import Simulation
 
     simulation = Simulation(specs)
-    # drives in this very program are late when the computer is: no reason to call them silent
+    # drives simulated in this process are late if the computer is: do not count them as silent
     timing = Timing(min_timeout=1.0)
     line = Line(_serve(simulation), timing=timing, read_only=read_only, gated=True)
     text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
@@ -188,7 +188,7 @@ def _simulated(
 
 
 def _opened(opened: OpenLine, wait: float | None) -> OpenLine:
-    """The line, connecting; closed with all behind it if it cannot be opened."""
+    """The line, connecting; closed with its transport if it cannot be opened."""
     try:
         opened.line.open(wait=wait)
     except BaseException:
@@ -198,7 +198,7 @@ def _opened(opened: OpenLine, wait: float | None) -> OpenLine:
 
 
 def _serve(simulation: Simulation) -> Link:
-    """Start a simulation where the panel reaches it: a pseudo-terminal, or loopback."""
+    """Start a simulation on a pseudo-terminal or loopback for the panel."""
     from tui.bus.link import RtuTcpLink, SerialLink
 
     simulation.start()

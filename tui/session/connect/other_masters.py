@@ -1,5 +1,4 @@
-"""True if another master polls drives on a line: heard before the first request, and during the
-search."""
+"""Detection of another master on a line: before the first request, and during the search."""
 
 from __future__ import annotations
 
@@ -16,17 +15,17 @@ from ..clock import REAL_CLOCK, Clock
 from .addresses import addresses_text
 
 LISTEN = 1.5
-"""Seconds that a line is listened to before the first request: a master's cycle is shorter."""
+"""Seconds for which a line is monitored before the first request: longer than a master's cycle."""
 TALK = 4
-"""Fewer loose bytes than the shortest frame has are not worth the name of somebody's talk."""
+"""Least loose bytes that count as traffic: the length of the shortest frame."""
 TOLD_OF_EACH = 3
 """Number of different requests to one address that are listed."""
 NOT_AWAITED = ("late or repeated", "noise")
-"""Notes of what came in while nothing was due."""
+"""Notes on frames that arrived while no reply was due."""
 
 
 class OtherMaster(LineError):
-    """Another master talks on the line; two of them disturb each other."""
+    """Another master polls on the line; two masters disturb each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,7 @@ class Overheard:
 
     requests: tuple[OverheardRequest, ...] = ()
     answered: tuple[int, ...] = ()
-    """Addresses that answered somebody."""
+    """Addresses that answered another master."""
     loose: int = 0
     """Bytes that form no frame at this baud and format."""
 
@@ -67,8 +66,7 @@ class Overheard:
 
 
 def overheard(frames: Iterable[Frame], since: float) -> Overheard:
-    """Return the traffic of others since a time of the line's clock; our own echoes do not
-    count."""
+    """Return the traffic of others after a time of the line's clock; own echoes do not count."""
     ours: set[bytes] = set()
     requests: list[OverheardRequest] = []
     answered: dict[int, None] = {}
@@ -92,32 +90,32 @@ def overheard(frames: Iterable[Frame], since: float) -> Overheard:
 async def listen_first(
     line: ModbusLine, seconds: float = LISTEN, clock: Clock = REAL_CLOCK
 ) -> Overheard:
-    """Listen to a line. Drives that are polled meanwhile are not taken for others' talk."""
+    """Monitor a line for some seconds; drives that are polled by Drive Panel do not count."""
     since, before = _last_time(line.trace), line.counters.bytes_in
     await clock.sleep(seconds)
     found = overheard(line.trace, since)
     new = [frame for frame in line.trace if frame.time >= since]
     if found.text or any(frame.direction == "out" for frame in new):
         return found
-    # bytes that are no frame yet: the listening ended in the midst of somebody's talk
+    # an incomplete frame: monitoring ended in the middle of another master's traffic
     framed = sum(len(frame.data) for frame in new)
     return Overheard(loose=found.loose + line.counters.bytes_in - before - framed)
 
 
 class MasterDetector:
-    """Looks for requests of other masters while drives are searched for."""
+    """Detector of other masters' requests during a search."""
 
     def __init__(self, line: ModbusLine) -> None:
         self._line = line
         self._since = _last_time(line.trace)
 
     def look(self) -> None:
-        """Raise OtherMaster where somebody else has asked a drive meanwhile."""
+        """Raise OtherMaster if another master has polled a drive since the last call."""
         found = overheard(self._line.trace, self._since)
         if found.requests:
             raise OtherMaster(found.text)
 
 
 def _last_time(frames: Sequence[Frame]) -> float:
-    """The time behind which a frame is new."""
+    """Time of the latest frame; later frames are new."""
     return frames[-1].time + 1e-9 if frames else 0.0

@@ -1,4 +1,4 @@
-"""The frames that stop a drive whatever goes wrong in this program; made when it is opened."""
+"""Stop frames of a drive, made when it is opened so that no later error prevents a stop."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ log = logging.getLogger(__name__)
 def prepared_stop(
     line: ModbusLine, device: int, families: Sequence[Profile]
 ) -> tuple[PreparedWrite, ...]:
-    """Make ready the words that stop a drive of any of these families in any of their charts.
+    """Prepare the words that stop a drive of any of these families in any of their charts.
 
-    Empty if there is no such word; an error of its own must not keep a drive from being opened.
+    Empty if there is no such word; an error must not keep a drive from being opened.
     """
     try:
         words = blind_stops([stop_profile_of(family) for family in families])

@@ -1,4 +1,4 @@
-"""Duration of a search at other settings of a line, and the message before the slow ones."""
+"""Duration of a search at other settings of a line, and the message before slow settings."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class ScanEstimate:
     """Time of an empty address at each setting of a line, in seconds."""
 
     each: Mapping[LineSetting, float]
-    """One address."""
+    """Seconds of one address by setting."""
     addresses: int
 
     def seconds(self, settings: Iterable[LineSetting]) -> float:
-        """A search at these settings."""
+        """Return the seconds of a search at these settings."""
         return sum(self.each.get(setting, 0.0) for setting in settings) * self.addresses
 
     def before_slow(self, settings: Sequence[LineSetting], ends: str) -> str:
@@ -42,7 +42,7 @@ def scan_estimate(
     *,
     patient: bool = False,
 ) -> ScanEstimate:
-    """Return the times at settings of a line; reads files. `wait` is that of a network, in
+    """Return the times at settings of a line; reads files. `wait` is the network wait in
     seconds."""
     each = {}
     for setting in settings:

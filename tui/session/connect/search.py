@@ -1,4 +1,4 @@
-"""A search for drives on a line: how far it is, and who is asked once more."""
+"""Search for drives on a line, with its progress and retries."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .address_prober import AddressProber, probers_of
 from .identify import ScanResult, find_drive
 
 REST = 2.0
-"""A search beside regular polls rests so many times as long as it waited in vain."""
+"""Pause of a search during regular polling, as a multiple of the time lost at an empty address."""
 SECOND_WAIT = 0.1
-"""Seconds in which a reply begins at the latest when silent addresses are asked once more."""
+"""Seconds within which a reply begins when silent addresses are tried again."""
 LATE_WAIT = 0.3
-"""Seconds behind the last request in which late replies are heard: there are drives that may be
-set to answer 250 ms after a request."""
+"""Seconds after the last request in which late replies are accepted: some drives can be set to
+answer after 250 ms."""
 
 LEFT_ALONE = "left alone"
 """Source of the knowledge about a drive whose polling a program has paused."""
@@ -33,14 +33,14 @@ Found = Callable[[ScanResult], Awaitable[None]]
 
 
 class Search:
-    """Asks each address in turn, behind everything else; those that stay silent once more.
+    """Search that probes each address in turn at the lowest priority, and silent ones twice.
 
-    An address at which nobody is costs its request and the longest turnaround of the profiles. A
-    device that answers later than that is heard anyway, and gets another request with more
-    patience; unless `once`, so are all the others. A `patient` search waits as long as the line
-    does: for a stop, and for drives simulated in this very program, which are late when it is.
-    `between` is called before each address, and may end the search by what it raises. Any loop may
-    look at how far it is.
+    An empty address costs its request and the longest turnaround of the profiles. A device whose
+    reply arrives later is still detected, and gets another request with a longer wait; unless
+    `once`, so do all other addresses. A `patient` search waits as long as the line does: before a
+    stop, and for drives simulated in this process, which are late if it is. `between` is called
+    before each address, and may end the search by an exception. Progress may be read from any event
+    loop.
     """
 
     def __init__(
@@ -59,14 +59,14 @@ class Search:
         self.requested = 0
         """Number of addresses already requested."""
         self.at: int | None = None
-        """The address that is being asked."""
+        """The address that is being probed."""
         self.again = False
-        """True if it asks those a second time that were silent."""
+        """True while silent addresses are tried again."""
         self.answered: frozenset[int] = frozenset()
         self.ended = ""
-        """`done`, `stopped`, or empty while it goes on."""
+        """`done`, `stopped`, or empty while it runs."""
         self.cost = 0.0
-        """Seconds that an address costs at which nobody is; 0 before the first is asked."""
+        """Seconds that an empty address costs; 0 before the first request."""
         self._cost_again = 0.0
         self._silent = _SilentTimes()
         self._rests, self._now = rests, now
@@ -74,15 +74,15 @@ class Search:
 
     @property
     def goes_on(self) -> bool:
-        """True if it has not ended."""
+        """True while the search runs."""
         return not self.ended
 
     @property
     def left(self) -> float:
-        """Seconds that it still takes where nobody else answers; 0 before the first is asked.
+        """Estimated seconds left if no further device answers; 0 before the first request.
 
-        By what the line allows, or by what silent addresses of this round took where that was
-        more, as beside polls. That they are asked once more counts too.
+        Uses the line's waits, or the measured times of silent addresses in this round if these are
+        longer, as during polling. Retries are included.
         """
         if self.ended or not self.cost:
             return 0.0
@@ -96,7 +96,7 @@ class Search:
 
     @property
     def text(self) -> str:
-        """Progress in few words."""
+        """Progress as a short text."""
         found = f"{len(self.answered)} found"
         if self.ended:
             return f"{self.ended}, {found}"
@@ -106,9 +106,9 @@ class Search:
         return f"{self.requested} of {self.of}, {found}"
 
     async def run(self, line: ModbusLine, found: Found) -> None:
-        """Search; `found` hears of every address that is not silent.
+        """Run the search; calls `found` for every address that is not silent.
 
-        What is wrong with one address ends nothing. Raises LineClosed and LineLost.
+        A fault at one address does not end it. Raises LineClosed and LineLost.
         """
         try:
             if await self._refused_at_once(line, found):
@@ -121,7 +121,7 @@ class Search:
             first = partial(self._round, line, how, found)
             silent = await first(self.devices, Priority.BACKGROUND, how.within)
             if silent and how.within is not None:
-                await self._rests(LATE_WAIT)  # the last ones may be late as well
+                await self._rests(LATE_WAIT)  # the last replies may be late as well
             late = [device for device in silent if line.device_state(device).answers]
             self.again = bool(silent)
             if late:
@@ -137,10 +137,10 @@ class Search:
             self.at = None
 
     async def _refused_at_once(self, line: ModbusLine, found: Found) -> bool:
-        """Return True if the one device that was named has identified itself.
+        """Return True if the only device of the search has identified itself.
 
-        It is asked before all profiles are read, of which the questions to strangers are made:
-        that takes longer than most drives do to say it.
+        It is requested before the profiles are read: reading them takes longer than most drives
+        take to answer.
         """
         if len(self.devices) != 1 or self.devices[0] in line.facts.paused:
             return False
@@ -171,7 +171,7 @@ class Search:
         priority: Priority,
         within: float | None,
     ) -> list[int]:
-        """Ask these addresses; returns those that were silent."""
+        """Probe these addresses; return the silent ones."""
         self.requested, self.of, self._silent = 0, len(devices), _SilentTimes()
         silent: list[int] = []
         asks = _Considerate(line, self._rests)
@@ -179,7 +179,7 @@ class Search:
             self._between()
             self.requested, self.at, began = number, device, self._now()
             if paused := line.facts.paused.get(device):
-                # left alone on purpose: it is there, and not silent
+                # polling is paused on purpose: the drive is present, not silent
                 self.answered |= {device}
                 await found(ScanResult(device, None, paused[1], LEFT_ALONE))
                 continue
@@ -213,16 +213,16 @@ class _SilentTimes(NamedTuple):
 
     @property
     def mean(self) -> float:
-        """Seconds each; 0 while there was none."""
+        """Mean seconds of an empty address; 0 if there was none."""
         return self.seconds / self.times if self.times else 0.0
 
     def with_one_more(self, seconds: float) -> _SilentTimes:
-        """With another one."""
+        """Return the times with one more."""
         return _SilentTimes(self.times + 1, self.seconds + seconds)
 
 
 def _cost_again(how: AddressProber, line: ModbusLine) -> float:
-    """Seconds that a silent address costs that is asked once more."""
+    """Seconds that the retry of a silent address costs."""
     if how.within is None:
         return line.timing.patient_timeout * len(how.probes)
     longer = max(SECOND_WAIT, how.within) - how.within
@@ -230,9 +230,10 @@ def _cost_again(how: AddressProber, line: ModbusLine) -> float:
 
 
 class _Considerate:
-    """A line on which who polls keeps its rate while empty addresses are asked.
+    """A line on which regular polling keeps its rate while empty addresses are probed.
 
-    Each wait in vain holds a cycle up: at most one falls into a cycle, and most have none.
+    Each unanswered request delays a poll cycle: at most one falls into each cycle, and most cycles
+    have none.
     """
 
     def __init__(self, line: ModbusLine, rests: Rests) -> None:

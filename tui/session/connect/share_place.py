@@ -1,4 +1,4 @@
-"""Meeting place of this user's programs on a line, and the name of this one there."""
+"""Meeting place of this user's programs on a line, and the name of this program there."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 PROGRAM = "drivepanel"
 SHARE_GROUP_SETTING = "DRIVEPANEL_SHARE_GROUP"
-"""Environment variable: the group of users that may attach to lines opened from here."""
+"""Environment variable: the group of users that may attach to lines opened by this program."""
 FOLDER_SETTING = "DRIVEPANEL_SHARE_FOLDER"
 LOCKS = "lines"
-"""The folder of the locks, in the state folder."""
+"""Folder of the locks inside the state folder."""
 USUAL_GROUP_FOLDER = "/run/drivepanel"
 """Folder for users of a group, unless the environment names another; the administrator makes it."""
 
@@ -35,13 +35,13 @@ def group_folder() -> Path:
 
 
 def share_place(text: str) -> SharePlace | None:
-    """The meeting place of a line as it was typed; None on a system without local sockets.
+    """The meeting place of a typed line; None on a system without local sockets.
 
-    The socket lies in the user's runtime folder, else in the state folder. The lock lies in the
-    state folder, which no log-out takes away. Where a group may share the line both lie in the
-    group's folder, where who belongs to it finds them without being told.
+    The socket is in the user's runtime folder, else in the state folder. The lock is in the state
+    folder, which persists after log-out. If a group may share the line, both are in the group's
+    folder, so that its members find them.
 
-    Raises NotShared where a group is named and has no such folder.
+    Raises NotShared if a named group has no such folder.
     """
     if os.name != "posix":
         return None
@@ -62,7 +62,7 @@ def share_place(text: str) -> SharePlace | None:
 
 
 def group_number(group: str, folder: Path) -> int:
-    """The number of a group whose users share lines in a folder. Raises NotShared."""
+    """Number of a group whose users share lines in a folder. Raises NotShared."""
     import grp
 
     try:
@@ -83,16 +83,16 @@ def group_number(group: str, folder: Path) -> int:
 
 
 def this_program(name: str) -> Program:
-    """This program as others on the line see it."""
+    """This program as shown to others on the line."""
     user = os.environ.get("USER") or os.environ.get("LOGNAME") or ""
-    # as others take it: the environment holds any bytes
+    # as other programs accept it: the environment holds any bytes
     texts = (text.encode(errors="replace").decode()[:200] for text in (name, user, _terminal()))
     shown, user, terminal = texts
     return Program(uuid.uuid4().hex, shown, os.getpid(), user, terminal, pid_namespace())
 
 
 def _terminal() -> str:
-    """The terminal of this program; empty where it has none."""
+    """Terminal of this program; empty if it has none."""
     for stream in (sys.__stdin__, sys.__stdout__, sys.__stderr__):
         with suppress(OSError, ValueError, AttributeError):
             return os.ttyname(stream.fileno()).removeprefix("/dev/")  # type: ignore[union-attr]
@@ -100,7 +100,7 @@ def _terminal() -> str:
 
 
 def owners() -> list[Owner]:
-    """The processes that hold lines of this user and of the group at present."""
+    """The processes that at present hold lines of this user and of the group."""
     if os.name != "posix":
         return []
     from tui.bus.share.place import is_locked, owner_of_lock

@@ -1,1 +1,2 @@
-"""Why a drive does not answer: what is seen of its line, the rung of the ladder that fails."""
+"""Diagnosis of a drive that does not answer: evidence from its line, and the first failing
+check."""

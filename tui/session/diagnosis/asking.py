@@ -1,7 +1,7 @@
-"""Seeing why a drive does not answer: its port, its adapter, and a few reads of the drive.
+"""Collection of evidence for a diagnosis: the port, its adapter, and a few reads of the drive.
 
-Nothing is ever written, and the line keeps its baud and its format. The reads go out as an
-operator's, through the one owner of the line; a drive that is left alone on purpose stays so.
+Nothing is ever written, and the line keeps its baud and its format. The reads are sent with the
+priority of an operator, by the process that owns the line; paused polling stays paused.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from .evidence import SAME_ADAPTER, AdapterSeen, DiagnosticEvidence
 from .heard import Heard, heard_by_errors, heard_of
 
 ASKED = 3
-"""Reads of a drive that answers, up to one that it does not."""
+"""Number of reads of a drive that answers, up to the first unanswered one."""
 ASKED_IN_VAIN = 2
-"""Reads of one that does not."""
+"""Number of reads of a drive that does not answer."""
 SERIAL = "serial:"
 FRAMES_COME_WITHIN = 0.5
-"""Seconds in which the keeper of a line has sent its frames."""
+"""Seconds within which the keeper of a line sends its frames."""
 LATE_WITHIN = 1.0
-"""Seconds in which a reply arrives to the last request of those that got none in time."""
+"""Seconds within which a late reply to the last unanswered request arrives."""
 Asks = Callable[[], Awaitable[object]]
 
 
@@ -50,7 +50,7 @@ def evidence_of_port(
 
 
 def adapter_of(link: Link) -> AdapterSeen:
-    """Return whether the adapter last used under the port's name is somewhere else now."""
+    """Return where the adapter last used under the port's name is at present."""
     if not isinstance(link, SerialLink):
         return SAME_ADAPTER
     typed = os.path.abspath(link.path)
@@ -61,7 +61,7 @@ def adapter_of(link: Link) -> AdapterSeen:
     if not os.path.exists(was):
         return AdapterSeen(was)
     now = os.path.realpath(was)
-    # a name of one adapter that leads nowhere else is the same adapter
+    # a permanent name of one adapter that leads to the same port is the same adapter
     return SAME_ADAPTER if now == os.path.realpath(typed) else AdapterSeen(was, now)
 
 
@@ -73,7 +73,7 @@ async def sight_of_drive(
     changed: str = "",
     neighbors: Sequence[int] = (),
 ) -> DiagnosticEvidence:
-    """Send a drive on an open line a few requests, and see their results."""
+    """Send a drive on an open line a few requests, and return the evidence from the results."""
     seen = await asyncio.to_thread(evidence_of_port, line.link, device)
     seen = replace(seen, profile=profile, changed=changed, neighbors=tuple(neighbors))
     if _attached(line) and seen.port is not None:
@@ -139,7 +139,7 @@ def _questions(line: ModbusLine, device: int, profile: Profile | None) -> list[A
         return [identify, *(read(address) for address in status_words_without_identification())]
     status = profile.quantity("status_word") or next(iter(profile.parameters))
     first = read(status.address, status.function)
-    # another shape of request need not wait until a late answer to the first can come no more
+    # a request of another shape need not wait until a late answer to the first is ruled out
     return [first, identify if profile.function(IDENTIFY) is not None else first]
 
 
@@ -159,7 +159,7 @@ async def _heard(
 
 
 def last_time(frames: Sequence[Frame]) -> float:
-    """The time after which a frame is new."""
+    """Return the time of the latest frame; later frames are new."""
     return max((frame.time for frame in frames), default=-math.inf)
 
 
@@ -175,7 +175,7 @@ def _errors_counted(line: ModbusLine) -> PortErrors:
 
 
 def profile_remembered(link: Link, device: int) -> Profile | None:
-    """The profile by which a drive at this address was taken last; None where nothing is known."""
+    """Return the profile last used for the drive at this address; None if unknown."""
     mark = load_memory().lines.get(line_name(link).key)
     drive = mark.drives.get(device) if mark is not None else None
     if drive is None or not drive.profile:

@@ -1,4 +1,4 @@
-"""One cause on the ladder of a diagnosis: its test, its sentence, its steps, its certainty."""
+"""One check of a diagnosis: its test, its sentence, its next steps, its certainty."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Steps = Callable[[DiagnosticEvidence], Iterable[str]]
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that may be wrong."""
+    """Check for one possible cause."""
 
     id: str
     fails: Callable[[DiagnosticEvidence], bool]
     says: Callable[[DiagnosticEvidence], str]
-    """One sentence."""
+    """Cause as one sentence."""
     steps: Steps
     certainty: Callable[[DiagnosticEvidence], str] = lambda _: CERTAIN
     others: tuple[str, ...] = ()

@@ -1,6 +1,6 @@
-"""The ladder of what may keep a drive from answering: a test, a sentence and the next step each.
+"""Checks for the causes of a missing answer: a test, a sentence and the next steps of each.
 
-Pure: all follows from the evidence. The first rung whose test holds is the one that fails.
+Pure functions of the evidence. The first check whose test holds is the verdict.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from .gateway_probe import GATEWAY_CODES, gateway_codes
 from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS
 
 HELD_BACK = 8
-"""Milliseconds from which an adapter's latency is worth a word."""
+"""Latency of an adapter in ms from which it is reported."""
 SEEN_OF_IT = 0.75
-"""Share of that time that the answers must be late by, to say that it is the adapter's."""
+"""Share of that latency by which the answers must be late before the adapter is blamed."""
 
 
 def _not_there(sight: DiagnosticEvidence) -> bool:
@@ -154,7 +154,7 @@ def _says_damaged(sight: DiagnosticEvidence) -> str:
 
 
 def _gateway_codes(sight: DiagnosticEvidence) -> list[int]:
-    """Codes of a gateway, unless the family means something of its own by them."""
+    """Exception codes of a gateway, unless the family has its own meaning for them."""
     codes = gateway_codes(sight.profile)
     return [code for code in sight.heard.exceptions if code in codes]
 
@@ -245,4 +245,4 @@ LADDER: tuple[Check, ...] = (
     ),
     Check("exception", _refused, _says_refused, steps.ask_otherwise),
 )
-"""Every rung, in the order in which they are tried; each test but the first ones' works alone."""
+"""All checks, in the order in which they are tried; each test but the first ones' works alone."""

@@ -1,4 +1,4 @@
-"""Why a drive does not answer, in one sentence, and what to look at next; pure."""
+"""Diagnosis of a drive that does not answer, in one sentence, with the next steps; pure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .evidence import DiagnosticEvidence
 from .sick import CERTAIN
 
 ANSWERS = "answers"
-"""The rung of a drive that answers, with nothing wrong on the way."""
+"""Verdict for a drive that answers, with no fault on the way."""
 
 UNOPENED = "not-open"
 NOTHING_SEEN = "Nothing is wrong with this line as far as it is seen while it is not open."
@@ -18,7 +18,7 @@ OPEN_IT = "Open it, then try again: a drive is polled only on an open line."
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The rung that fails, with its sentence and the next steps."""
+    """Verdict of a diagnosis, with its sentence and the next steps."""
 
     rung: str
     text: str
@@ -31,12 +31,12 @@ class Diagnosis:
 
     @property
     def well(self) -> bool:
-        """True if the drive answers and nothing is wrong."""
+        """True if the drive answers and no fault was found."""
         return self.rung == ANSWERS
 
 
 def diagnosed(sight: DiagnosticEvidence) -> Diagnosis:
-    """The first rung of the ladder that fails."""
+    """Return the verdict of the first check whose test holds."""
     for rung in LADDER:
         if rung.fails(sight):
             sure = rung.certainty(sight)

@@ -1,4 +1,4 @@
-"""All that was seen of a line and one drive on it; the facts for the checks of the diagnosis."""
+"""Evidence about a line and one drive on it, for the checks of the diagnosis."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class AdapterSeen:
     """Present place of the adapter that was last used under a port's name."""
 
     was: str = ""
-    """Its lasting name; empty where the name still leads to it, or nothing is remembered."""
+    """Its permanent name; empty if the name still leads to it, or nothing is stored."""
     now: str = ""
-    """The port that it is now; empty where it is not plugged in."""
+    """Its present port; empty if it is not plugged in."""
 
 
 SAME_ADAPTER = AdapterSeen()
@@ -42,7 +42,7 @@ class DiagnosticEvidence:
     identity: DriveIdentity | None = None
     """Identity of a drive without a known profile; None if it was not read."""
     trouble: LineError | None = None
-    """Why the line cannot be used, where it cannot."""
+    """Error that prevents use of the line; None if it can be used."""
     port: PortSeen | None = None
     adapter: AdapterSeen = SAME_ADAPTER
     changed: str = ""
@@ -53,33 +53,33 @@ class DiagnosticEvidence:
     errors: PortErrors = NO_ERRORS
     """Errors counted by the port while the drive was polled."""
     turnaround: float | None = None
-    """The usual time from the end of a request to the start of its answer."""
+    """Usual time in seconds from the end of a request to the start of its answer."""
     overheard: str = ""
-    """Another master on the line, in a sentence; empty where none was heard."""
+    """Another master on the line, as a sentence; empty if none was detected."""
     measure: Measure | None = None
-    """Shares of sick frames among many reads; None where the drive was not read so often."""
+    """Shares of faulty frames among many reads; None if the drive was not read often enough."""
     works: Works | None = None
     """The request that a silent gateway answers."""
     behind: bool = False
-    """True if the line was named as one whose replies are one behind."""
+    """True if the name of the line marks its replies as one behind."""
     idle_closed: bool = False
-    """True if the connection was closed as nothing was sent."""
+    """True if the connection was closed because nothing was sent."""
     idle: float = 0.0
-    """Seconds for which no request was sent, to see that; 0 if it was not tried."""
+    """Seconds without requests in that test; 0 if it was not made."""
     neighbors: tuple[int, ...] = ()
     """Other addresses of this line that answer."""
 
     @property
     def owner_frozen(self) -> bool:
-        """True if a program of Drive Panel owns the line, and does not answer."""
+        """True if a Drive Panel process owns the line and does not respond."""
         return isinstance(self.trouble, LineLost) and OWNER_SILENT in str(self.trouble)
 
     @property
     def path(self) -> str:
-        """The serial port; empty where the line is none."""
+        """The serial port; empty if the line has none."""
         return self.link.path if isinstance(self.link, SerialLink) else ""
 
     @property
     def broken(self) -> int:
-        """Characters that the port itself saw broken."""
+        """Number of characters that the port itself reported as damaged."""
         return self.errors.framing + self.errors.parity + self.errors.breaks

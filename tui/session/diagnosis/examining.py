@@ -1,6 +1,6 @@
-"""A whole examination of a drive's line: listen, ask, measure, and what a gateway may be instead.
+"""Complete examination of a drive's line: monitor, request, measure, and probe a gateway.
 
-Nothing is ever written. Where another master is heard first, nothing is sent at all.
+Nothing is ever written. If another master is detected first, nothing is sent at all.
 """
 
 from __future__ import annotations
@@ -33,16 +33,18 @@ SHORT_READS = 200
 MEASURE_WITHIN = 6.0
 """Seconds that the reads may take."""
 EXCLUDED, RISK = 0.02, 0.05
-"""Share of sick replies from which a line is poor, and the risk of missing it in clean reads."""
+"""Share of faulty replies that makes a line poor, and the risk of missing it after good reads
+only."""
 CLEAN_READS = ceil(log(RISK) / log(1 - EXCLUDED))
 LEAST_READS = 50
-"""Reads beside the replies that the last minute of the drive has counted."""
+"""Least number of reads in addition to the drive's replies of the last minute."""
 PAUSED_READS, PAUSE, PAUSED_WITHIN = 16, 0.1, 4.0
-"""Reads with pauses, in s, that distinguish copies of replies from those of a second drive."""
+"""Number of reads that distinguish copies of replies from a second drive's, the pause between them,
+and their time limit, both in s."""
 RECONNECTED_WITHIN = 3.0
-"""Seconds in which a gateway takes a new connection."""
+"""Seconds within which a gateway accepts a new connection."""
 IDLE = 3.0
-"""Seconds without a request in which a gateway shows that it closes idle connections."""
+"""Seconds without a request after which it shows whether a gateway closes idle connections."""
 
 
 async def examine_line(
@@ -54,7 +56,7 @@ async def examine_line(
     answering: Sequence[int] = (),
     reads: int = SHORT_READS,
 ) -> DiagnosticEvidence:
-    """Everything that is seen of a drive and its line."""
+    """Collect all evidence about a drive and its line."""
     behind = [ONE_BEHIND in line.state.reason]
 
     def hear(event: LineEvent) -> None:
@@ -93,7 +95,7 @@ async def _examined(
     unreached = heard.nothing or not (heard.answered or set(heard.exceptions) - GATEWAY_REFUSALS)
     if not isinstance(line.link, SerialLink) and (cut or (heard.requested and unreached)):
         return replace(sight, works=await probed(line, device, beside=not heard.exceptions))
-    # a good reply of the last minute: the baud and the format are right, however few come now
+    # a good reply of the last minute: the baud and the format are correct, however few arrive now
     good = line.counters.devices.get(device, DeviceCounters()).minute.good
     if heard.answered or heard.functions or heard.misshapen or (good and not heard.nothing):
         return await _measured(line, sight, reads)
@@ -101,17 +103,17 @@ async def _examined(
 
 
 async def _others(line: ModbusLine) -> str:
-    """Another master that is heard before the first request, in a sentence; empty for none."""
+    """Return another master detected before the first request, as a sentence; empty for none."""
     since = last_time(line.trace)
     await REAL_CLOCK.sleep(LISTEN)
     heard = overheard(line.trace, since)
     ours = any(frame.direction == "out" and frame.time > since for frame in line.trace)
-    # late replies and noise around polls of this computer are no talk of another master
+    # late replies and noise around polls of this computer are not traffic of another master
     return heard.text if heard.requests or not ours else ""
 
 
 async def _measured(line: ModbusLine, sight: DiagnosticEvidence, reads: int) -> DiagnosticEvidence:
-    """The sight with the shares of many reads."""
+    """Return the evidence with the shares of many reads."""
     device, since, profile, identity = sight.device, last_time(line.trace), sight.profile, None
     if profile is None:
         identity, profile = await _identified(line, device)
@@ -142,9 +144,9 @@ async def _measured(line: ModbusLine, sight: DiagnosticEvidence, reads: int) -> 
 
 
 def clean_reads(counted: LineCounters, device: int) -> int:
-    """Reads that are enough if all are good: so many replies exclude a poor line.
+    """Number of reads that are enough if all are good: so many replies exclude a poor line.
 
-    Good replies of the last minute count, if there were no others.
+    Good replies of the last minute count if there were no faulty ones.
     """
     line = counted.minute
     own = counted.devices.get(device, DeviceCounters()).minute
@@ -170,7 +172,7 @@ async def _read(
 
 
 async def _identified(line: ModbusLine, device: int) -> tuple[DriveIdentity | None, Profile | None]:
-    """The drive's identity, and its profile or the likeliest one."""
+    """Return the drive's identity, and its profile or the likeliest one."""
     try:
         found = await identify_drive(line, device)
         likely = found.profile or next(iter(found.candidates), None)
@@ -183,7 +185,7 @@ async def _identified(line: ModbusLine, device: int) -> tuple[DriveIdentity | No
 
 
 async def _connected_again(line: ModbusLine) -> bool:
-    """True once a lost line is connected; a gateway may have closed it as nothing was sent."""
+    """True once a lost line is connected; a gateway may have closed it because nothing was sent."""
     limit = REAL_CLOCK.monotonic() + RECONNECTED_WITHIN
     while line.state.status is not LineStatus.CONNECTED and REAL_CLOCK.monotonic() < limit:
         await REAL_CLOCK.sleep(FRAMES_COME_WITHIN / 10)

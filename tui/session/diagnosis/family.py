@@ -1,4 +1,4 @@
-"""Advice from the manuals of a family if a drive does not answer; from its profile."""
+"""Advice from a family's manuals, by its profile, for a drive that does not answer."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from .evidence import DiagnosticEvidence
 WIRED = ("polarization", "polarisation", "termination")
 """Subjects of line rules to check; older profiles have the second spelling."""
 NAMED = "names of"
-"""Beginning of the line rule that names its wires."""
+"""Beginning of the line rule that names the family's wires."""
 SPEED_ROLES = ("baud", "format", "parity")
 USED_PINS = ("d0", "d1", "common", "rx", "tx", "0 v")
-"""Signals that a cable of the line joins; the two of the pair first."""
+"""Signals that a cable of the line connects; the differential pair first."""
 BOTH_WAYS = "Makers call the two wires both ways round: change them over if nothing answers."
 
 
 def speed_hint(sight: DiagnosticEvidence) -> str:
-    """A baud or a format of the line that the family does not have; empty where it has them."""
+    """Return a baud or a format of the line that the family lacks; empty if it has them."""
     link, profile = sight.link, sight.profile
     if profile is None or not isinstance(link, SerialLink):
         return ""
@@ -35,7 +35,7 @@ def speed_hint(sight: DiagnosticEvidence) -> str:
 
 
 def address_hint(sight: DiagnosticEvidence) -> str:
-    """Return the likely cause of an address: off, a group's, or out of the family's range."""
+    """Return why an address may be wrong: off, a group address, or out of the family's range."""
     if sight.profile is None:
         return ""
     known, device = sight.profile.data.addresses, sight.device
@@ -51,7 +51,7 @@ def address_hint(sight: DiagnosticEvidence) -> str:
 
 
 def as_factory(sight: DiagnosticEvidence) -> bool:
-    """Return True if the line has the settings with which the drive leaves the factory."""
+    """Return True if the line has the drive's factory settings."""
     profile, link = sight.profile, sight.link
     if profile is None or not isinstance(link, SerialLink):
         return True
@@ -59,7 +59,7 @@ def as_factory(sight: DiagnosticEvidence) -> bool:
 
 
 def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
-    """Baud and format: those that the drive leaves the factory with, beside those of the line."""
+    """Compare the drive's factory baud and format with those of the line."""
     profile, link = sight.profile, sight.link
     if profile is None:
         return
@@ -80,7 +80,7 @@ def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
 def wiring_hints(sight: DiagnosticEvidence, *, answers: bool = False) -> Iterator[str]:
     """Polarity, pins, polarization and termination, as the family's manual names them.
 
-    The wires of a drive that answers are the right ones: then nothing of polarity and pins.
+    If the drive answers, its wires are correct: nothing on polarity and pins is given.
     """
     if sight.profile is None:
         return
@@ -112,7 +112,7 @@ def _wire_hints(profile: Profile) -> Iterator[str]:
 
 
 def _polarity(profile: Profile) -> str:
-    """Return other names of the wires, and which are the inverted ones."""
+    """Return the family's names of the wires, or which of them are inverted; empty if unknown."""
     data = profile.data
     for rule in data.line_rules:
         if rule.subject.casefold().startswith(NAMED):
@@ -134,6 +134,6 @@ def _polarity(profile: Profile) -> str:
 
 
 def _code(profile: Profile, role: str) -> str:
-    """The parameters of the drive that set one side of its line."""
+    """Return the drive's parameters for one setting of its line."""
     found: list[LinkSetting] = [s for s in profile.data.link.settings if s.role == role]
     return " or ".join(dict.fromkeys(setting.parameter for setting in found))

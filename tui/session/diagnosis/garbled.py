@@ -11,11 +11,12 @@ from .evidence import DiagnosticEvidence
 USUAL_BAUDS = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 USUAL_FORMATS = ("8E1", "8N1", "8N2", "8O1")
 SAME_SPEED = 1.3
-"""Times by which the bytes that came may differ from those due where the speed is the same."""
+"""Greatest ratio of received to due bytes that still indicates the same speed."""
 
 
 def speed_text(sight: DiagnosticEvidence) -> str:
-    """Return the conclusion from the number of bytes: a receiver at half the speed gets half."""
+    """Return the conclusion from the number of bytes: a receiver at half the speed sees half of
+    them."""
     came, due = sight.heard.compared
     if not came or not due:
         return ""
@@ -28,13 +29,13 @@ def speed_text(sight: DiagnosticEvidence) -> str:
 
 
 def same_speed(sight: DiagnosticEvidence) -> bool:
-    """Return True if about as many bytes came as were due."""
+    """Return True if the number of received bytes is about the number due."""
     came, due = sight.heard.compared
     return bool(came and due) and 1 / SAME_SPEED < came / due < SAME_SPEED
 
 
 def other_formats(sight: DiagnosticEvidence) -> tuple[str, ...]:
-    """The formats of the family that the line does not have; none behind a device server."""
+    """Return the family's formats other than the line's; none for a device server."""
     if not isinstance(sight.link, SerialLink):
         return ()
     known = sight.profile.data.link.formats if sight.profile is not None else ()
@@ -42,9 +43,9 @@ def other_formats(sight: DiagnosticEvidence) -> tuple[str, ...]:
 
 
 def likely_baud(sight: DiagnosticEvidence) -> int | None:
-    """The other baud of the family that the bytes fit best.
+    """Return the other baud of the family that fits the bytes best.
 
-    None where the present one fits, and behind a device server.
+    None if the present one fits, and for a device server.
     """
     came, due = sight.heard.compared
     if not came or not due or same_speed(sight) or not isinstance(sight.link, SerialLink):

@@ -1,6 +1,6 @@
-"""Other ways to reach a silent gateway: as another protocol, or for another unit.
+"""Probes of a silent gateway by another protocol, or for another unit.
 
-Each try asks for one register, by function 3.
+Each probe reads one register, by function 3.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tui.wire.frames import frame, is_whole
 from .heard import REFUSED, TCP_HEAD
 
 WITHIN = 1.0
-"""Seconds for the connection, and for the reply."""
+"""Seconds each for the connection and for the reply."""
 ANY_REGISTER = bytes.fromhex("030C810001")
 """A read whose RTU frame is not a message of Modbus TCP: its protocol would not be 0."""
 GATEWAY_CODES = {10: "0A, it has no way to the drive", 11: "0B, the drive did not answer it"}
@@ -56,7 +56,8 @@ def _answers_tcp(data: bytes, unit: int) -> bool:
 
 
 def gateway_codes(profile: Profile | None) -> frozenset[int]:
-    """Exceptions of a gateway that did not reach the drive, unless the family has them too."""
+    """Return the exceptions of a gateway that did not reach the drive, except those of the
+    family."""
     own = (
         {exception.code for exception in profile.data.exceptions} if profile is not None else set()
     )
@@ -64,11 +65,11 @@ def gateway_codes(profile: Profile | None) -> frozenset[int]:
 
 
 async def probed(line: ModbusLine, device: int, *, beside: bool = True) -> Works | None:
-    """Find a request that a silent gateway answers; None for nothing.
+    """Find a request that a silent gateway answers; None if there is none.
 
-    First by the line itself. A connection beside it might end the one of the line, as many
-    gateways take one client. So that is tried only if the line never brought a reply, if no
-    other program uses it, and not without `beside`.
+    The line itself is tried first. A second connection might end that of the line, as many gateways
+    accept one client. So it is tried only with `beside`, if the line never returned a reply and no
+    other program uses it.
     """
     link = line.link
     assert isinstance(link, TcpLink | RtuTcpLink)
@@ -112,7 +113,7 @@ async def _reads(line: ModbusLine, unit: int) -> bool:
 async def _answered(
     link: TcpLink | RtuTcpLink, request: bytes, right: Callable[[bytes], bool]
 ) -> bool:
-    """True if the right reply comes on a connection of its own."""
+    """True if the expected reply arrives on a separate connection."""
     data = b""
     with suppress(OSError, TimeoutError):
         async with asyncio.timeout(WITHIN):

@@ -16,36 +16,36 @@ TCP_HEAD = 6
 """Bytes of Modbus TCP before the address."""
 ECHO_NOTE = "echo"
 LATE_NOTE = "late"
-"""Beginning of the note on a frame that came while none was due."""
+"""Beginning of the note on a frame that arrived while no reply was due."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """Counts of what was heard of one drive, and in its place."""
+    """Counts of the replies to the requests to one drive."""
 
     requested: int = 0
     answered: int = 0
     late: int = 0
-    """Answers that came after the time for them was up."""
+    """Answers that arrived after the timeout."""
     echoed: int = 0
-    """Requests that came back as they were sent."""
+    """Requests that returned unchanged."""
     exceptions: tuple[int, ...] = ()
     functions: tuple[int, ...] = ()
-    """Functions that the drive answered with, where another was asked for."""
+    """Functions of replies that differ from the requested one."""
     misshapen: int = 0
-    """Answers to the right function that are not as long as they must be."""
+    """Answers with the requested function and a wrong length."""
     others: tuple[int, ...] = ()
-    """Addresses that answered in its place, in order."""
+    """Addresses that answered instead of the drive, in order."""
     damaged: int = 0
-    """Answers that begin as they must and fail their checksum, or break off."""
+    """Answers with a correct beginning that fail their checksum or are cut short."""
     garbage: int = 0
-    """Bytes that are part of no frame."""
+    """Number of bytes outside any frame."""
     compared: tuple[int, int] = (0, 0)
-    """Of reads that brought garbage alone: bytes that came, and bytes that were due."""
+    """For reads that returned only garbage: bytes received, and bytes due."""
 
     @property
     def nothing(self) -> bool:
-        """True if not one byte came back, an echo aside."""
+        """True if no byte was received, except an echo."""
         return not (
             self.answered
             or self.late
@@ -78,7 +78,7 @@ def _device(data: bytes, tcp: bool) -> int:
 
 
 def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> Heard:
-    """Add one more exchange."""
+    """Return the counts with one more exchange."""
     if not request:
         return found
     found = replace(found, requested=found.requested + 1)
@@ -98,7 +98,7 @@ def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> 
 
 
 def _with_whole(found: Heard, requested: bytes, body: bytes, *, late: bool) -> Heard:
-    """One whole frame more: address, function and data."""
+    """Return the counts with one more intact frame: address, function and data."""
     device, function = body[0], body[1]
     if device != requested[0]:
         return replace(found, others=_once(found.others, device))
@@ -126,7 +126,8 @@ def _with_loose(found: Heard, requested: bytes, loose: bytes, *, alone: bool) ->
 
 
 def due_bytes(requested: bytes) -> int:
-    """Bytes of the frame that answers a read, from address to checksum; of a request without it."""
+    """Return the bytes of the reply to a read, from address to checksum; of the request if it is
+    not a read."""
     return 5 + 2 * int.from_bytes(requested[4:6], "big")
 
 
@@ -135,7 +136,8 @@ def _once(known: tuple[int, ...], new: int) -> tuple[int, ...]:
 
 
 def heard_by_errors(outcomes: Iterable[LineError | None], device: int) -> Heard:
-    """The same where no frames are at hand: from how the requests ended, None being an answer."""
+    """Return the same counts from the results of requests, None for an answer, if frames are
+    missing."""
     found = Heard()
     for outcome in outcomes:
         found = replace(found, requested=found.requested + 1)

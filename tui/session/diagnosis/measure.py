@@ -14,16 +14,17 @@ from .heard import LATE_NOTE, REFUSED, REGISTER_READS, TCP_HEAD, due_bytes
 SICK_KINDS = ("late", "lost", "damaged", "duplicated", "foreign", "unreached")
 DAMAGED_NOTE = "damaged"
 TURNS = 2
-"""Second replies, or returns of a setting to an earlier value, that show two drives."""
+"""Number of second replies, or of returns of a setting to an earlier value, that indicates two
+drives."""
 SLOW_REPLIES = 0.25
-"""Usual delay of the replies, in s, from which a missing one is taken for a late one."""
+"""Usual delay of the replies, in s, from which a missing reply counts as late."""
 RECENT = 6
-"""Requests back to which a frame may belong that came when none was due."""
+"""Number of last requests to which an unexpected frame may belong."""
 PROMPT = 0.15
-"""Seconds after a request within which a line that is one behind sends its older reply."""
+"""Seconds after a request within which a line that is one behind sends the older reply."""
 DIAGNOSE = 8
 TRANSACTION_BYTES = 2
-"""Bytes of Modbus TCP that name the request of a reply."""
+"""Length of the transaction identifier of Modbus TCP, in bytes."""
 
 
 @dataclass(slots=True)
@@ -40,42 +41,43 @@ class Measure:
     unreached: int = 0
     """Refusals of a gateway that did not reach the drive."""
     behind: int = 0
-    """Replies that fit the request before, and not their own."""
+    """Replies that match the previous request, and not their own."""
     second: int = 0
-    """Second replies to one request, with another content."""
+    """Second replies to one request with different content."""
     turns: int = 0
     """Times that a setting returned to an earlier value."""
     seconds: float = 0.0
     swapped: int = 0
-    """Values that make sense with their bytes swapped, and not as they are."""
+    """Values that are plausible only with their bytes swapped."""
     straight: int = 0
-    """Values of which the contrary is so."""
+    """Values that are plausible only without swapping."""
 
     def count(self, kind: str) -> int:
-        """The number of frames that were sick in this way."""
+        """Return the number of frames with this fault."""
         number: int = getattr(self, kind)
         return number
 
     @property
     def worst(self) -> str:
-        """The most frequent trouble; empty for none."""
+        """The most frequent fault; empty if there is none."""
         worst = max(SICK_KINDS, key=self.count)
         return worst if self.count(worst) else ""
 
     @property
     def two_drives(self) -> bool:
-        """True if two drives reply in turn, each with values of its own."""
+        """True if two drives reply in turn, each with its own values."""
         return self.second >= TURNS or (self.turns >= TURNS and self.damaged >= TURNS)
 
     @property
     def one_behind(self) -> bool:
-        """True if requests get the reply to the one before; a repeated one gets its own."""
+        """True if each request gets the reply to the one before, and a repeated request gets its
+        own."""
         return self.behind > 1 and self.behind > self.late and self.behind * 3 >= self.requested
 
     def decide(self, paused: Measure) -> None:
-        """Settle from reads with pauses if surplus replies are copies or a second drive's.
+        """Decide from reads with pauses if surplus replies are copies or a second drive's.
 
-        Without a pause, a copy may come during the next request and be taken for its reply.
+        Without a pause, a copy may arrive during the next request and be taken for its reply.
         """
         if paused.second >= TURNS:
             self.second = paused.second
@@ -92,10 +94,10 @@ class _Exchange:
     delay: float = 0.0
     """From the request to the first reply, in s."""
     sick: bool = False
-    """True if it brought something, though no reply."""
+    """True if bytes arrived, but no valid reply."""
     damaged: bool = False
     older: str = ""
-    """The kind of a reply to the request before that came at once, unless all are one behind."""
+    """Kind of an immediate reply to the previous request, unless all replies are one behind."""
 
 
 def measure_of(
@@ -107,10 +109,10 @@ def measure_of(
     echoes: bool = False,
     unreached: Collection[int] = (),
 ) -> Measure:
-    """The counts of the requests to a device among these frames, oldest first.
+    """Return the counts of the requests to a device among these frames, oldest first.
 
-    With `echoes` the adapter repeats what is sent, so that no echo by function 8 is judged.
-    `unreached` are the exceptions by which a gateway says that it did not reach the drive.
+    With `echoes`, the adapter repeats sent bytes, so that echoes by function 8 are not judged.
+    `unreached` are the exceptions by which a gateway reports that it did not reach the drive.
     """
     frames = list(frames)
     polled = {_body(item, tcp)[:1] for item in frames if item.direction == "out"}
@@ -144,7 +146,7 @@ def measure_of(
 
 
 def _end(found: Measure, exchange: _Exchange) -> None:
-    """Count an exchange that is over."""
+    """Count a completed exchange."""
     found.requested += 1
     found.answered += bool(exchange.replies)
     found.lost += not exchange.replies and not exchange.sick
@@ -164,7 +166,7 @@ def _is_echo(frame: Frame, body: bytes, exchange: _Exchange) -> bool:
 
 
 def _loose(found: Measure, exchange: _Exchange, frame: Frame) -> None:
-    """Bytes that form no frame: one damaged reply each."""
+    """Count bytes outside any frame: one damaged reply for each run."""
     found.damaged += 1
     exchange.damaged = True
     if frame.note == DAMAGED_NOTE or not exchange.replies:
@@ -172,7 +174,7 @@ def _loose(found: Measure, exchange: _Exchange, frame: Frame) -> None:
 
 
 def _whole(found: Measure, recent: Sequence[_Exchange], body: bytes, frame: Frame) -> None:
-    """A whole frame of the drive: the reply, or a surplus one of the last requests."""
+    """Count an intact frame of the drive: the reply, or a surplus one to a recent request."""
     now, before = recent[-1], recent[-2] if len(recent) > 1 else None
     due = not now.replies and not frame.note.startswith(LATE_NOTE)
     if due and may_answer(body, now.request):

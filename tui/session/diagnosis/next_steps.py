@@ -13,14 +13,14 @@ from .family import address_hint, as_factory, settings_hints, speed_hint, wiring
 from .garbled import likely_baud, other_formats, same_speed
 
 LATER = frozenset({5, 6})
-"""Exceptions by which a request is put off."""
+"""Exceptions that postpone a request."""
 NOT_KNOWN = frozenset({1, 2, 3})
-"""Exceptions by which what was asked is not known: function, register, value."""
+"""Exceptions that reject the function, the register or the value."""
 NAME_A_FAMILY = "Name the drive's profile: then the advice of its manual is shown here."
 
 
 def find_adapter(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A port whose adapter has another number now."""
+    """Steps if the adapter of the port now has another port number."""
     if sight.adapter.now:
         yield f"Open {sight.adapter.now}, or {sight.adapter.was}, which no replugging changes."
     else:
@@ -30,12 +30,12 @@ def find_adapter(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def accept_change(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A line that answers, and is not the one that it was."""
+    """Steps if the line answers, but differs from the stored one."""
     yield "Nothing but a stop is written meanwhile. If it is right, accept the line as it is now."
 
 
 def plug_in(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A port that is not there."""
+    """Steps if the port does not exist."""
     ports = sight.trouble.ports if isinstance(sight.trouble, PortMissing) else ()
     yield f"Ports found: {', '.join(ports)}." if ports else "No serial port was found."
     if sight.adapter.was:
@@ -44,7 +44,7 @@ def plug_in(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def get_permission(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A port that this user may not use."""
+    """Steps if the user may not open the port."""
     port = sight.port
     group, user = (port.group, port.user) if port is not None else ("", "")
     if port is not None and port.in_group:
@@ -61,7 +61,7 @@ def get_permission(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def free_port(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A port that another program has."""
+    """Steps if another program uses the port."""
     if sight.owner_frozen:
         yield "Let that program go on, or end it: kill -9 and its pid. Then the line is free."
         return
@@ -69,12 +69,12 @@ def free_port(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def other_port(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A port that cannot be opened as it is to be."""
+    """Steps if the port cannot be opened with the required settings."""
     yield "Try another adapter, or another baud and format: serial:PATH,BAUD,FORMAT."
 
 
 def reach_line(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A line that was lost, or a host that is not reached."""
+    """Steps if the line was lost, or the host is unreachable."""
     if isinstance(sight.link, SerialLink):
         yield "Check the adapter's plug; the line reopens automatically."
         return
@@ -82,19 +82,19 @@ def reach_line(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def wait(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A drive that is left alone on purpose."""
+    """Steps if polling of the drive is paused on purpose."""
     yield "Ask again when that is over."
 
 
 def hurry_adapter(sight: DiagnosticEvidence) -> Iterator[str]:
-    """An adapter that keeps bytes back."""
+    """Steps if the adapter delays received bytes."""
     name = os.path.basename(os.path.realpath(sight.path))
     yield f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
     yield "Nothing is wrong with the drive; each request costs that much more."
 
 
 def mend_settings(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A baud or a format that is not the drive's."""
+    """Steps if the baud or the format is not the drive's."""
     if hint := speed_hint(sight):
         yield hint
     if (likely := likely_baud(sight)) and isinstance(sight.link, SerialLink):
@@ -109,7 +109,7 @@ def mend_settings(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def end_silence(sight: DiagnosticEvidence) -> Iterator[str]:
-    """Nobody answers: the drive's address and settings, its port, its wires."""
+    """Steps if no device answers: check the drive's address and settings, its port, its wires."""
     if hint := speed_hint(sight):
         yield hint
     if sight.profile is None:
@@ -120,31 +120,31 @@ def end_silence(sight: DiagnosticEvidence) -> Iterator[str]:
         yield from search(sight)
         return
     hints = [address_hint(sight), *settings_hints(sight)]
-    # what is not as the drive left the factory is looked at first
+    # settings other than the factory settings come first
     yield from hints[1:] + hints[:1] if not as_factory(sight) else hints
     yield from search(sight)
     yield from wiring_hints(sight)
 
 
 def search(sight: DiagnosticEvidence) -> Iterator[str]:
-    """That the panel itself can look for the drive elsewhere."""
+    """Suggest a search for the drive by Drive Panel."""
     settings = ", --all-settings at other baud rates" if isinstance(sight.link, SerialLink) else ""
     yield f"drivepanel scan, or s on Line, looks for it at other addresses{settings}."
 
 
 def wait_longer(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A drive or a gateway that takes longer than is waited."""
+    """Steps if the drive or a gateway takes longer than the timeout."""
     yield "Write ,timeout=2 behind the line, seconds up to 30; a gateway may add much."
 
 
 def end_echo(sight: DiagnosticEvidence) -> Iterator[str]:
-    """An adapter that repeats what is sent, and nobody else."""
+    """Steps if the adapter repeats sent bytes, and no device answers."""
     yield "The adapter is right: it hears its own sending, so the wires up to it are not cut."
     yield from end_silence(sight)
 
 
 def end_damage(sight: DiagnosticEvidence) -> Iterator[str]:
-    """Answers that arrive broken."""
+    """Steps if replies arrive damaged."""
     if sight.broken:
         yield "A format that differs by its parity or stop bits breaks some characters only."
         yield from settings_hints(sight)
@@ -154,7 +154,7 @@ def end_damage(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def sort_addresses(sight: DiagnosticEvidence) -> Iterator[str]:
-    """Somebody else answers."""
+    """Steps if another address answers."""
     others = ", ".join(map(str, sight.heard.others))
     yield f"Ask for address {others}; or its answer is late: ,timeout=2 behind the line."
     yield "A gateway may be set to put another address in place of the one asked."
@@ -163,13 +163,13 @@ def sort_addresses(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def find_second_master(sight: DiagnosticEvidence) -> Iterator[str]:
-    """The drive answers somebody else's question."""
+    """Steps if the drive answers another master's request."""
     yield "Another master on this line asks the same drive: a line has one."
     yield "Or two drives have this address: switch one off and ask again."
 
 
 def ask_gateway(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A gateway that did not reach the drive."""
+    """Steps if the gateway did not reach the drive."""
     if 10 in sight.heard.exceptions:
         yield f"In the gateway: is address {sight.device} routed to its serial side?"
         return
@@ -179,7 +179,7 @@ def ask_gateway(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def ask_otherwise(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A drive that refuses a read."""
+    """Steps if the drive refuses a read."""
     code = sight.heard.exceptions[-1]
     if code in LATER:
         yield "Line, baud and format are right. Ask again: it, or a gateway before it, is at work."
@@ -196,25 +196,25 @@ def ask_otherwise(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def _any(names: tuple[str, ...]) -> str:
-    """Names of which one is right."""
+    """Join alternative names by "or"."""
     return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]
 
 
 def one_master(sight: DiagnosticEvidence) -> Iterator[str]:
-    """Another master on the line."""
+    """Steps if another master uses the line."""
     if details := sight.overheard.partition(". ")[2]:
         yield f"It asks {details[:1].lower()}{details[1:]}"
     yield "Stop the other master, or join it: a line has one. drivepanel listen shows what it asks."
 
 
 def open_what_works(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A gateway that speaks another protocol."""
+    """Steps if the gateway uses another protocol."""
     assert sight.works is not None
     yield f"Close the line and open {sight.works.line}, or set the gateway to Modbus TCP."
 
 
 def set_unit(sight: DiagnosticEvidence) -> Iterator[str]:
-    """A gateway that answers one unit only."""
+    """Steps if the gateway answers one unit only."""
     assert sight.works is not None
     yield f"Close the line and open {sight.works.line}. The only drive is device 1 there."
     yield (
@@ -224,34 +224,34 @@ def set_unit(sight: DiagnosticEvidence) -> Iterator[str]:
 
 
 def restart_converter(_sight: DiagnosticEvidence) -> Iterator[str]:
-    """A converter that is one reply behind."""
+    """Steps if the converter is one reply behind."""
     yield "Do not use this line: each value shown may be that of another register."
     yield "Restart the converter; set its receive timeout longer than the drive takes to reply."
 
 
 def part_drives(sight: DiagnosticEvidence) -> Iterator[str]:
-    """Two drives at one address."""
+    """Steps if two drives have one address."""
     yield f"Switch one of the drives at address {sight.device} off, and give the other its own."
 
 
 def swap_bytes(_sight: DiagnosticEvidence) -> Iterator[str]:
-    """Bytes that are swapped on the way."""
+    """Steps if bytes are swapped on the way."""
     yield "Send no command and no setting: in the gateway, switch the swapping of bytes off."
 
 
 def keep_connection(_sight: DiagnosticEvidence) -> Iterator[str]:
-    """A gateway that closes idle connections."""
+    """Steps if the gateway closes idle connections."""
     yield "Set the idle timeout of the gateway longer, or switch it off."
 
 
 def find_losses(_sight: DiagnosticEvidence) -> Iterator[str]:
-    """Replies that do not come."""
+    """Steps if replies are missing."""
     yield "Check the wires, their ends and the supply of the drive. Write ,timeout=2 after LINE."
     yield "Other work of the drive or gateway, or another master, makes it miss requests too."
 
 
 def end_copies(_sight: DiagnosticEvidence) -> Iterator[str]:
-    """Replies that come twice."""
+    """Steps if replies arrive twice."""
     yield "Check adapter, repeater and gateway: one of them sends each frame again."
     yield "Switch the drive off and run why again: a reply shows a second drive at its address."
 

@@ -1,4 +1,4 @@
-"""Troubles of a line that show while it is searched: an echo, and refusals of a gateway."""
+"""Faults of a line that show during a search: an echo, and refusals of a gateway."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .heard import ECHO_NOTE, REFUSED, TCP_HEAD
 
 
 class LineRemarks:
-    """Collects what the frames of a line show, by looks that are not too far apart."""
+    """Remarks on a line from its frames; call `look` often, as a line keeps few frames."""
 
     def __init__(self, line: ModbusLine) -> None:
         self._line = line
@@ -22,7 +22,7 @@ class LineRemarks:
         """Addresses that a gateway did not reach, by its exception."""
 
     def look(self) -> None:
-        """Take the frames since the last look."""
+        """Evaluate the frames since the last call."""
         tcp = isinstance(self._line.link, TcpLink)
         for frame in self._line.trace:
             if frame.time <= self._last or frame.direction == "out":
@@ -35,7 +35,7 @@ class LineRemarks:
 
     @property
     def texts(self) -> list[str]:
-        """A sentence for each trouble; none if there was none."""
+        """Return a sentence for each fault; none if there was none."""
         found = []
         if self._echoes:
             found.append(

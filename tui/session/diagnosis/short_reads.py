@@ -1,7 +1,7 @@
-"""Many short reads of one drive, of several shapes, so that each reply shows its request.
+"""Many short reads of one drive, of several shapes, so that each reply identifies its request.
 
 A line holds a request back while the late reply to a lost one could be taken for its own. So the
-shapes take turns: another length or function need not wait.
+shapes alternate: a request of another length or function need not wait.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from ..connect.identify import status_words_without_identification
 from .heard import TCP_HEAD
 
 FRAMES_AT_ONCE = 50
-"""Reads after which their frames are taken: a line keeps the last ones only."""
+"""Number of reads after which their frames are collected: a line keeps only the last frames."""
 CHECKED = 30
-"""Parameters of each shape whose values are looked at."""
+"""Number of parameters of each shape whose values are checked."""
 SMALL = 0x0FFF
-"""The greatest raw value of a parameter that shows whether its bytes are swapped."""
+"""Greatest raw value of a parameter that shows whether its bytes are swapped."""
 LONGEST_READ = 4
 """Words of the longest short read."""
 PATIENCE, SLOWER = 0.3, 4.0
 """Least wait for a reply in s, and the wait as a multiple of the quickest reply."""
 AFTER_A_MISS = 0.5
-"""Seconds without a request after a missing reply: one that is late comes then."""
+"""Seconds without a request after a missing reply, in which a late one may arrive."""
 MISSES_IN_A_ROW = 6
-"""Misses in a row that show the trouble; more would cost time only."""
+"""Consecutive misses that are enough for a verdict; more would only cost time."""
 DIAGNOSE, ECHO = 8, 0
 REGISTERS = 3
 
@@ -46,7 +46,8 @@ ReadOnce = Callable[[], Awaitable[None]]
 
 @dataclass(slots=True)
 class _Shape:
-    """Requests with replies of one form; `missed` is when one got no reply, in s."""
+    """Requests with replies of one form; `missed` is the time in s of the last one without a
+    reply."""
 
     asks: Sequence[ReadOnce]
     times: int = 0
@@ -55,26 +56,26 @@ class _Shape:
 
 @dataclass(slots=True)
 class ShortReads:
-    """Reads of one drive; nothing is written. `ended` is why they broke off, if they did."""
+    """Reads of one drive; nothing is written. `ended` is the reason if they ended early."""
 
     line: ModbusLine
     device: int
     profile: Profile | None
     values: dict[str, tuple[Parameter, list[int]]] = field(default_factory=dict)
-    """Values that were read of small settings, by code, oldest first."""
+    """Values read from settings with small values, by code, oldest first."""
     frames: list[Frame] = field(default_factory=list)
     ended: LineError | None = None
     seconds: float = 0.0
     """Seconds that the reads took."""
     last: float = 0.0
-    """Time of the last frame that was taken."""
+    """Time of the last collected frame."""
 
     async def read(
         self, reads: int, within: float, *, pause: float = 0.0, clean: int | None = None
     ) -> None:
-        """Read so many times, in turns of all shapes, for so long at most.
+        """Read so many times, in turns of all shapes, within a time limit in seconds.
 
-        `clean` reads are enough if nothing at all was wrong with them.
+        `clean` reads are enough if none had a fault.
         """
         shapes, held, sick = _shapes(self), self.line.timing.late_reply, _sick(self.line)
         began, misses = REAL_CLOCK.monotonic(), 0
@@ -116,25 +117,26 @@ class ShortReads:
 
     @property
     def patience(self) -> float | None:
-        """Seconds in which a reply is to begin; None before the first one."""
+        """Wait for the start of a reply in seconds; None before the first reply."""
         quickest = min(_delays(self.line.trace, self.device), default=None)
         return None if quickest is None else max(PATIENCE, SLOWER * quickest)
 
     def take_frames(self) -> None:
-        """Take the frames since the last look."""
+        """Collect the frames since the last call."""
         new = [frame for frame in self.line.trace if frame.time > self.last]
         if new:
             self.frames += new
             self.last = new[-1].time
 
     def note(self, parameters: Sequence[Parameter], words: Sequence[int]) -> None:
-        """Keep values that were read."""
+        """Store values that were read."""
         for parameter, raw in zip(parameters, words, strict=True):
             self.values.setdefault(parameter.code, (parameter, []))[1].append(raw)
 
     @property
     def swapped(self) -> tuple[int, int]:
-        """Settings that make sense with swapped bytes alone, and as they are alone."""
+        """Numbers of settings that are plausible only with swapped bytes, and only without
+        swapping."""
         swapped = straight = 0
         for parameter, raws in self.values.values():
             low, high = raw_range(parameter)
@@ -147,7 +149,7 @@ class ShortReads:
 
     @property
     def turns(self) -> int:
-        """The number of times that a setting returned to an earlier value."""
+        """Number of times that a setting returned to an earlier value."""
         return sum(
             raw != raws[at - 1] and raw in raws[: at - 1]
             for _, raws in self.values.values()
@@ -157,14 +159,14 @@ class ShortReads:
 
 
 def _sick(line: ModbusLine) -> int:
-    """The number of replies on the line so far that were not as they must be, or refusals."""
+    """Return the number of faulty replies and refusals on the line so far."""
     now = line.counters
     missed = now.timeouts + now.checksum + now.wrong + now.exceptions
     return missed + now.stale + now.resyncs + now.framing + now.parity + now.breaks
 
 
 def _delays(frames: Sequence[Frame], device: int) -> Iterator[float]:
-    """Seconds from requests to their replies."""
+    """Yield the seconds from each request to its reply."""
     for before, frame in pairwise(frames):
         replied = before.direction == "out" and frame.direction == "in" and not frame.note
         if replied and device in (before.data[0], *before.data[TCP_HEAD : TCP_HEAD + 1]):
@@ -176,7 +178,7 @@ def _longest_ago(shapes: Sequence[_Shape]) -> _Shape:
 
 
 def _shapes(reads: ShortReads) -> list[_Shape]:
-    """The shapes that the drive is known to understand; never none."""
+    """Return the shapes that the drive is known to support; never empty."""
     line, device, profile = reads.line, reads.device, reads.profile
 
     def read(parameters: Sequence[Parameter]) -> ReadOnce:
@@ -212,7 +214,7 @@ def _shapes(reads: ShortReads) -> list[_Shape]:
 
 
 def _runs(profile: Profile) -> list[list[tuple[Parameter, ...]]]:
-    """Small settings at adjacent addresses, by the length of the runs, from 1 on."""
+    """Settings with small values at adjacent addresses, by the length of the run, from 1."""
     small = {
         parameter.address: parameter
         for parameter in profile.parameters

@@ -1,4 +1,4 @@
-"""Verdicts from the shares of sick frames: the text of each, and its certainty; pure."""
+"""Verdicts from the shares of faulty frames: the text of each, and its certainty; pure."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from .measure import Measure
 
 CERTAIN, LIKELY, POSSIBLE = "certain", "likely", "possible"
 SURE_FROM, LIKELY_FROM = 5, 2
-"""Sick frames from which a verdict is certain, and likely."""
+"""Number of faulty frames from which a verdict is certain, and likely."""
 SWAPPED_FROM = 3
-"""Values that must make sense with swapped bytes alone."""
+"""Number of values that must be plausible only with swapped bytes."""
 
 
 def sureness(count: int) -> str:
-    """The certainty that so many sick frames give a verdict."""
+    """Return the certainty of a verdict by its number of faulty frames."""
     return CERTAIN if count >= SURE_FROM else LIKELY if count >= LIKELY_FROM else POSSIBLE
 
 
 @dataclass(frozen=True, slots=True)
 class SickFrames:
-    """One way in which frames are sick, as the verdict that it leads to."""
+    """Verdict for one kind of faulty frame."""
 
     kind: str
     rung: str
@@ -29,7 +29,7 @@ class SickFrames:
     others: tuple[str, ...]
 
     def fails(self, sight: DiagnosticEvidence) -> bool:
-        """True if most sick frames are of this kind."""
+        """True if most faulty frames are of this kind."""
         return sight.measure is not None and sight.measure.worst == self.kind
 
     def certainty(self, sight: DiagnosticEvidence) -> str:
@@ -67,7 +67,7 @@ SICK_FRAMES = (
 
 
 def says_sick(kind: SickFrames, sight: DiagnosticEvidence) -> str:
-    """The verdict with its share, and the others beside it."""
+    """Return the verdict with its share, and other faults."""
     measure = _measure(sight)
     count = measure.count(kind.kind)
     beside = [
@@ -80,7 +80,7 @@ def says_sick(kind: SickFrames, sight: DiagnosticEvidence) -> str:
 
 
 def says_two_drives(sight: DiagnosticEvidence) -> str:
-    """The verdict of two drives at one address."""
+    """Return the verdict of two drives at one address."""
     measure = _measure(sight)
     return (
         f"Two drives have address {sight.device}: {measure.requested} requests got"
@@ -89,13 +89,13 @@ def says_two_drives(sight: DiagnosticEvidence) -> str:
 
 
 def swapped(sight: DiagnosticEvidence) -> bool:
-    """True if values make sense with swapped bytes alone."""
+    """True if values are plausible only with swapped bytes."""
     measure = sight.measure
     return measure is not None and measure.swapped >= SWAPPED_FROM and not measure.straight
 
 
 def says_swapped(sight: DiagnosticEvidence) -> str:
-    """The verdict of swapped bytes."""
+    """Return the verdict of swapped bytes."""
     return (
         f"The bytes of each word are swapped: {_measure(sight).swapped} settings make sense only"
         " with their bytes changed over."

@@ -1,4 +1,4 @@
-"""The causes that show in many reads, and those of a gateway."""
+"""Checks that need many reads, and those of a gateway."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _works(sight: DiagnosticEvidence) -> Works:
 
 
 def _is_behind(sight: DiagnosticEvidence) -> bool:
-    """True if the line or the reads say so; no line that is one behind has surplus replies."""
+    """True if the line or the reads show it; a line that is one behind has no surplus replies."""
     count = sight.measure
     if count is None:
         return sight.behind
@@ -84,7 +84,7 @@ GATEWAY_RUNGS = (
         ("Another master asks the same drive.", "The replies come much later."),
     ),
 )
-"""Found without a reply on the line itself."""
+"""Checks that need no reply on the line itself."""
 SICK_RUNGS: tuple[Check, ...] = (
     Check(
         "two-drives",

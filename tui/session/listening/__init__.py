@@ -1,1 +1,2 @@
-"""Listening to a line on which others talk: which drives, which values, how well it goes."""
+"""Monitoring of a line with another master: its drives, their values, and the quality of
+polling."""

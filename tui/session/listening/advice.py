@@ -14,15 +14,15 @@ from .tally import DriveTally
 from .words import WordSpan, names_of_words
 
 WORTH_TELLING = 0.95
-"""Part of the present time on the wire that a shorter plan takes at most."""
+"""Greatest share of the present time on the wire that a reported shorter plan takes."""
 SAME_PACE = 2
-"""Reads that come at least once for so many of the most frequent belong to one cycle."""
+"""Reads count as one cycle if they occur at least once per this many of the most frequent read."""
 MILLISECONDS = "ms"
 
 
 @dataclass(frozen=True, slots=True)
 class ShorterPlan:
-    """Reads of a master's cycle, and those that bring the same values in less time."""
+    """Reads of a master's cycle, and those that return the same values in less time."""
 
     now: tuple[WordSpan, ...]
     now_seconds: float
@@ -31,9 +31,9 @@ class ShorterPlan:
 
 
 def shorter_plan(profile: Profile, drive: DriveTally, timing: WireTiming) -> ShorterPlan | None:
-    """A shorter plan for what a master reads of a drive again and again; None where none is.
+    """Return a shorter plan for the repeated reads of a master; None if there is none.
 
-    Reads of words that no parameter of the family has are left as they are.
+    Reads of words that no parameter of the family has stay unchanged.
     """
     often = max((read.times for read in drive.reads.values()), default=0)
     if often < SAME_PACE:
@@ -59,32 +59,33 @@ def _readable(profile: Profile, code: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Feeding:
-    """A drive's communication timeout, against how long nobody asked it; times in seconds."""
+    """Margin of a drive's communication timeout over the longest pause in polling; times in
+    seconds."""
 
     code: str
     seconds: float | None
-    """None where it is off."""
+    """Timeout in seconds; None if it is off."""
     known: Literal["heard", "factory"]
     begun: bool
-    """False where it begins with a first command, and none was heard."""
+    """False if it begins with a first command, and none was observed."""
     longest_pause: float
 
     @property
     def margin(self) -> float | None:
-        """Seconds that were left at the worst moment; below zero it ran out."""
+        """Least seconds left before the timeout; negative if it expired."""
         return None if self.seconds is None else self.seconds - self.longest_pause
 
     @property
     def fed(self) -> bool | None:
-        """True if it never ran out; None where it is off."""
+        """True if it never expired; None if it is off."""
         return None if self.margin is None else self.margin > 0
 
 
 def feeding(profile: Profile, drive: DriveTally, now: float) -> Feeding | None:
-    """Return how a drive's timeout is kept from running out; None if it has none, or is unknown.
+    """Return the margin of a drive's timeout; None if it has none, or it is unknown.
 
-    Values that the drive has reported to any program precede its factory setting; of several
-    timeouts the shortest counts.
+    Values reported to any program take precedence over the factory setting; of several timeouts the
+    shortest counts.
     """
     rules = profile.data.communication_fault
     if rules is None or not rules.timeout or drive.fed is None:

@@ -1,4 +1,4 @@
-"""A line that is monitored in a thread of its own, for a screen that reads it now and then."""
+"""Line monitored in a thread of its own, for a screen that reads it periodically."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from .place import PlaceToListen, line_to_listen
 from .summary import ListeningSummary
 
 FRAMES_HEARD = 1000
-"""Frames that are kept."""
+"""Number of frames that are kept."""
 READ_WITHIN = 0.1
-"""Seconds within which it ends when that is wanted."""
+"""Seconds within which monitoring ends after a request."""
 SUMMED_UP_EVERY = 1.0
-"""Seconds for which a summary is good: it costs a read plan a drive."""
+"""Seconds for which a summary is reused: it needs one read plan per drive."""
 
 log = logging.getLogger(__name__)
 
 
 class HeardLine:
-    """Opened by `open`; everything may be looked at from any thread.
+    """Monitored line, opened by `open`; every attribute may be read from any thread.
 
-    `named` gives profiles by device, with None for that of all others.
+    `named` gives profiles by device, with None as the key for all others.
     """
 
     def __init__(
@@ -48,10 +48,10 @@ class HeardLine:
         self._trace = Trace(FRAMES_HEARD)
         self._summed: tuple[float, ListeningSummary] | None = None
         self.trouble = ""
-        """Why it has ended without a command; empty while it goes on."""
+        """Error that ended monitoring; empty while it runs or after `close`."""
 
     def open(self) -> None:
-        """Open the line and begin; reads files. Raises as `line_to_listen` does."""
+        """Open the line and start monitoring; reads files. Raises as `line_to_listen` does."""
         with ExitStack() as opening:
             place: PlaceToListen = opening.enter_context(line_to_listen(self.text, self._program))
             self.link: Link = place.line.link
@@ -65,7 +65,7 @@ class HeardLine:
         self._thread.start()
 
     def close(self) -> None:
-        """Give the port back; may be called twice."""
+        """Release the port; may be called twice."""
         self._over.set()
         if self._thread is not None:
             self._thread.join()
@@ -77,7 +77,7 @@ class HeardLine:
         return self._trace.frames()
 
     def summary(self) -> ListeningSummary:
-        """Return the result; at most a second old."""
+        """Return the summary; at most a second old."""
         with self._lock:
             now = self._hearing.clock.monotonic()
             if self._summed is None or now - self._summed[0] > SUMMED_UP_EVERY:
@@ -85,13 +85,13 @@ class HeardLine:
             return self._summed[1]
 
     def profile(self, device: int) -> Profile | None:
-        """The profile that a drive is taken for now."""
+        """Return the profile at present assumed for a drive."""
         with self._lock:
             family = self._families.family(device)
         return family.profile if family is not None else None
 
     def raws(self, device: int) -> Mapping[str, int]:
-        """The last raw value of each parameter that was heard of a drive."""
+        """Return the last observed raw value of each parameter of a drive."""
         with self._lock:
             tally = self._hearing.listener.tally.drives.get(device)
             return dict(tally.raws) if tally is not None else {}

@@ -1,6 +1,6 @@
-"""Which family a drive is of that others talk to: named, as it says itself, remembered, or likely.
+"""Family of a drive polled by another master: named, self-reported, remembered, or likely.
 
-What is inferred goes by what the drive answers: addresses that a family knows, functions, the
+The likely family follows from the drive's answers: addresses that a family has, functions, the
 longest read.
 """
 
@@ -21,17 +21,17 @@ from .words import identity_objects, spans_of
 
 How = Literal["named", "identified", "remembered", "likely"]
 NO_SUCH_FUNCTION, NO_SUCH_ADDRESS = 1, 2
-"""Codes of exceptions."""
+"""Exception codes."""
 
 
 @dataclass(frozen=True, slots=True)
 class AssumedProfile:
-    """The profile that a drive is taken by, and why."""
+    """Assumed profile of a drive, and its source."""
 
     profile: Profile
     how: How
     others: tuple[str, ...] = ()
-    """Ids of profiles that fit as well."""
+    """Ids of other profiles that fit equally."""
 
 
 @dataclass(slots=True)
@@ -39,7 +39,7 @@ class _Evidence:
     """Answers of a drive so far."""
 
     answered: set[tuple[int, int]] = field(default_factory=set)
-    """Function and address of each word."""
+    """Function and address of each answered word."""
     lacking: set[tuple[int, int]] = field(default_factory=set)
     functions: set[int] = field(default_factory=set)
     unknown_functions: set[int] = field(default_factory=set)
@@ -48,13 +48,13 @@ class _Evidence:
 
     @property
     def size(self) -> int:
-        """Grows whenever something is added."""
+        """Number of facts; grows with each new one."""
         words, functions = len(self.answered) + len(self.lacking), len(self.functions)
         return words + functions + len(self.unknown_functions) + self.longest
 
 
 def remembered_families(link: Link) -> dict[int, str]:
-    """By device, ids of the profiles of drives that answered on a line when it was used last."""
+    """Return, by device, profile ids of drives that answered on a line at its last use."""
     key = line_name(link).key
     mark = load_memory().lines.get(key) if key else None
     found = {}
@@ -66,7 +66,7 @@ def remembered_families(link: Link) -> dict[int, str]:
 
 
 class Families:
-    """The families of the drives of one line; learns from what is heard."""
+    """Families of the drives on one line, learned from observed exchanges."""
 
     def __init__(
         self,
@@ -79,12 +79,12 @@ class Families:
         self._remembered = remembered or {}
         self._evidence: dict[int, _Evidence] = {}
         self._likely: dict[int, tuple[int, AssumedProfile | None]] = {}
-        """By device, how much was known, and the result."""
+        """By device, the number of facts used, and the result."""
         self.identities: dict[int, DriveIdentity] = {}
-        """Drives that have identified themselves to any program."""
+        """Identities that drives have reported to any program."""
 
     def family(self, device: int) -> AssumedProfile | None:
-        """Return the present guess of a drive's family; None if nothing indicates one."""
+        """Return the likely family of a drive; None if nothing indicates one."""
         named = self._named.get(device) or self._named.get(None)
         if named is not None:
             return AssumedProfile(named, "named")
@@ -97,7 +97,7 @@ class Families:
         return self._inferred(device)
 
     def note(self, exchange: HeardExchange) -> None:
-        """Learn from an exchange."""
+        """Add the facts of an exchange."""
         if (objects := identity_objects(exchange)) is not None:
             reported = identity_from(exchange.device, objects)
             if reported.reference or exchange.device not in self.identities:
@@ -148,7 +148,7 @@ def _score(evidence: _Evidence, profile: Profile) -> float:
     reported = _words(profile)
     hits = len(evidence.answered & reported)
     misses = len(evidence.answered) - hits
-    # an address that is refused may be one that this model, or this moment, does not have
+    # a refused address may be one that this model lacks, or that is unavailable at the moment
     doubts = len(evidence.lacking & reported) + len(evidence.unknown_functions & functions)
     weight = 0.5 if profile.data.reading.gaps_readable else 1.0
     return hits - weight * misses - 0.5 * doubts

@@ -1,4 +1,4 @@
-"""Listening to an opened line: reading what comes, a step at a time, and summing it up."""
+"""Step-by-step monitoring of an open line, with a summary."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OnExchange = Callable[[ToldExchange], None]
 
 
 class Hearing:
-    """One line that is listened to; times are those of its clock."""
+    """Monitored line; times are those of its clock."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Hearing:
         return data, self.clock.monotonic()
 
     def take(self, data: bytes, now: float) -> None:
-        """Report the conclusions from the bytes read, or from a pause without bytes."""
+        """Report the exchanges completed by the bytes read, or by a pause without bytes."""
         found = self.listener.take(data, now) if data else self.listener.idle(now)
         for exchange in found:
             self._report(exchange)

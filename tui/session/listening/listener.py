@@ -1,4 +1,4 @@
-"""Listening at work: bytes in, exchanges with their values out, and all of it counted."""
+"""Listener from bytes to counted exchanges with their values."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .tally import LineTally
 from .words import HeardValue, values_of
 
 SHORTEST_PAUSE = 0.05
-"""Seconds without a byte that end a frame: an adapter may hand over the rest so much later."""
+"""Seconds without a byte that end a frame: an adapter may deliver the rest this much later."""
 BESIDE_SILENCE = 0.02
 LONG_FOR_AN_ANSWER = 0.5
-"""Seconds after which a request that is open at the end counts as not answered."""
+"""Seconds after which a request that is still open at the end counts as unanswered."""
 
 FrameHeard = Callable[[HeardFrame, bool | None], None]
-"""Takes each frame, with whether it is a request; None of bytes that form no frame."""
+"""Receives each frame; True for a request, False for a reply, None for bytes outside any frame."""
 
 
 @dataclass(frozen=True, slots=True)
 class ToldExchange:
-    """An exchange in the words of its drive's family."""
+    """Exchange interpreted by its drive's family."""
 
     exchange: HeardExchange
     family: AssumedProfile | None
@@ -33,15 +33,14 @@ class ToldExchange:
 
     @property
     def profile(self) -> Profile | None:
-        """The profile that explains it."""
+        """The profile used for the interpretation."""
         return self.family.profile if self.family is not None else None
 
 
 class LineListener:
-    """Reports the traffic on one line; `character` and `silence` are the line's, in seconds.
+    """Listener to the traffic on one line; `character` and `silence` are the line's, in seconds.
 
-    Times are those of a monotonic clock. A character of 0 is that of a line whose pauses cannot be
-    measured.
+    Times are those of a monotonic clock. A `character` of 0 means that pauses cannot be measured.
     """
 
     def __init__(
@@ -58,22 +57,23 @@ class LineListener:
         self.silence = silence
         self.character = character
         self.pause = max(SHORTEST_PAUSE, silence + BESIDE_SILENCE)
-        """Seconds without a byte after which `idle` is to be called."""
+        """Seconds without a byte after which `idle` must be called."""
         self._heard = frame_heard
         self._pairing = Pairing()
         self._splitter = FrameSplitter(character, self._pairing.is_due)
 
     def take(self, data: bytes, time: float) -> list[ToldExchange]:
-        """Bytes that were read at a time; the exchanges that are known by now."""
+        """Process bytes read at a time; return the exchanges completed so far."""
         return self._report(self._splitter.take(data, time))
 
     def idle(self, now: float) -> list[ToldExchange]:
-        """No byte came for a pause: what ends with it, and what is not answered any more."""
+        """Process a pause without bytes; return the exchanges that it completes or leaves
+        unanswered."""
         found = self._report(self._splitter.pause())
         return found + [self._tell(exchange) for exchange in self._pairing.wait(now)]
 
     def end(self, now: float) -> list[ToldExchange]:
-        """Nothing more is heard: a request that waits for its answer since long has none."""
+        """End monitoring; a request that has waited long for its reply counts as unanswered."""
         found = self._report(self._splitter.pause())
         return found + [
             self._tell(exchange) for exchange in self._pairing.wait(now, LONG_FOR_AN_ANSWER)

@@ -1,4 +1,4 @@
-"""The line that is meant to be listened to, opened: a port, or simulated drives with a master."""
+"""Opening of a line for monitoring: a port, or simulated drives with a master."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ..connect.share_place import share_place, this_program
 
 
 class NothingToHear(LineError):
-    """A line on which nobody can hear what others say."""
+    """The line cannot be monitored for other masters' traffic."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceToListen:
-    """An opened line, and what is to be done once all is ready for what comes."""
+    """Open line, and the action once monitoring is ready."""
 
     line: ListeningLine
     begin: Callable[[], None] = lambda: None
@@ -28,9 +28,10 @@ class PlaceToListen:
 
 @contextmanager
 def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
-    """The line that is meant, opened for a program of that name.
+    """Open the line of a text for monitoring, for a program of that name.
 
-    Raises NothingToHear unless it is a serial line, LinkSyntaxError, and those of ListeningLine.
+    Raises NothingToHear unless it is a serial line, LinkSyntaxError, and the errors of
+    ListeningLine.
     """
     if text.casefold().startswith(SIMULATED_PREFIX):
         with _simulated(text, program) as place:
@@ -48,7 +49,7 @@ def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
 
 @contextmanager
 def _simulated(text: str, program: str) -> Iterator[PlaceToListen]:
-    """Simulated drives with a master that asks them, as soon as it is listened to."""
+    """Simulated drives with a master that polls them once monitoring is ready."""
     from tui.simulator import PlcOnLine, Simulation, parse_drives, plc_cycle
 
     with Simulation(parse_drives(text[len(SIMULATED_PREFIX) :])) as simulation:

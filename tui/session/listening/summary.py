@@ -1,4 +1,4 @@
-"""Result of listening: commander of each drive, quality of polling, errors."""
+"""Result of monitoring: commander of each drive, quality of polling, errors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .listener import LineListener
 from .tally import DriveTally, LineTally, WriteTally
 
 CODES_SHOWN = 6
-"""Parameters of a list that are named; the others are counted."""
+"""Number of parameters of a list that are named; the others are counted."""
 HOW_SURE = {
     "named": "as -p says",
     "identified": "as it says itself",
@@ -26,36 +26,36 @@ HOW_SURE = {
 
 @dataclass(frozen=True, slots=True)
 class DriveSummary:
-    """One drive: what was counted, and what follows from it."""
+    """Counts and conclusions for one drive."""
 
     tally: DriveTally
     family: AssumedProfile | None
     pace: float | None
-    """Requests a second."""
+    """Requests per second."""
     feeding: Feeding | None
     shorter: ShorterPlan | None
 
     @property
     def silent(self) -> bool:
-        """True if it has answered nothing at all."""
+        """True if the drive answered no request."""
         return not self.tally.answered
 
 
 @dataclass(frozen=True, slots=True)
 class ListeningSummary:
-    """The whole line, over so many seconds."""
+    """Summary of a line over a number of seconds."""
 
     seconds: float
     tally: LineTally
     load: float | None
-    """Part of the time in which there were bytes on the line; None where that is not known."""
+    """Share of the time with bytes on the line; None if unknown."""
     drives: tuple[DriveSummary, ...]
     reports_silences: bool
     """True if pauses between bytes could be measured."""
 
 
 def summary_of(listener: LineListener, now: float, timing: WireTiming) -> ListeningSummary:
-    """Return the present result of listening; `timing` is that of the line."""
+    """Return the present summary; `timing` is that of the line."""
     tally = listener.tally
     seconds = max(0.0, now - tally.begun)
     busy = tally.bytes * listener.character
@@ -124,7 +124,7 @@ def _drive_lines(drive: DriveSummary) -> Iterator[str]:
 
 
 def family_text(family: AssumedProfile | None) -> str:
-    """A family, and how sure that is."""
+    """Return a family, with its certainty."""
     if family is None:
         return "family not known; -p names it"
     or_ = f", or {', '.join(family.others)}" if family.others else ""
@@ -167,7 +167,7 @@ def _writes_text(writes: dict[str, WriteTally]) -> str:
 
 
 def feeding_text(feeding: Feeding) -> str:
-    """Return whether polling keeps a drive's timeout from running out, and by what margin."""
+    """Return a text on a drive's timeout: whether polling prevents it, and with what margin."""
     heard = feeding.known == "heard"
     known = "as heard" if heard else "factory setting; its own was not heard"
     if feeding.seconds is None or feeding.margin is None:

@@ -1,4 +1,4 @@
-"""Counts of the traffic so far: of the line, and of each drive on it."""
+"""Counts of the observed traffic: of the line, and of each drive on it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from tui.wire.heard.splitting import HeardFrame
 from .words import HeardValue, WordSpan, spans_of
 
 CUT_BY = 0.002
-"""Seconds past the silence that a pause inside a frame has to have to count: readings are late."""
+"""Seconds by which a pause inside a frame must exceed t3.5 to count: bytes are read late."""
 TOO_SOON = 0.5
-"""Part of the silence that a pause between two frames has to have, for the same reason."""
+"""Share of t3.5 below which a pause between two frames counts as too short, for the same reason."""
 DECIDING = frozenset(
     {
         "command_word",
@@ -28,16 +28,17 @@ DECIDING = frozenset(
         "command_speed",
     }
 )
-"""Quantities that decide what the motor does."""
+"""Quantities that control the motor."""
 NOBODY_WAITS_SO_SHORT = 0.01
-"""Seconds in which no master gives up an answer and continues: another one did."""
+"""Seconds within which no master abandons a reply and continues: another master sent the
+request."""
 READS_KEPT = 500
-"""Different reads of one drive that are counted one by one."""
+"""Number of different reads of one drive that are counted separately."""
 
 
 @dataclass(slots=True)
 class WriteTally:
-    """One parameter that was written, as often as it was."""
+    """Writes of one parameter."""
 
     parameter: Parameter | None
     commands: bool
@@ -56,7 +57,7 @@ class WriteTally:
 
 @dataclass(slots=True)
 class ReadTally:
-    """One read, as often as it was asked."""
+    """One read, with its count."""
 
     span: WordSpan
     times: int = 0
@@ -82,7 +83,7 @@ class DriveTally:
     reads: dict[WordSpan, ReadTally] = field(default_factory=dict)
     writes: dict[str, WriteTally] = field(default_factory=dict)
     raws: dict[str, int] = field(default_factory=dict)
-    """The last raw value of each parameter."""
+    """Last raw value of each parameter by code."""
     turnaround_sum: float = 0.0
     turnaround_least: float = float("inf")
     turnaround_most: float = 0.0
@@ -97,12 +98,12 @@ class DriveTally:
 
     @property
     def answered(self) -> int:
-        """Requests that it answered, or refused."""
+        """Number of requests that the drive answered or refused."""
         return self.answers["ok"] + self.answers["exception"]
 
     @property
     def turnaround(self) -> float | None:
-        """Seconds on average; None where it has answered nothing."""
+        """Mean seconds; None if the drive answered nothing."""
         return self.turnaround_sum / self.answered if self.answered else None
 
     def pause_until(self, now: float) -> float:
@@ -112,7 +113,7 @@ class DriveTally:
     def take(
         self, exchange: HeardExchange, values: Sequence[HeardValue], profile: Profile | None
     ) -> None:
-        """Count an exchange of this drive."""
+        """Count an exchange of this drive with its values."""
         self.answers[exchange.answer] += 1
         if exchange.answer in ("again", "unasked"):
             return
@@ -153,7 +154,7 @@ class DriveTally:
 
 
 def decides(profile: Profile | None, parameter: Parameter | None) -> bool:
-    """Return True if a parameter decides what the motor does."""
+    """Return True if a parameter controls the motor."""
     if profile is None or parameter is None:
         return False
     commands = {chart.command for chart in profile.data.charts if chart.command}
@@ -174,20 +175,21 @@ class LineTally:
     noises: int = 0
     noise_bytes: int = 0
     together: int = 0
-    """Frames that came in one reading with the one before, so that their pause is not known."""
+    """Frames read together with the one before, so that the pause between them is unknown."""
     cut: int = 0
-    """Frames with a pause inside that is longer than the silence which ends one."""
+    """Frames with a pause inside that is longer than t3.5."""
     longest_cut: float = 0.0
-    """That pause in seconds."""
+    """Longest such pause in seconds."""
     hasty: int = 0
-    """Frames that began before the silence after another was over."""
+    """Frames that began before the t3.5 after another had passed."""
     exchanges: int = 0
     crossed: int = 0
-    """Requests that began while another waited for its answer."""
+    """Requests that began while another awaited its reply."""
     drives: dict[int, DriveTally] = field(default_factory=dict)
 
     def take_frame(self, frame: HeardFrame, silence: float) -> None:
-        """Count a frame, or noise; `silence` is what has to lie between two, in seconds, or 0."""
+        """Count a frame, or noise; `silence` is the required pause between two frames in seconds,
+        or 0."""
         self.bytes += len(frame.data)
         if not frame.whole:
             self.noises += 1

@@ -1,4 +1,4 @@
-"""An exchange that was heard, in a sentence."""
+"""Description of an observed exchange, in a sentence."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from .summary import exception_meaning
 from .words import FUNCTION_NAMES, WHO, HeardValue, names_of_words, spans_of
 
 CODES_TOLD_AT_MOST = 4
-"""Parameters of a request that are named where it brought no values."""
+"""Number of parameters of a request that are named if it returned no values."""
 FUNCTION_WIDTH = 6
 
 
 def function_name(function: int) -> str:
-    """A function as a person calls it."""
+    """Return the common name of a function."""
     return FUNCTION_NAMES.get(function, f"function {function}")
 
 
 def requested_names(reported: ToldExchange) -> list[str]:
-    """The parameters that a request names, each once; addresses where none is known."""
+    """Return the parameters that a request names, each once; addresses for unknown ones."""
     spans = spans_of(reported.exchange.request)
     found = (name for span in spans for name in names_of_words(span, reported.profile))
     return list(dict.fromkeys(found))
 
 
 def exchange_text(reported: ToldExchange, families: Families) -> str:
-    """Device, function, and the values or the result; control characters as signs."""
+    """Return device, function, and the values or the result; control characters are replaced."""
     exchange = reported.exchange
     head = f"{exchange.device or 'all':>3} {function_name(exchange.function):<{FUNCTION_WIDTH}}"
     return plain(f"{head} {_what(reported, families)}".rstrip())

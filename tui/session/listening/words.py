@@ -154,6 +154,6 @@ def identity_objects(exchange: HeardExchange) -> IdentificationObjects | None:
         number, length = reply[at], reply[at + 1]
         content = reply[at + 2 : at + 2 + length]
         if objects.setdefault(number, content) != content:
-            return None  # two contents decide nothing
+            return None  # two different contents are ambiguous
         at += 2 + length
     return IdentificationObjects(reply[3], objects)

@@ -1,1 +1,1 @@
-"""The proof of communication loss: does a drive react to a silent line as it is set to?"""
+"""Test of a drive's reaction to communication loss."""

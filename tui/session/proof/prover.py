@@ -1,6 +1,6 @@
-"""Lets a drive alone for longer and longer, and sees after which silence it has reacted.
+"""Test of a drive's communication timeout by pauses in polling of growing length.
 
-To ask a drive feeds it, so one silence cannot be timed: each ends with one read.
+A read restarts the drive's timeout, so one pause cannot be timed: each ends with one read.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from .silences import Bracket, silences
 
 LEFT_ALONE_FOR_PROOF = "Its communication timeout is being tested: polling is paused."
 LOOK_FOR_STOP = 0.05
-"""Seconds between two looks, in a silence, whether a stop was given."""
+"""Seconds between two checks, during a pause, for a stop command."""
 RECONNECTED_BY_THEN = 10.0
-"""Seconds for which a line may be lost after a silence before the proof ends."""
+"""Seconds for which a line may be lost after a pause before the test ends."""
 REACTION_SHOWS_AFTER = 0.3
-"""Seconds that a drive has for its reaction to show, before it is read with all words."""
+"""Seconds after which a drive's reaction shows, before all its words are read."""
 SLOWER = 0.8
-"""Share of the frequency before below which a motor that turned is slowing down."""
+"""Share of the previous frequency below which a turning motor counts as slowing down."""
 
 
 class NothingToProve(DriveError):
@@ -42,7 +42,7 @@ class NothingToProve(DriveError):
 
 
 def hidden_at_rest(reaction: Reaction | None) -> str:
-    """Why a reaction does not show on a motor at rest; empty where it does, or is not known."""
+    """Return why a reaction does not show at standstill; empty if it shows or is unknown."""
     if reaction is None or reaction.trips:
         return ""
     return (
@@ -52,7 +52,7 @@ def hidden_at_rest(reaction: Reaction | None) -> str:
 
 
 def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) -> str:
-    """Why there is nothing to prove, by what each port of the drive has told of its timeout."""
+    """Return why there is nothing to test, from the timeout reported for each port."""
     ports = (rules.timeout, *rules.other_timeouts)
     silent = " and ".join(code for code in ports if code not in reported)
     missing = f"{silent} cannot be read: perhaps this drive has no such word"
@@ -65,7 +65,7 @@ def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) ->
 
 @dataclass(slots=True)
 class Prover:
-    """One proof of one drive; The callback gets the progress."""
+    """One timeout test of one drive; the callback receives the progress."""
 
     session: DriveSession
     journal: Journal
@@ -78,10 +78,10 @@ class Prover:
         self._reader = Reader(self.session)
 
     async def prove(self) -> ProofResult:
-        """Prove the communication timeout of the drive.
+        """Test the communication timeout of the drive.
 
-        Raises NothingToProve, OrderRefused where the drive is not fit for it, Stopped where a stop
-        came, and the line's errors. Whatever happens others may ask the drive again afterwards.
+        Raises NothingToProve, OrderRefused if the drive is not ready for the test, Stopped if a
+        stop arrives, and the line's errors. In every case, polling by others resumes afterwards.
         """
         session, facts = self.session, self.session.line.facts
         rules = session.profile.data.communication_fault
@@ -115,7 +115,8 @@ class Prover:
 
     @staticmethod
     def _timeout(rules: CommunicationFault, reported: dict[str, Reading]) -> float:
-        """The shortest that is not off; raises NothingToProve where all are."""
+        """The shortest timeout that is not off, in seconds; raises NothingToProve if all are
+        off."""
         running = [
             s
             for reading in reported.values()
@@ -140,7 +141,7 @@ class Prover:
         return list(dict.fromkeys(code for code in codes if code))
 
     async def _read(self, codes: list[str]) -> dict[str, Reading]:
-        # as a part of a stop: those alone pass where a drive is left alone
+        # with the priority of a stop: only stops pass while polling is paused
         return await self._reader.read(codes, priority=Priority.STOP)
 
     @staticmethod
@@ -149,7 +150,8 @@ class Prover:
         return next((reaction for reaction in rules.reactions if reaction.raw == raw), None)
 
     def _check_fit(self, state: DriveState, reaction: Reaction | None) -> None:
-        """Raise OrderRefused where nothing could be proved, or more than was asked for."""
+        """Raise OrderRefused if nothing could be tested, or if the motor would do more than
+        requested."""
         if state.kind == "fault":
             raise OrderRefused("The drive is in a fault already: reset it first.")
         if state.kind == "unknown":
@@ -166,13 +168,14 @@ class Prover:
             raise OrderRefused(why)
 
     async def _begin_watch(self, rules: CommunicationFault) -> None:
-        """Give a command that moves nothing, if the watch begins with the first command."""
+        """Send a command that moves nothing, if the drive's timeout begins with the first
+        command."""
         word = rules.begins_with
         chart = self.session.profile.chart(self.session.image.raws)
         if word is None or chart is None or self.turning:
             return
         self.permit.check()
-        # no permit: the reads that go with one would be held, as everybody else's are
+        # no permit: the reads that accompany one would be held, like those of other programs
         writer = Writer(self.session, self.journal, None)
         await writer.write_parameter(
             self.session.profile[chart.command],
@@ -183,7 +186,7 @@ class Prover:
         )
 
     async def _check_same(self, rules: CommunicationFault, began: dict[str, Reading]) -> None:
-        """Raise OrderRefused where somebody set the drive otherwise while it was proved."""
+        """Raise OrderRefused if a setting of the drive changed during the test."""
         ports = (rules.timeout, *rules.other_timeouts, rules.reaction)
         now = await self._read([code for code in ports if code and code in began])
         for code in now:
@@ -230,9 +233,9 @@ class Prover:
         return await self._result(rules, timeout, reaction, bracket, "", changed)
 
     async def _read_after_silence(self) -> dict[str, Reading]:
-        """Read the state. A gateway may close a connection without requests: then once it is back.
+        """Read the state; if a gateway closed the idle connection, read after it reconnects.
 
-        The drive is not read in between, so its silence only lasts longer. Raises LineLost if the
+        The drive is not read in between, so its pause only becomes longer. Raises LineLost if the
         line stays lost.
         """
         clock = self.session.clock
@@ -249,7 +252,7 @@ class Prover:
             await self._silence(clock.monotonic() + LOOK_FOR_STOP)
 
     def _check_rest(self, state: DriveState) -> None:
-        """Raise OrderRefused where a motor turns by now that was at rest: nobody agreed to that."""
+        """Raise OrderRefused if a motor that was at standstill turns now: nobody agreed to that."""
         if not self.turning and state.motion in ENABLED_KINDS:
             raise OrderRefused(
                 "The motor began to turn: the test has ended, and the drive is polled again."

@@ -1,4 +1,4 @@
-"""A proof in the journal, for the report."""
+"""Journal entry of a timeout test, for the report."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .result import ProofResult
 
 
 def proof_entry(session: DriveSession, result: ProofResult) -> Entry:
-    """The entry of a proof: nothing was written, `new` says what came of it."""
+    """The journal entry of a test: nothing was written, `new` holds the result."""
     rules = session.profile.data.communication_fault
     code = rules.timeout if rules else ""
     address = session.profile[code].address if code else 0

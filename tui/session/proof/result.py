@@ -9,39 +9,39 @@ from tui.drive.profile.schema import Reaction
 from .silences import Bracket
 
 UNNAMED_FAULT = "a fault"
-"""One whose code the drive does not report."""
+"""Fault whose code the drive does not report."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProofResult:
-    """One proof of one drive."""
+    """Result of one timeout test of one drive."""
 
     device: int
     configured: float
-    """The communication timeout that is set, in seconds."""
+    """The configured communication timeout in seconds."""
     reaction: Reaction | None
-    """The reaction that is set; None where the family has none to set, or it is not known."""
+    """The configured reaction; None if the family has none to set, or it is unknown."""
     bracket: Bracket
     turning: bool
     """True if the motor turned."""
     seen: str = ""
     """Observed reaction of the drive; empty if it did nothing."""
     fault: str = ""
-    """The fault that it is in now, as `SLF1, Modbus communication`."""
+    """The present fault, as `SLF1, Modbus communication`."""
     expected_fault: str = ""
-    """The fault that it should be in."""
+    """The expected fault."""
     changed: str = ""
     """Settings that differ from the earlier reading, as a sentence."""
 
     @property
     def as_set(self) -> bool:
-        """True if it did what it is set to, when it is set to."""
+        """True if the drive reacted as configured, at the configured time."""
         right = not self.expected_fault or self.fault == self.expected_fault
         return bool(self.seen) and right and self.bracket.holds(self.configured)
 
     @property
     def short(self) -> str:
-        """The proof in a few words."""
+        """Short text of the result."""
         middle = self.bracket.measured
         if middle is None:
             return "PROVED: NO REACTION"
@@ -49,7 +49,7 @@ class ProofResult:
 
     @property
     def text(self) -> str:
-        """The proof in a sentence or two, for a person and the report."""
+        """The result in one or two sentences, for a person and the report."""
         middle = self.bracket.measured
         if middle is None:
             return (
