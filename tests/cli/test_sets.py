@@ -19,6 +19,8 @@ import pytest
 from tests.programs import DRIVEPANEL, PATIENCE
 from tests.sweeps import kept
 from tui.bus.errors import LineLost
+from tui.cli.shared.say import Messages
+from tui.cli.shared.sets import say_afterwards
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.session.settings.restore import plan_for
 
@@ -407,3 +409,22 @@ def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
         result = invoked("restore", line, file, "-d", "9", "-d", "2", "--arm")
         assert result.exit_code == 3
         assert "Wrote 1" in result.output
+
+
+@pytest.mark.parametrize(
+    ("after_reset", "unsaved", "saved", "parts"),
+    [
+        ([], [], False, []),
+        (["TTO", "ADD"], [], False, ["next reset of the drive: TTO, ADD."]),
+        ([], ["ACC"], False, ["--save"]),
+        ([], ["ACC"], True, []),
+        (["TTO"], ["ACC"], False, ["TTO", "--save"]),
+    ],
+)
+def test_work_left_after_a_write_is_reported(
+    after_reset: list[str], unsaved: list[str], saved: bool, parts: list[str]
+) -> None:
+    messages = Messages(as_json=True)
+    say_afterwards(messages, after_reset, unsaved, saved=saved)
+    assert len(messages.texts) == len(parts)
+    assert all(part in text for part, text in zip(parts, messages.texts, strict=True))

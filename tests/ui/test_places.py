@@ -23,7 +23,7 @@ from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_wo
 from tui.screens.monitor.commands import order_keys
 from tui.screens.monitor.motor import motor_lines, other_values, value_cells
 from tui.screens.monitor.readouts import readout_lines
-from tui.screens.monitor.view import View
+from tui.screens.monitor.view import View, readout_parameter
 from tui.session.monitor.trend import TrendPoint
 from tui.session.shown import Quality
 from tui.widgets.drawing import key_line
@@ -249,3 +249,12 @@ def test_a_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:
     row = motor_lines(view, 80, 3, 3)[0]
     assert "7s" in row.plain
     assert "rpm" not in row.plain
+
+
+@pytest.mark.parametrize("family", [listing.id for listing in library.listings()])
+def test_no_value_is_shown_beside_the_readouts_and_in_them(family: str) -> None:
+    profile = library.load(family)
+    readouts = [readout_parameter(profile, name) for name in ("output_frequency", "motor_current")]
+    codes = {parameter.code for parameter in readouts if parameter is not None}
+    assert codes
+    assert not codes & {value.parameter for value in other_values(profile)}
