@@ -264,10 +264,8 @@ class Judge:
             by = self._noticed_by(mutant, tests, copy) if tests else UNREACHED
         package = mutant.path.split("/")[1]
         seconds = time.monotonic() - begun
-        first_line = (
-            mutant.apply(_text(mutant.path)).encode()[: mutant.change.start].count(b"\n") + 1
-        )
-        return Judged(mutant.identity, package, first_line, by, seconds, len(tests))
+        count = sum(map(len, tests))
+        return Judged(mutant.identity, package, mutant.line, by, seconds, count)
 
     def _noticed_by(self, mutant: Mutant, parts: list[list[str]], copy: Path) -> str:
         path = copy / mutant.path
