@@ -17,7 +17,7 @@ from .rules import Traits
 
 @dataclass(frozen=True, slots=True)
 class ActiveFault:
-    """A fault the drive has; it can be reset once its cause is gone."""
+    """Present fault of the drive; it can be reset once its cause is removed."""
 
     raw: int
     code: str
@@ -28,7 +28,7 @@ CHART_WORDS: Mapping[Quantity, str] = {"status_word": "status", "command_word": 
 
 
 class Fallback(Enum):
-    """Reaction to a silent line without a fault."""
+    """Reaction to communication loss without a fault."""
 
     STOP = "stop"
     SPEED = "fallback speed"
@@ -37,28 +37,29 @@ class Fallback(Enum):
 
 @dataclass
 class LineOrders:
-    """Which commands and references the line wrote since power-up, and in which order."""
+    """Commands and references that the line wrote since power-up, in their order."""
 
     _sequence: int = 0
     _at: dict[str, int] = field(default_factory=dict)
 
     def note(self, parameter: Parameter) -> None:
-        """Remember that the line wrote one."""
+        """Record a write of one by the line."""
         self._sequence += 1
         self._at[parameter.code] = self._sequence
 
     def given_at(self, parameter: Parameter | None) -> int:
-        """When the line last wrote this one, as a running number; 0: not since power-up."""
+        """Return the sequence number of the line's last write of this one; 0: not since
+        power-up."""
         return self._at.get(parameter.code, 0) if parameter else 0
 
     def take_back(self, *parameters: Parameter | None) -> None:
-        """Something else took the place of what the line wrote into these."""
+        """Discard these writes of the line: another source has replaced their values."""
         for parameter in parameters:
             if parameter and parameter.code in self._at:
                 self._at[parameter.code] = 0
 
     def forget(self) -> None:
-        """Forget them, as a power-down does."""
+        """Discard all writes, as a power-down does."""
         self._at.clear()
 
     @property
@@ -81,23 +82,23 @@ class Body:
     terminals: Terminals = field(default_factory=lambda: Terminals(PLAIN_TERMINALS))
     """Its inputs; no trip, reset or power-down changes them."""
     earlier_hz: float | None = None
-    """Reference in Hz that another master gave before the line wrote one; None: none."""
+    """Reference in Hz of another master before the line's first one; None if there is none."""
     fault: ActiveFault | None = None
     fallback: Fallback | None = None
     forced_local: bool = False
-    """True if an input forces local control: the line is not watched meanwhile."""
+    """True if an input forces local control; the timeout is then not monitored."""
     alarms: int = 0
-    """Alarm word as provoked, beside what the motor itself raises."""
+    """Alarm bits set by `alarm`, in addition to those that the motor itself raises."""
     saving: float = 0.0
-    """Time in s that an EEPROM save still takes; nothing can be written meanwhile."""
+    """Remaining time in s of an EEPROM save; nothing can be written until it ends."""
     line_orders: LineOrders = field(default_factory=LineOrders)
 
     # Parameters by meaning
 
     def parameter(self, quantity: Quantity) -> Parameter | None:
-        """The parameter that carries a quantity, or None.
+        """Return the parameter of a quantity, or None.
 
-        Status and command word are those of the chart where no parameter is called so.
+        Status and command word are those of the chart if no parameter has these quantities.
         """
         if found := self.profile.quantity(quantity):
             return found
@@ -106,12 +107,13 @@ class Body:
         return None
 
     def raw(self, quantity: Quantity, default: int = 0) -> int:
-        """Raw value in force of a quantity; the default where the family has none."""
+        """Return the raw value in force of a quantity; the default if the family has none."""
         found = self.parameter(quantity)
         return default if found is None else self.registers.in_force(found)
 
     def value(self, quantity: Quantity, default: float) -> float:
-        """Engineering value in force of a quantity; the default where the family has none."""
+        """Return the engineering value in force of a quantity; the default if the family has
+        none."""
         found = self.parameter(quantity)
         return default if found is None else self.engineering(found)
 
@@ -120,9 +122,9 @@ class Body:
         return self.registers.in_force(parameter) * self.scale(parameter)
 
     def scale(self, parameter: Parameter) -> float:
-        """Return the value of one count, from the parameter that its scale follows.
+        """Return the value of one count, from the parameter that defines its scale.
 
-        The panel has a conversion of its own, and this one is there to show its mistakes.
+        Independent of the panel's conversion, so that tests show errors in that one.
         """
         follows = parameter.scale_by
         if follows is None:
@@ -132,14 +134,15 @@ class Body:
         return float(follows.scales.get(chosen, parameter.scale))
 
     def setting(self, code: str, default: int) -> int:
-        """Raw value in force of a setting by its code in any case; the default without it."""
+        """Return the raw value in force of a setting by its code in any case; the default without
+        it."""
         found = self.registers.named(code)
         return default if found is None else self.registers.in_force(found)
 
     def show(self, quantity: Quantity, engineering: float) -> None:
         """Put an engineering value into the word of a quantity, if the family has one.
 
-        A word without a sign shows the size.
+        An unsigned word shows the magnitude.
         """
         if found := self.parameter(quantity):
             value = engineering if found.type.startswith("int") else abs(engineering)
@@ -158,14 +161,14 @@ class Body:
     # Ramps
 
     def ramps(self, second: bool = False) -> tuple[float, float]:
-        """Acceleration and deceleration in Hz/s, after the drive's own ramp times."""
+        """Return acceleration and deceleration in Hz/s, from the drive's own ramp times."""
         span = self.value("rated_frequency", self.rating.frequency)
         up = self.value("acceleration_2" if second else "acceleration", 3.0)
         down = self.value("deceleration_2" if second else "deceleration", up)
         return span / max(up, 0.01), span / max(down, 0.01)
 
     def rates(self, stop: Stop, second: bool = False) -> tuple[float, float]:
-        """Ramps as `stop` changes them: a fast stop divides the deceleration time by DCF."""
+        """Return the ramps during a `stop`: a fast stop divides the deceleration time by DCF."""
         up, down = self.ramps(second)
         if stop is Stop.FAST:
             down *= self.setting("DCF", 4) or 1000

@@ -1,6 +1,6 @@
-"""A simulated drive: its words, state chart, motor, faults and watch, put together.
+"""Simulated drive: its words, state chart, motor, faults and line timeout, put together.
 
-A drive may be asked and stepped from several threads; each public method holds its lock.
+Several threads may request and step a drive; each public method holds its lock.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .spec import DriveSpec, LineTiming
 from .tripping import Tripping
 
 WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"})
-"""Orders that start the watch where it needs one."""
+"""Quantities whose write starts the timeout of a drive that waits for a first command."""
 
 
 class SimulatedDrive:
@@ -52,7 +52,7 @@ class SimulatedDrive:
         self.profile = profile
         self.spec = spec
         self.busy = False
-        """While true, the drive refuses writes as it does when another task has hold of it."""
+        """While true, the drive refuses writes, as during another task of its own."""
         traits = traits_of(profile)
         identification = profile.data.identification
         identity = identity_of(identification, spec.name, spec.identity)
@@ -103,10 +103,11 @@ class SimulatedDrive:
         self.registers.protect(self.profile.find(code) for code in self.spec.protects)
 
     def set(self, code: str, raw: int) -> None:
-        """Put a raw value in force, as if it had always been there; a monitored one stays.
+        """Put a raw value in force as if it had always been set; a monitored value then stays
+        constant.
 
         `code` is a parameter's code, number or address, `%MW..` or `IPC1`..`IPC4`. Raises
-        UnknownParameter, or SimulatorError where the value does not fit.
+        UnknownParameter, or SimulatorError if the value does not fit.
         """
         with self._lock:
             if not self.registers.named(code) and self.line_side.put_card_word(code, raw):
@@ -117,14 +118,14 @@ class SimulatedDrive:
                 self.registers.hold(parameter)
 
     def raw(self, code: str) -> int:
-        """The present raw value of a parameter; raises UnknownParameter."""
+        """Return the present raw value of a parameter; raises UnknownParameter."""
         with self._lock:
             return self.registers.present(self.profile.find(code))
 
     # Supply
 
     def power_on(self) -> None:
-        """Switch the supply on: saved settings come into force, orders are forgotten."""
+        """Switch the supply on: saved settings take effect, commands are discarded."""
         with self._lock:
             body = self._body
             body.powered = True
@@ -156,7 +157,7 @@ class SimulatedDrive:
         self.power_off()
         self.power_on()
 
-    # What happens to the drive
+    # Events
 
     @property
     def motor(self) -> MotorState:
@@ -165,15 +166,15 @@ class SimulatedDrive:
 
     @property
     def fault(self) -> ActiveFault | None:
-        """The fault the drive has, if any."""
+        """The present fault, if any."""
         return self._body.fault
 
     def run(self, hz: float, *, wander: bool = False) -> None:
-        """Run the motor at a reference in Hz without anything that is sent from now on.
+        """Run the motor at a reference in Hz without a command on the line.
 
-        Its run input is closed where the terminals command; where the line does, it runs as
-        another master left it. With `wander` the reference changes now and then, until the line
-        gives one.
+        If the terminals command, its run input is closed. If the line commands, it runs as if by an
+        earlier command of another master. With `wander`, the reference changes at intervals, until
+        the line gives one.
         """
         with self._lock:
             if self._body.fault is None:
@@ -182,17 +183,17 @@ class SimulatedDrive:
                 self._refresh()
 
     def halt(self) -> None:
-        """Open the run inputs, and end what another master left."""
+        """Open the run inputs, and end the command of another master."""
         with self._lock:
             self._chart.halt()
             self._wanderer.begin(None)
             self._refresh()
 
     def set_input(self, name: str, text: str) -> str:
-        """Set an input by name, to what a person types: `1`, `0`, `5V`, `12mA`, `50%`.
+        """Set an input by name to a typed value: `1`, `0`, `5V`, `12mA`, `50%`.
 
-        Returns what it is now. It stays so, through trips, resets and power-downs. Raises
-        SimulatorError for an input that the drive does not have, or a value that it cannot take.
+        Returns the resulting text. The value stays through trips, resets and power-downs. Raises
+        SimulatorError for an input that the drive lacks, or a value out of range.
         """
         with self._lock:
             reported = self._body.terminals.set(name, text)
@@ -205,8 +206,8 @@ class SimulatedDrive:
     def provoke(self, fault: str | int, *, persists: bool = False) -> None:
         """Trip the drive with a fault given by code or raw value.
 
-        With `persists` its cause stays, and no reset helps, until `clear_cause`. Raises
-        SimulatorError for a code that the profile does not know.
+        With `persists`, its cause stays, and resets fail until `clear_cause`. Raises SimulatorError
+        for a code that the profile does not have.
         """
         with self._lock:
             raw = fault_raw(self.profile, fault)
@@ -214,14 +215,14 @@ class SimulatedDrive:
             self._refresh()
 
     def clear_cause(self) -> None:
-        """Take a fault's cause away, so that a reset helps."""
+        """Remove the cause of a fault, so that a reset clears it."""
         with self._lock:
             if self._body.fault is not None:
                 self._body.fault = replace(self._body.fault, persists=False)
                 self._refresh()
 
     def alarm(self, word: int) -> None:
-        """Show alarms: the bits of the family's alarm word, 0 for none."""
+        """Set the bits of the family's alarm word, 0 for none."""
         with self._lock:
             self._body.alarms = word
             self._refresh()
@@ -252,7 +253,7 @@ class SimulatedDrive:
         return self._body.rating.voltage * self._load.mains
 
     def _refresh(self) -> None:
-        """Bring motor and shown words up to date without letting time pass."""
+        """Update the motor and the shown words without advancing the time."""
         body = self._body
         if body.powered:
             self._tripping.look()
@@ -272,7 +273,7 @@ class SimulatedDrive:
 
     @property
     def address(self) -> int:
-        """The address the drive answers at now."""
+        """The present address of the drive."""
         return self.station.address
 
     def _blocked(self, parameter: Parameter) -> bool:

@@ -1,5 +1,5 @@
-"""Errors of the simulated line, in words for the person who set it up."""
+"""Errors of the simulated line, worded for the user who set it up."""
 
 
 class SimulatorError(Exception):
-    """A simulated drive or line cannot be set up as asked; the text says what to change."""
+    """A simulated drive or line cannot be set up as requested; the text says what to change."""

@@ -1,4 +1,4 @@
-"""Lines by which a person sets the inputs of simulated drives: `2: LI1=1, AI1=5V`."""
+"""Text lines that set the inputs of simulated drives: `2: LI1=1, AI1=5V`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ EXAMPLE = "2: LI1=1, AI1=5V"
 
 
 def set_inputs(simulation: Simulation, text: str) -> str:
-    """Set the inputs of a line, and return their present state.
+    """Set the inputs in a text line, and return their present state.
 
-    The address may be left out where there is one drive; without inputs they are only told.
-    Nothing is set where a part of the line is wrong. Raises SimulatorError.
+    The address may be omitted if there is one drive; a line without inputs only returns their
+    state. Nothing is set if a part of the line is invalid. Raises SimulatorError.
     """
     drive, assignments = check_inputs(simulation, text)
     reported = [drive.set_input(name, value) for name, value in assignments]
@@ -21,9 +21,9 @@ def set_inputs(simulation: Simulation, text: str) -> str:
 
 
 def check_inputs(simulation: Simulation, text: str) -> tuple[SimulatedDrive, list[tuple[str, str]]]:
-    """The drive that a line means, with its inputs and what they are set to; sets nothing.
+    """Return the drive of a text line, with its inputs and their new values; sets nothing.
 
-    Raises SimulatorError where a part of the line is wrong.
+    Raises SimulatorError if a part of the line is invalid.
     """
     head, colon, rest = text.partition(":")
     address = head.strip() if colon else ""

@@ -1,4 +1,4 @@
-"""A master that asks simulated drives as a PLC does, and a port at which both are heard."""
+"""Master that polls simulated drives as a PLC does, and a port on which both can be monitored."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _ANSWER_WITHIN = 0.2
 """Seconds after which the master continues without an answer."""
 _STEP = 0.001
 _ASKED = ("status_word", "output_frequency", "motor_current")
-"""Quantities that the master reads, one by one, as many a program of a PLC does."""
+"""Quantities that the master reads, one by one, as many PLC programs do."""
 _GIVEN = ("frequency_reference", "command_frequency")
-"""Quantities of which it writes the first that can be written: 0, which moves nothing."""
+"""Quantities of which it writes the first writable one: 0, which moves nothing."""
 
 
 class PlcOnLine:
-    """Serves the talk on a simulated line to who listens; it begins with `start`.
+    """Traffic of a master on a simulated line, for a listener; it begins with `start`.
 
-    `requests` are frames without checksum, asked one after the other, again and again. POSIX only:
-    raises SimulatorError where there are no pseudo-terminals.
+    `requests` are frames without checksum, sent one after the other in a cycle. POSIX only: raises
+    SimulatorError if there are no pseudo-terminals.
     """
 
     def __init__(
@@ -49,18 +49,18 @@ class PlcOnLine:
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.path = os.ttyname(self._theirs)
-        """The port to listen at."""
+        """Path of the port to monitor."""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._work, name="simulated master", daemon=True)
         self._simulation = simulation
 
     def start(self) -> None:
-        """Let the master ask."""
+        """Start polling."""
         self._simulation.start()
         self._thread.start()
 
     def stop(self) -> None:
-        """End the talk and take the port away; may be called twice."""
+        """End the traffic and remove the port; may be called twice."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -77,7 +77,7 @@ class PlcOnLine:
                     return
 
     def _ask(self, request: bytes) -> None:
-        """One exchange, which everybody hears as it goes."""
+        """Make one exchange, visible at the port byte by byte."""
         self._say(request)
         requested = time.monotonic()
         self._conversation.feed(request, requested)
@@ -93,12 +93,12 @@ class PlcOnLine:
                 return
 
     def _say(self, data: bytes) -> None:
-        with suppress(BlockingIOError):  # nobody takes what the port holds
+        with suppress(BlockingIOError):  # no program reads the port
             os.write(self._ours, data)
 
 
 def plc_cycle(drives: Sequence[tuple[int, Profile]]) -> list[bytes]:
-    """A usual cycle over drives at their addresses: who each is, single reads, a reference of 0."""
+    """Return a typical cycle over drives by address: identity, single reads, a reference of 0."""
     found = []
     for address, profile in drives:
         if profile.function(43):

@@ -1,4 +1,4 @@
-"""The words of a simulated drive: present, in force, saved; held and protected ones."""
+"""Words of a simulated drive: present, in force, saved; held and protected ones."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ UNKEPT_QUANTITIES = frozenset(
         "command_speed",
     }
 )
-"""Quantities that are orders of the line: no family keeps them over a power-down."""
+"""Quantities that are commands of the line: no family keeps them over a power-down."""
 
 
 class Registers:
-    """Words by wire address, behind parameters by code.
+    """Words by wire address, and parameters by code.
 
-    A written word is *present* at once. It is *in force* at once, or after the next power-up
-    where the profile says so. It is *saved* at once where the drive writes its EEPROM, on
-    command where it keeps a working copy, and never where it is kept in memory only.
+    A written word is *present* at once. It is *in force* at once, or after the next power-up if the
+    profile says so. It is *saved* at once if the drive writes its EEPROM, on command if the drive
+    has a working copy, and never if it is in volatile memory only.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Registers:
             for p in profile.parameters
             if word_count(p) == 1 and not is_field(p)
         }
-        """Address and range of each parameter that is one word, all of it: nearly every one."""
+        """Address and range of each parameter that is one whole word: nearly every one."""
         for parameter in profile.parameters:
             for address in _addresses(parameter):
                 self._owner.setdefault(address, parameter)
@@ -57,18 +57,18 @@ class Registers:
         self._volatile = {address for address, p in self._owner.items() if is_volatile(p)}
         self._saved = {a: word for a, word in self._words.items() if a not in self._own}
 
-    # What the line sees
+    # Access by the line
 
     def owner(self, address: int) -> Parameter | None:
-        """The parameter a word belongs to; None for an unknown or protected word."""
+        """Return the parameter of a word; None for an unknown or protected word."""
         return None if address in self._protected else self._owner.get(address)
 
     def word(self, address: int) -> int:
-        """The present word at a known address."""
+        """Return the present word at a known address."""
         return self._words[address]
 
     def write_word(self, address: int, word: int) -> None:
-        """Take a word from the line; storage and effect follow the profile."""
+        """Write a word from the line; storage and effect follow the profile."""
         parameter = self._owner[address]
         self._words[address] = word & 0xFFFF
         if parameter.effective == "at-once":
@@ -76,40 +76,40 @@ class Registers:
         if parameter.storage in ("eeprom", "unknown") and address not in self._volatile:
             self._saved[address] = word & 0xFFFF
 
-    # What the drive itself sees
+    # Access by the drive
 
     def named(self, code: str) -> Parameter | None:
-        """The parameter with this code in any case, or None."""
+        """Return the parameter with this code in any case, or None."""
         return self._folded.get(code.casefold())
 
     def present(self, parameter: Parameter) -> int:
-        """The raw value as the line reads it."""
+        """Return the raw value that the line reads."""
         return from_words(parameter, [self._words[a] for a in _addresses(parameter)])
 
     def in_force(self, parameter: Parameter) -> int:
-        """The raw value the drive acts on."""
+        """Return the raw value on which the drive acts."""
         if (whole := self._whole.get(parameter.code)) is not None:
             word = self._in_force[whole[0]]
             return word if word <= whole[2] else word - 0x10000
         return from_words(parameter, [self._in_force[a] for a in _addresses(parameter)])
 
     def put(self, parameter: Parameter, raw: int) -> None:
-        """Show a raw value of the drive's own; a held parameter keeps what it was set to."""
+        """Show a raw value of the drive's own; a held parameter keeps its set value."""
         if parameter.code not in self._held:
             self._store(parameter, raw)
 
     def settle(self, parameter: Parameter, raw: int) -> None:
-        """Put a raw value in force, present and saved, as if it had always been there."""
+        """Put a raw value in force, present and saved, as if it had always been set."""
         self._store(parameter, raw)
         for address in _addresses(parameter):
             self._saved[address] = self._words[address]
 
     def hold(self, parameter: Parameter) -> None:
-        """Keep a monitored value where it is, whatever the motor does."""
+        """Keep a monitored value constant, whatever the motor does."""
         self._held.add(parameter.code)
 
     def protect(self, parameters: Iterable[Parameter]) -> None:
-        """Make parameters unknown to the line."""
+        """Hide parameters from the line."""
         self._protected = {a for p in parameters for a in _addresses(p)}
 
     # Memory
@@ -121,32 +121,34 @@ class Registers:
                 self._saved[address] = word
 
     def restore(self, *, volatile_only: bool = False) -> None:
-        """Take the saved words as the present ones, as at power-up; or only those not kept."""
+        """Replace the present words by the saved ones, as at power-up; optionally only those not
+        kept."""
         saved = {a: w for a, w in self._saved.items() if a in self._volatile or not volatile_only}
         self._words.update(saved)
         self._in_force.update(saved)
 
     def recall(self, keep: frozenset[str]) -> None:
-        """Take the saved words as the present ones, except those whose code is kept."""
+        """Replace the present words by the saved ones, except those whose code is in `keep`."""
         for address, word in self._saved.items():
             if address not in self._volatile and self._owner[address].code not in keep:
                 self._words[address] = self._in_force[address] = word
 
     def to_factory(self, keep: frozenset[str]) -> None:
-        """Make every writable parameter its factory value, except those whose code is kept."""
+        """Set every writable parameter to its factory value, except those whose code is in
+        `keep`."""
         for parameter in self.profile.parameters:
             if parameter.access == "r" or is_volatile(parameter) or parameter.code in keep:
                 continue
             self.make_factory(parameter)
 
     def make_factory(self, parameter: Parameter) -> None:
-        """Make one parameter its factory value."""
+        """Set one parameter to its factory value."""
         for address in _addresses(parameter):
             self._words[address] = self._in_force[address] = self._factory[address]
 
     def _store(self, parameter: Parameter, raw: int) -> None:
         if (whole := self._whole.get(parameter.code)) is not None:
-            # the drive shows some twenty values at each step of its time
+            # the drive shows about twenty values at each time step
             address, low, high = whole
             self._words[address] = self._in_force[address] = min(max(raw, low), high) & 0xFFFF
             return
@@ -156,7 +158,8 @@ class Registers:
 
 
 def is_volatile(parameter: Parameter) -> bool:
-    """Return True if a parameter lives in memory only: so declared, or an order of the line."""
+    """Return True if a parameter is in volatile memory only: so declared, or a command of the
+    line."""
     return (
         parameter.storage == "ram"
         or parameter.access == "w"
@@ -165,13 +168,13 @@ def is_volatile(parameter: Parameter) -> bool:
 
 
 INPUT_REGISTERS = 0x10000
-"""Offset of the address of an input register (function 4), a space of its own."""
+"""Offset of the address of an input register (function 4), a separate address space."""
 
 
 def typed_raw(parameter: Parameter, raw: int) -> int:
-    """A raw value as the parameter's type has it, whether given signed or as a word.
+    """Return a raw value in the parameter's type, whether given signed or as a word.
 
-    Raises SimulatorError where it does not fit.
+    Raises SimulatorError if it does not fit.
     """
     low, high = type_range(parameter)
     span = high - low + 1

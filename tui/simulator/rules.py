@@ -38,16 +38,16 @@ SILENT = Refusals(None, None, None, None, None, None)
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Differences of a family from its sisters for which the profile has no field."""
+    """Differences of a family from related ones for which the profile has no field."""
 
     kind: ChartKind
     refusals: Refusals
     limits_follow: bool = False
-    """True where a value past another parameter's limit is cut to it instead of refused."""
+    """True if a value beyond another parameter's limit is reduced to it instead of refused."""
     power_bit: bool = False
     """Status bit 4 shows that the power section is supplied (ATV71)."""
     enable_from_ready: bool = False
-    """Enable operation is taken in Ready to switch on too (ATV71 on a single supply)."""
+    """Enable operation is accepted in Ready to switch on too (ATV71 on a single supply)."""
     access_levels: bool = False
     """LAC below L3 lets an enable command start the drive without the chart (ATV31/312)."""
     config_disables: bool = False
@@ -59,7 +59,7 @@ class Traits:
     max_hz_high_resolution: float | None = None
     """Frequency of 32767 with CMI bit 9 set; None: the maximum frequency TFR (ATV71)."""
     limits: Mapping[str, str] = field(default_factory=dict)
-    """Words that the drive itself limits by another, in the same counts, by their codes."""
+    """Words that the drive itself limits by another, in the same counts, by code."""
     first_values: Mapping[str, int] = field(default_factory=dict)
     """Settings of a simulated drive that was commissioned for the line, by code."""
 
@@ -121,13 +121,15 @@ PLAYED_BY: Mapping[ChartKind, tuple[str, ...]] = {
     "altivar21": ("FA00", "FD01"),
     "leroy-somer": ("6.42", "6.43", "10.40"),
 }
-"""Words that a drive must have to be played as one of a family; others go by their own chart."""
+"""Words that a drive must have to be simulated as one of a family; others follow their own
+chart."""
 LINE_WORDS = ("modbus", "line", "serial", "rs485", "rs-485")
 """Names of the line among the sources of a profile."""
 
 
 def traits_of(profile: Profile) -> Traits:
-    """The traits of a profile's family; a user's own profile goes by its state chart."""
+    """Return the traits of a profile's family; those of a user's own profile follow its state
+    chart."""
     if known := TRAITS.get(profile.id):
         return known
     kinds = {chart.kind for chart in profile.data.charts}
@@ -139,10 +141,11 @@ def traits_of(profile: Profile) -> Traits:
 
 
 def commissioned(profile: Profile) -> Mapping[str, int]:
-    """Settings by code with which the line commands a drive, as far as its profile has them.
+    """Return the settings by code with which the line commands a drive, as far as its profile has
+    them.
 
-    The first configuration whose only source of commands is the line, and what the interlocks
-    want of words that can be set.
+    They are the first configuration whose only command source is the line, and the values of
+    writable words that the interlocks require.
     """
     values: dict[str, int] = {}
     for source in profile.data.control_sources:

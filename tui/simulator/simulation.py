@@ -1,4 +1,4 @@
-"""A simulated line at work: its drives, its time, and the endpoints that reach it."""
+"""Running simulated line: its drives, its time, and its endpoints."""
 
 from __future__ import annotations
 
@@ -22,17 +22,16 @@ from .spec import DriveSpec, LineTiming
 from .troubles import FaultRates, Habits
 
 TICK = 0.05
-"""Time in s between two steps of the drives while no request arrives."""
+"""Time in s between two steps of the drives if no request arrives."""
 
 
 class Simulation:
-    """Simulated drives on one line, with the ways to reach it.
+    """Simulated drives on one line, with their endpoints.
 
-    The drives' time passes from `start` to `stop`, in a thread of its own; every endpoint has
-    a thread too. `profiles` takes the place of the installed profiles, by id; the drives' time is
-    that of `clock`, in s. With `any_settings` it does not matter what baud and stop bits a client
-    sets on a pseudo-terminal. Raises SimulatorError for two drives with one address,
-    UnknownProfile, UnknownParameter.
+    The drives' time passes from `start` to `stop`, in a thread of its own; every endpoint has a
+    thread too. `profiles` replaces the installed profiles, by id; `clock` is the drives' time, in
+    s. With `any_settings`, the baud and stop bits of a client of a pseudo-terminal do not matter.
+    Raises SimulatorError for two drives with one address, UnknownProfile, UnknownParameter.
     """
 
     def __init__(
@@ -85,7 +84,7 @@ class Simulation:
         self.stop()
 
     def start(self) -> None:
-        """Let the drives' time pass; nothing happens where it does already."""
+        """Start the drives' time; does nothing if it is running."""
         if self._ticker is None:
             self._stopping.clear()
             self.line.start()
@@ -97,7 +96,7 @@ class Simulation:
             self.line.advance()
 
     def stop(self) -> None:
-        """End every way to reach the line and the simulated time."""
+        """Stop all endpoints and the simulated time."""
         for endpoint in self._endpoints:
             endpoint.unplug()
         self._endpoints.clear()
@@ -110,9 +109,9 @@ class Simulation:
     def serve_pty(self, link: str | None = None) -> str:
         """Serve the line on a pseudo-terminal; returns the path to open.
 
-        That path is a symbolic link, made at `link` if given, taken away at the end. It begins
-        with the settings of the first drive. Raises
-        SimulatorError where the system has no pseudo-terminals or the path is taken.
+        That path is a symbolic link, made at `link` if given, removed at the end. It begins with
+        the settings of the first drive. Raises SimulatorError if the system has no pseudo-terminals
+        or the path is in use.
         """
         first = self.drives[0].station.own(self.timing) if self.drives else self.timing
         endpoint = PtyEndpoint(self._rtu, link, first, any_settings=self._any_settings)
@@ -122,7 +121,7 @@ class Simulation:
     def serve_tcp(self, host: str = "127.0.0.1", port: int = 0) -> tuple[str, int]:
         """Serve the drives over Modbus TCP, by unit; returns host and port.
 
-        Raises SimulatorError where the port cannot be had.
+        Raises SimulatorError if the port is not available.
         """
         endpoint = TcpEndpoint(
             lambda: TcpConversation(self.line, self.faults),
@@ -136,7 +135,7 @@ class Simulation:
     def serve_rtu_tcp(self, host: str = "127.0.0.1", port: int = 0) -> tuple[str, int]:
         """Serve the line's bytes over TCP; returns host and port.
 
-        Raises SimulatorError where the port cannot be had.
+        Raises SimulatorError if the port is not available.
         """
         endpoint = TcpEndpoint(self._rtu_unseen, host, port, self.faults.habits.idle_close)
         self._add(endpoint)
@@ -147,7 +146,7 @@ class Simulation:
     ) -> None:
         """Serve the line on an opened port, which is closed at the end.
 
-        `client` holds the settings of the other side, if they can be seen.
+        `client` holds the settings of the other side, if visible.
         """
 
         def paced() -> Conversation:
@@ -167,12 +166,12 @@ class Simulation:
         self._endpoints.append(endpoint)
 
     def drive(self, address: int) -> SimulatedDrive:
-        """The drive that has this address now; raises SimulatorError."""
+        """Return the drive with this address at present; raises SimulatorError."""
         return self.line.drive(address)
 
     @property
     def only_drive(self) -> SimulatedDrive:
-        """The drive of a line that has one; raises SimulatorError where it has several."""
+        """Return the only drive of the line; raises SimulatorError if there are several."""
         if len(self.drives) != 1:
             known = ", ".join(str(drive.address) for drive in self.drives)
             raise SimulatorError(
@@ -186,11 +185,11 @@ class Simulation:
         return self.line.drives
 
     def unplug(self) -> None:
-        """Pull the plug of every endpoint: terminals and connections go away."""
+        """Unplug every endpoint: terminals and connections close."""
         for endpoint in self._endpoints:
             endpoint.unplug()
 
     def replug(self) -> None:
-        """Put the plug back: links and TCP ports are where they were."""
+        """Plug every endpoint in again: links and TCP ports are the same as before."""
         for endpoint in self._endpoints:
             endpoint.plug()

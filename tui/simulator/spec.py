@@ -11,20 +11,20 @@ from .errors import SimulatorError
 DEFAULT_ADDRESS = 1
 LAST_ADDRESS = 247
 LONGEST_ADDRESS = 9
-"""Digits of an address that is looked at; int() takes not as many as can be pasted."""
+"""Digits of the longest address that is parsed; a pasted one may be too long for int()."""
 _FORMAT = re.compile(r"8[NEO][12]")
 
 
 @dataclass(frozen=True)
 class DriveSpec:
-    """One simulated drive.
+    """Specification of one simulated drive.
 
     `sets` are raw values by parameter code (or number, or address) in force from power-up; a
-    monitored word among them keeps its value. `%MW20` and `IPC1`..`IPC4` set words of an
-    Altivar 71's cards. `protects` names parameters that the line cannot see. `identity`
-    replaces objects of function 43 by their id. `run_hz` starts the motor at power-up, by its run
-    input where the terminals command, else as another master left it; with `wander` that
-    reference changes now and then.
+    monitored word among them keeps its value. `%MW20` and `IPC1`..`IPC4` set words of an Altivar
+    71's cards. `protects` names parameters that are hidden from the line. `identity` replaces
+    objects of function 43 by their id. `run_hz` starts the motor at power-up: by its run input if
+    the terminals command, else as if by an earlier command of another master. With `wander`, that
+    reference changes at intervals.
     """
 
     profile: str
@@ -39,14 +39,14 @@ class DriveSpec:
 
 @dataclass(frozen=True)
 class LineTiming:
-    """Baud and character format of the line, and whether the line keeps their time."""
+    """Baud and character format of the line, and whether the simulation keeps their real time."""
 
     baud: int = 19200
     format: str = "8E1"
     real_time: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse a format or a baud that no serial port has."""
+        """Raise for a format or a baud that no serial port has."""
         if not _FORMAT.fullmatch(self.format):
             raise SimulatorError(
                 f"{self.format!r} is not a character format; write it like 8E1, 8O1, 8N1 or 8N2."
@@ -56,27 +56,28 @@ class LineTiming:
 
     @property
     def bits_per_character(self) -> int:
-        """Bits of one character on the wire: start, data, parity if any, stop bits."""
+        """Return the bits of one character on the wire: start, data, parity if any, stop bits."""
         return 1 + int(self.format[0]) + (self.format[1] != "N") + int(self.format[2])
 
     @property
     def character(self) -> float:
-        """Time of one character on the wire, in seconds."""
+        """Return the time of one character on the wire, in seconds."""
         return self.bits_per_character / self.baud
 
     @property
     def silence(self) -> float:
-        """Silence that ends a frame, in s: 3.5 characters, 1.75 ms above 19200 baud.
+        """Return the pause that ends a frame, in s: 3.5 characters, 1.75 ms above 19200 baud.
 
-        Worked out here and not by tui.wire, whose witness the simulator is.
+        Computed independently of tui.wire, so that the simulator can show defects in it.
         """
         return 0.00175 if self.baud > 19200 else 3.5 * self.character
 
 
 def parse_drives(text: str) -> list[DriveSpec]:
-    """Drives from `atv71@2,atv21`: profiles with addresses, missing ones the next free from 1.
+    """Return the drives of `atv71@2,atv21`: profiles with addresses, missing ones the next free
+    from 1.
 
-    Raises SimulatorError with what is wrong in the text.
+    Raises SimulatorError with the invalid part of the text.
     """
     wanted: list[tuple[str, int | None]] = []
     for part in text.split(","):

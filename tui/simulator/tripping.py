@@ -1,4 +1,4 @@
-"""Causes of a simulated drive's faults: provoked, a silent line, a word or an input."""
+"""Causes of a simulated drive's faults: provoked, communication loss, a word or an input."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .plant.watch import SilenceWatch
 
 
 class Tripping:
-    """Trips one drive, once at a time."""
+    """Trip logic of one drive; one fault at a time."""
 
     def __init__(self, body: Body, chart: PlayedChart, watch: SilenceWatch) -> None:
         self._body = body
@@ -20,16 +20,17 @@ class Tripping:
         self._watch = watch
         self._history = FaultHistory(body)
         self._raised = False
-        """True if the fault is one that a word or an input reports still."""
+        """True if a word or an input still reports the fault."""
 
     def trip(self, raw: int, stop: Stop, *, persists: bool = False) -> None:
-        """Trip with a fault, if none is there; the inputs stay as they are."""
+        """Trip with a fault, if none is present; the inputs stay unchanged."""
         if self._body.fault is None:
             self._history.enter(raw, persists=persists)
             self._chart.trip(stop)
 
     def look(self) -> None:
-        """Trip by what a word or an input reports; once it is gone a reset helps."""
+        """Trip on a fault reported by a word or an input; once the report ends, a reset clears
+        it."""
         own = self._chart.raises()
         fault = self._body.fault
         if own is None:
@@ -42,7 +43,7 @@ class Tripping:
             self._raised = own.persists
 
     def step(self, dt: float) -> None:
-        """Let time pass over a line that may be silent, and over what is reported."""
+        """Advance the time by `dt` seconds; trip on communication loss or a reported fault."""
         if consequence := self._watch.step(dt):
             if consequence.trip is not None:
                 self.trip(self._watch.fault or 0, consequence.trip)
@@ -51,5 +52,5 @@ class Tripping:
         self.look()
 
     def show(self) -> None:
-        """Show the present fault where its word does not keep the last one."""
+        """Show the present fault, unless its word keeps the last one."""
         self._history.show()

@@ -1,4 +1,4 @@
-"""The troubles that a simulated line can have: what each does, and in which unit it is given."""
+"""Faults that a simulated line can have: the effect and the unit of each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SHARE, REPLIES, UNIT, SECONDS = "share", "replies", "unit", "s"
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """One trouble: the unit of its value, and its effect."""
+    """Kind of fault: the unit of its value, and its effect."""
 
     unit: str
     effect: str
@@ -37,7 +37,7 @@ TROUBLES: Mapping[str, Trouble] = {
     "idle-close": Trouble(SECONDS, "A TCP connection without requests is closed after this time."),
     "master": Trouble(SECONDS, "Another master polls each drive, so often, on an RTU line."),
 }
-"""By kind, as `--line-fault` and the page of the command name it."""
+"""Faults by kind, as in `--line-fault` and its help."""
 VALUE_LIMITS = {
     SHARE: (0.0, 1.0),
     REPLIES: (1.0, 100.0),
@@ -72,7 +72,7 @@ class FaultRates:
     late_by: tuple[float, float] = (0.3, 1.5)
 
     def __post_init__(self) -> None:
-        """Refuse rates that are not probabilities or add up to more than 1."""
+        """Raise for rates that are not probabilities or add up to more than 1."""
         rates = self.by_kind()
         wrong = [kind for kind, rate in rates.items() if not 0 <= rate <= 1]
         if wrong:
@@ -81,7 +81,7 @@ class FaultRates:
             raise SimulatorError("The rates of line faults add up to more than 1.")
 
     def by_kind(self) -> dict[str, float]:
-        """The rates by kind of fault, in a fixed order."""
+        """Return the rates by kind of fault, in a fixed order."""
         return {
             _as_kind(f.name): getattr(self, f.name) for f in fields(self) if f.name != "late_by"
         }
@@ -89,7 +89,7 @@ class FaultRates:
 
 @dataclass(frozen=True, slots=True)
 class Habits:
-    """Habits of a sick line; at 0, None and infinity it has none."""
+    """Permanent faults of a line; it has none at 0, None and infinity."""
 
     behind: int = 0
     lost_every: int = 0
@@ -99,7 +99,7 @@ class Habits:
 
 
 def troubles_of(values: Mapping[str, float]) -> tuple[FaultRates, Habits]:
-    """The rates and habits of troubles by kind. Raises SimulatorError."""
+    """Return the rates and habits by kind of fault. Raises SimulatorError."""
     for kind, value in values.items():
         if kind not in TROUBLES:
             raise SimulatorError(f"{kind!r} is not a line fault. Use {', '.join(TROUBLES)}.")

@@ -1,1 +1,1 @@
-"""The state charts that simulated drives play, and the words that they show."""
+"""State charts of simulated drives, and the words that show their states."""

@@ -45,7 +45,7 @@ BEFORE_FAULT = {"FE00": "FD00", "FE01": "FD01", "FE42": "FD42", "FE49": "FD49"} 
     "FE06": "FD06",
     "FE07": "FD07",
 }
-"""Words that keep, while a fault is present, what their twin was at the trip."""
+"""Words that keep the value of their twin at the trip while a fault is present."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Sources:
 
 
 class Altivar21Chart:
-    """The orders and the status of one Altivar 21."""
+    """State chart of one Altivar 21: its commands and status."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -70,7 +70,7 @@ class Altivar21Chart:
         self._inputs = Altivar21Inputs(body)
 
     def power_up(self) -> None:
-        """Nothing is ordered by the line, nothing is latched."""
+        """Start without commands of the line and without a latched stop."""
         self._last = 0
         self._latched = False
         self._stop = Stop.RAMP
@@ -88,12 +88,12 @@ class Altivar21Chart:
         self._inputs.halt()
 
     def follow(self) -> None:
-        """Look at the inputs: RES resets a fault."""
+        """Read the inputs: RES resets a fault."""
         if self._inputs.resets():
             self.reset_fault()
 
     def written(self, parameter: Parameter) -> None:
-        """Follow a word that the line wrote."""
+        """Process a word that the line wrote."""
         if parameter is not self._body.parameter("command_word"):
             return
         word = self._word
@@ -105,7 +105,8 @@ class Altivar21Chart:
             self.reset_fault()
 
     def raises(self) -> OwnFault | None:
-        """The fault of an emergency stop, which F603 makes stop as a silent line does."""
+        """Return the fault of an emergency stop, whose reaction F603 sets as for communication
+        loss."""
         return OwnFault(EMERGENCY_FAULT, None) if self._latched else None
 
     @property
@@ -125,11 +126,11 @@ class Altivar21Chart:
         return Sources(command, reference, word & PRESETS if command else wired)
 
     def trip(self, stop: Stop) -> None:
-        """Stop the motor as the fault asks and show the fault."""
+        """Stop the motor as the fault demands, and show the fault."""
         self._stop = stop
 
     def reset_fault(self) -> None:
-        """Clear the fault if its cause is gone; words in RAM go back to their first values.
+        """Clear the fault if its cause is removed; words in RAM return to their first values.
 
         The priority bits are cleared with them: closed terminals command until the line takes
         control again.
@@ -148,7 +149,7 @@ class Altivar21Chart:
         """True if words that cannot be changed while running are locked."""
         return self._body.turning
 
-    # What the motor is told
+    # Demand on the motor
 
     def _run_ordered(self) -> bool:
         body = self._body
@@ -159,7 +160,7 @@ class Altivar21Chart:
         return self._inputs.run_ordered
 
     def _wanted(self) -> float:
-        """The reference in Hz, signed by direction."""
+        """Return the reference in Hz, signed by direction."""
         body = self._body
         sources = self._sources()
         hz = self._inputs.hz
@@ -181,7 +182,7 @@ class Altivar21Chart:
 
     @property
     def poles(self) -> int:
-        """Poles of the motor."""
+        """Return the number of poles of the motor."""
         raw = round(self._body.value("motor_poles", self._body.rating.poles))
         return raw if raw >= 2 else self._body.rating.poles
 
@@ -216,7 +217,7 @@ class Altivar21Chart:
         slow = self._stop in (Stop.RAMP, Stop.FAST)
         return replace(base, energised=moving and slow, target=0.0)
 
-    # What the line is shown
+    # Words for the line
 
     def show(self) -> None:
         """Put the status words of the present state into their registers."""

@@ -37,14 +37,14 @@ class Altivar21Inputs:
             self._body.terminals.close(name, closed=False)
 
     def resets(self) -> bool:
-        """Return True if RES was closed just now."""
+        """Return True if RES has closed since the last call."""
         closed = self._closed("RES")
         pressed = closed and not self._reset_before
         self._reset_before = closed
         return pressed
 
     def _closed(self, name: str) -> bool:
-        """Return True if an input is closed that has no other function than its own."""
+        """Return True if an input is closed and has only its own function."""
         return self._body.terminals.closed(name) and not self._function(name)
 
     def _function(self, name: str) -> int:
@@ -58,16 +58,16 @@ class Altivar21Inputs:
 
     @property
     def run_ordered(self) -> bool:
-        """True if F or R orders a run."""
+        """True if F or R commands a run."""
         return self._closed("F") or self._closed("R")
 
     @property
     def reverse(self) -> bool:
-        """True if they order it the other way."""
+        """True if the inputs command reverse."""
         return self._closed("R") and not self._closed("F")
 
     @property
     def hz(self) -> float:
-        """The analog reference, in Hz."""
+        """The analog reference in Hz."""
         name = "VIB" if self._body.setting("FMOD", 1) == VIB_REFERENCE else "VIA"
         return ANALOG_HZ * self._body.terminals.level(name)

@@ -1,7 +1,7 @@
-"""Words of the Altivar 21 beside its status words: what few families have.
+"""Words of the Altivar 21 other than status words: those that few families have.
 
-Source: ATV21 Modbus manual 8.3 and 8.8. The bases of the percentages are not in it: rated torque
-and rated current are taken. The unit of the energy counters is not either: kWh is taken.
+Source: ATV21 Modbus manual 8.3 and 8.8. It does not give the bases of the percentages: rated torque
+and rated current are assumed. Nor does it give the unit of the energy counters: kWh is assumed.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from ..body import Body
 ANALOG_FULL = 1023
 ANALOG_HZ = 50.0
 BY_LINE, BY_LINE_NEGATED = 38, 39
-"""Functions of an output that hand it to FA50, as it is or negated."""
+"""Functions of an output that make it follow FA50, directly or negated."""
 RELAY, FAULT_RELAY = 1 << 0, 1 << 2
 
 
 def outputs(body: Body) -> int:
-    """The outputs as FD07 shows them; RY follows FA50 where F130 hands it over."""
+    """Return the outputs as FD07 shows them; RY follows FA50 if F130 selects it."""
     function, given = body.setting("F130", 0), body.setting("FA50", 0) & RELAY
     relay = given if function == BY_LINE else 0
     if function == BY_LINE_NEGATED:
@@ -28,7 +28,7 @@ def outputs(body: Body) -> int:
 
 
 def show_altivar21_words(body: Body) -> None:
-    """Put the further words of the family into their registers."""
+    """Put the additional words of the family into their registers."""
     motor = body.motor
     rated = body.rating.current
     torque_current = motor.current * min(1.0, abs(motor.torque) / 100) if motor.energised else 0.0

@@ -1,4 +1,4 @@
-"""Words of the Altivar 31, 312 and 71 beside the status word: keypad state and marks.
+"""Words of the Altivar 31, 312 and 71 other than the status word: keypad state and marks.
 
 Source: ATV71 communication parameters list (HMIS, LRS1, LRS8, CNFS).
 """
@@ -15,7 +15,7 @@ from .channels import ChannelsInForce, channel_bit, channel_marks
 INPUT_BITS = 0x003F
 """Bits of IOLR that are inputs."""
 ANALOG_COUNTS = 1000
-"""Counts of AI1C in a volt."""
+"""Counts of AI1C per volt."""
 VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
 """Raw values of VCAL on three phases, by the voltage of the motor in V."""
 
@@ -48,7 +48,7 @@ def keypad_state(body: Body, stop: Stop | None, *, disabled: bool) -> int:
 
 
 def show_altivar_words(body: Body, stop: Stop | None, *, disabled: bool, reached: bool) -> None:
-    """Put the further words of the family into their registers."""
+    """Put the additional words of the family into their registers."""
     motor = body.motor
     high = body.value("high_speed", 0.0)
     marks = (
@@ -69,7 +69,7 @@ def show_altivar_words(body: Body, stop: Stop | None, *, disabled: bool, reached
 
 
 def show_inputs(body: Body) -> None:
-    """Put the inputs into IL1R or IOLR, and AI1C and its fellows (in mV)."""
+    """Put the inputs into IL1R or IOLR, and into AI1C and similar words (in mV)."""
     body.show_code("IL1R", body.terminals.bits())
     if outputs := body.registers.named("IOLR"):
         kept = body.registers.present(outputs) & ~INPUT_BITS

@@ -94,7 +94,7 @@ def switch_is_on(raw: int, closed: Callable[[str], bool], word: int) -> bool:
 
 
 def channels_in_force(setting: ReadSetting, active: Active) -> ChannelsInForce:
-    """The channels that the settings give, with the switches as they are now."""
+    """Return the channels selected by the settings, with the present switches."""
     second = active(setting("RFC", 96))
     first_b = not second and setting("FR1B", 0) != 0 and active(setting("RCB", 96))
     own = setting("FR1", AI_1)
@@ -119,12 +119,12 @@ def channels_in_force(setting: ReadSetting, active: Active) -> ChannelsInForce:
 
 
 def channel_bit(place: ChannelPlace) -> int:
-    """A place as CCC and CRC show it; the keypad has no bit of its own."""
+    """Return a source as CCC and CRC show it; the keypad has no bit of its own."""
     return 1 << place.value if place not in (ChannelPlace.NOWHERE, ChannelPlace.KEYPAD) else 0
 
 
 def extended_status_bits(place: ChannelPlace) -> tuple[bool, bool]:
-    """Bits 13 and 14 of ETI: who commands."""
+    """Return bits 13 and 14 of ETI: the source of commands."""
     if place in (ChannelPlace.TERMINALS, ChannelPlace.KEYPAD, ChannelPlace.NOWHERE):
         return False, False
     if place is ChannelPlace.DISPLAY:
@@ -133,7 +133,7 @@ def extended_status_bits(place: ChannelPlace) -> tuple[bool, bool]:
 
 
 def channel_marks(channels: ChannelsInForce, *, second_ramp: bool) -> tuple[int, int]:
-    """LRS3 and LRS7, as far as the channels and the ramp show in them."""
+    """Return LRS3 and LRS7, as far as they show the channels and the ramp."""
     second = (channels.reference_2, channels.command_2, second_ramp)
     each = (
         not channels.reference_2,

@@ -30,7 +30,7 @@ DRIVECOM_REACHED_HZ = 0.1
 
 
 class DrivecomChart:
-    """The chart of one drive: its commander, its state, its motor's command."""
+    """State chart of one drive: its commander, its state, its demand on the motor."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -41,9 +41,9 @@ class DrivecomChart:
         self._wiring = TerminalWiring(body)
         self._target_hz = 0.0
         self._resets = False
-        """True if the assigned fault reset was given at the last look."""
+        """True if the assigned fault reset was active at the last call."""
 
-    # Orders from outside
+    # Commands from outside
 
     def power_up(self) -> None:
         """Start the chart: disabled, or enabled automatically below access level L3."""
@@ -54,7 +54,7 @@ class DrivecomChart:
         self.follow()
 
     def run(self, hz: float) -> None:
-        """Run by the inputs where they command, else as another master ordered before."""
+        """Run by the inputs if they command, else by an earlier command of another master."""
         if self._channels.now.command is ChannelPlace.TERMINALS:
             self._body.terminals.close("LI2" if hz < 0 else "LI1")
         else:
@@ -75,7 +75,7 @@ class DrivecomChart:
             self._reference.leave(abs(hz))
 
     def halt(self) -> None:
-        """Open the inputs that run it, and end what another master ordered."""
+        """Open the run inputs, and end the command of another master."""
         for name in ("LI1", "LI2"):
             self._body.terminals.close(name, closed=False)
         self._body.earlier_hz = None
@@ -86,7 +86,7 @@ class DrivecomChart:
                 self._machine.leave()
 
     def follow(self) -> None:
-        """Look at the inputs and at what they switch."""
+        """Read the inputs and the switches that they control."""
         self._wiring.follow()
         before, now = self._channels.follow()
         self._body.forced_local = now.local
@@ -107,11 +107,11 @@ class DrivecomChart:
             self._reference.leave(abs(self._wanted(before)))
 
     def _copies(self, *, to_2: bool) -> bool:
-        """Channel 1 is copied to channel 2, in the I/O profile the other way too."""
+        """Return True if channel 1 is copied to channel 2; in the I/O profile also the reverse."""
         return to_2 or self._command.is_io
 
     def _change_channel(self, before: ChannelsInForce, now: ChannelsInForce) -> None:
-        """Another channel commands: what it orders holds from now on, or what was copied to it."""
+        """Change the command channel: its commands, or those copied to it, apply from now on."""
         running = self._ordered(before)
         self._machine.leaving = False
         self._command.let_go()
@@ -130,13 +130,13 @@ class DrivecomChart:
             self._obey(command_of(self._command.word))
 
     def _ordered(self, channels: ChannelsInForce) -> bool:
-        """Return True if the motor was ordered to run under these channels."""
+        """Return True if these channels command a run."""
         if channels.command is ChannelPlace.TERMINALS:
             return self._wiring.order.run
         return self._machine.state is DrivecomState.ENABLED and not self._stopping()
 
     def written(self, parameter: Parameter) -> None:
-        """Follow a word that the line wrote."""
+        """Process a word that the line wrote."""
         if parameter is self._body.parameter("command_word"):
             self._take(self._body.registers.present(parameter) & 0xFFFF)
         elif parameter.access == "rw-stopped":
@@ -166,7 +166,7 @@ class DrivecomChart:
         return self._channels.now.command is ChannelPlace.LINE
 
     def raises(self) -> OwnFault | None:
-        """The external fault, for as long as CMI bit 3 or the input of ETF reports it."""
+        """Return the external fault, for as long as CMI bit 3 or the input of ETF reports it."""
         return external_fault(self._body, self._channels.is_on)
 
     def trip(self, stop: Stop) -> None:
@@ -175,7 +175,8 @@ class DrivecomChart:
         self._command.let_go()
 
     def reset_fault(self) -> None:
-        """Leave Fault if its cause is gone; the line must command again, closed inputs run on."""
+        """Leave Fault if its cause is removed; the line must command again, closed inputs run
+        on."""
         fault = self._body.fault
         if self._machine.state is DrivecomState.FAULT and fault and not fault.persists:
             self._body.fault = None
@@ -189,7 +190,7 @@ class DrivecomChart:
         """True if stopped-only words are locked."""
         return self._body.turning
 
-    # What the motor is told
+    # Demand on the motor
 
     def order(self) -> MotorDemand:
         """Return the present demand on the motor."""
@@ -250,7 +251,8 @@ class DrivecomChart:
         return second and self._body.traits.access_levels
 
     def _wanted(self, channels: ChannelsInForce | None = None) -> float:
-        """The signed reference in Hz before LSP and HSP, under the channels in force or others."""
+        """Return the signed reference in Hz before LSP and HSP, for the channels in force or
+        others."""
         channels = channels or self._channels.now
         hz = self._reference.size(channels)
         if channels.command is ChannelPlace.LINE:
@@ -259,7 +261,7 @@ class DrivecomChart:
             reverse = self._wiring.order.reverse
         return -hz if reverse else hz
 
-    # What the line is shown
+    # Words for the line
 
     def show(self) -> None:
         """Put the words of the present state into their registers."""

@@ -1,4 +1,4 @@
-"""The channels of one Altivar 31, 312 or 71 as they are now, and as they were before."""
+"""Present and previous channels of one Altivar 31, 312 or 71."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
 from .channels import ChannelPlace, ChannelsInForce, channels_in_force, switch_is_on
 
 COMMISSIONED = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND}
-"""Channels of a drive whose profile has no words for them."""
+"""Channels of a drive whose profile has no words that select them."""
 FULL_ACCESS = 2
 
 
@@ -17,16 +17,16 @@ class DrivecomChannels:
     def __init__(self, body: Body) -> None:
         self._body = body
         self.line_spoke = False
-        """True if the line gave a command; below access level L3 it commands from then on."""
+        """True after a first command of the line; below access level L3 the line then commands."""
         self.now = ChannelsInForce(ChannelPlace.LINE, ChannelPlace.LINE)
 
     def power_up(self) -> None:
-        """The line has not spoken yet."""
+        """Start without a command of the line."""
         self.line_spoke = False
         self.now = self._look()
 
     def follow(self) -> tuple[ChannelsInForce, ChannelsInForce]:
-        """Look again; the channels before and now."""
+        """Update the channels; return the previous and the present ones."""
         before, self.now = self.now, self._look()
         return before, self.now
 

@@ -1,7 +1,7 @@
-"""The Drivecom state machine of one drive: where commands, faults and standstill lead.
+"""Drivecom state machine of one drive: transitions by commands, faults and standstill.
 
-Sources: ATV71 Modbus manual and communication parameters guide; ATV312 communication
-variables manual, control and status words.
+Sources: ATV71 Modbus manual and communication parameters guide; ATV312 communication variables
+manual, control and status words.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ QSTD_LEAVES = 2
 
 
 class DrivecomMachine:
-    """The state of one drive, and how it stops on its way out of it."""
+    """State of one drive, and how it stops when it leaves the state."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
         self.state = DrivecomState.DISABLED
         self.leaving = False
-        """True if a Disable operation waits for the motor to stop."""
+        """True while a Disable operation waits for the motor to stop."""
         self.stop = Stop.RAMP
         """Kind of stop in the fault reaction, or on leaving operation."""
 
@@ -31,7 +31,7 @@ class DrivecomMachine:
         self.leaving = False
 
     def enable(self) -> None:
-        """Go to Operation enabled without the line, unless a fault is there."""
+        """Go to Operation enabled without the line, unless a fault is present."""
         if not self.faulty:
             self.state = DrivecomState.ENABLED
             self.leaving = False
@@ -43,11 +43,11 @@ class DrivecomMachine:
 
     @property
     def faulty(self) -> bool:
-        """True if a fault is there or being reacted to."""
+        """True during a fault or a fault reaction."""
         return self.state in (DrivecomState.FAULT, DrivecomState.REACTION)
 
     def obey(self, command: DrivecomCommand | None, *, low_access: bool) -> None:
-        """Follow a command of the line."""
+        """Execute a command of the line."""
         if self.faulty:
             return
         self.leaving = False
@@ -61,7 +61,7 @@ class DrivecomMachine:
             self.state = target
 
     def _disable_operation(self) -> None:
-        """Stop as DOTD or the normal stop type says, then go to Switched on."""
+        """Stop as DOTD or the normal stop type demands, then go to Switched on."""
         freewheel_set = self._body.setting("DOTD", 1) == 0
         self.stop = Stop.FREEWHEEL if freewheel_set else stop_type(self._body)
         self.leaving = self.stop is not Stop.FREEWHEEL
@@ -74,13 +74,13 @@ class DrivecomMachine:
         return self.state is DrivecomState.DISABLED and low_access
 
     def reconfigured(self) -> None:
-        """A configuration word was written: some families go back to disabled."""
+        """Process a write to a configuration word: some families return to disabled."""
         between = (DrivecomState.READY, DrivecomState.SWITCHED_ON)
         if self._body.traits.config_disables and self.state in between:
             self.state = DrivecomState.DISABLED
 
     def trip(self, stop: Stop) -> None:
-        """Go to Fault, over the fault reaction where the motor is stopped first."""
+        """Go to Fault, after the fault reaction if the motor is stopped first."""
         slow = stop is not Stop.FREEWHEEL and self._body.turning
         self.state = DrivecomState.REACTION if slow else DrivecomState.FAULT
         self.stop = stop
@@ -100,7 +100,7 @@ class DrivecomMachine:
             self.state = DrivecomState.DISABLED
 
     def stopping(self) -> Stop | None:
-        """Return the stop that its state demands; None if the state lets it run."""
+        """Return the stop that the state demands; None if the state allows running."""
         if self.state is DrivecomState.QUICK_STOP:
             return Stop.FAST
         if self.state is DrivecomState.REACTION or self.leaving:

@@ -1,7 +1,7 @@
-"""The reference of the Altivar 31, 312 and 71: which word counts, its sign and its limits.
+"""Reference of the Altivar 31, 312 and 71: its source word, its sign and its limits.
 
-Source: ATV71 communication parameters guide (LFR, LFRD, CMI bits 9 and 12); ATV312
-communication variables, high resolution.
+Source: ATV71 communication parameters guide (LFR, LFRD, CMI bits 9 and 12); ATV312 communication
+variables, high resolution.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class DrivecomReference:
         return self.cut(wanted)
 
     def size(self, channels: ChannelsInForce) -> float:
-        """The reference in Hz that the channel in force gives, before its limits.
+        """Return the reference in Hz of the channel in force, before its limits.
 
-        From the line it may be negative; 0 from a channel that nothing is simulated of.
+        From the line it may be negative; it is 0 for a channel that is not simulated.
         """
         if channels.reference is ChannelPlace.LINE:
             hz = self._written()
@@ -46,14 +46,14 @@ class DrivecomReference:
         return 0.0
 
     def wire(self, channels: ChannelsInForce, hz: float) -> None:
-        """Put the analog input of a channel to the value for this reference in Hz."""
+        """Set the analog input of a channel to the value for this reference in Hz."""
         low, high = self.limits()
         part = (hz - low) / (high - low) if high > low else 0.0
         self._body.terminals.apply(f"AI{channels.input}", part)
 
     @property
     def is_earlier(self) -> bool:
-        """True if the line's reference is still what another master left there."""
+        """True if the line's reference is still that of another master."""
         return self._body.earlier_hz is not None and self._written() is None
 
     def leave(self, hz: float) -> None:
@@ -65,14 +65,13 @@ class DrivecomReference:
             self._body.line_orders.take_back(frequency, self._body.parameter("command_speed"))
 
     def turned_over(self, is_io: bool) -> bool:
-        """Return True if CMI bit 12 turns the direction of the command word over (ATV71,
-        Drivecom)."""
+        """Return True if CMI bit 12 inverts the direction of the command word (ATV71, Drivecom)."""
         if is_io or self._body.traits.access_levels:
             return False
         return bool(self._cmi & CMI_REVERSE)
 
     def _written(self) -> float | None:
-        """The later written of frequency and speed reference, in Hz; None if none was."""
+        """Return the later written of frequency and speed reference, in Hz; None if none was."""
         body = self._body
         frequency, speed = body.parameter("command_frequency"), body.parameter("command_speed")
         at, speed_at = body.line_orders.given_at(frequency), body.line_orders.given_at(speed)
@@ -84,7 +83,7 @@ class DrivecomReference:
 
     @property
     def poles(self) -> int:
-        """Poles of the motor."""
+        """Return the number of poles of the motor."""
         return round(self._body.value("motor_poles", self._body.rating.poles)) or 4
 
     @property
@@ -99,13 +98,13 @@ class DrivecomReference:
         return (fixed or self._body.value("max_frequency", 60.0)) / FULL_COUNT
 
     def cut(self, hz: float) -> float:
-        """A reference in the limits of low and high speed."""
+        """Return a reference limited to low and high speed."""
         low, high = self.limits()
         size = min(max(abs(hz), low), high)
         return -size if hz < 0 else size
 
     def limits(self) -> tuple[float, float]:
-        """Low and high speed in force, in Hz."""
+        """Return low and high speed in force, in Hz."""
         body = self._body
         high = min(body.value("high_speed", UNLIMITED), body.value("max_frequency", UNLIMITED))
         return min(body.value("low_speed", 0.0), high), high

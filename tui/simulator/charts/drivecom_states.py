@@ -1,7 +1,4 @@
-"""The Drivecom chart itself: its states, its commands, and where each leads.
-
-Sources: CiA 402; ATV71 Modbus manual; ATV312 communication variables manual.
-"""
+"""Drivecom state chart: its states, its commands, and its transitions."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from enum import Enum
 
 
 class DrivecomState(Enum):
-    """States of the chart with the bits 0 to 6 of their status word, bit 4 left out."""
+    """States of the chart with bits 0 to 6 of their status word, without bit 4."""
 
     DISABLED = 0x40
     READY = 0x21
@@ -45,9 +42,9 @@ TRANSITIONS: Mapping[tuple[DrivecomState, DrivecomCommand], DrivecomState] = {
     (DrivecomState.ENABLED, DrivecomCommand.QUICK_STOP): DrivecomState.QUICK_STOP,
     (DrivecomState.QUICK_STOP, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
 }
-"""Transitions that are made at once; Disable operation (16#0007) may wait for a ramp."""
+"""Transitions that happen at once; Disable operation (16#0007) may wait for a ramp."""
 
 
 def command_of(word: int) -> DrivecomCommand | None:
-    """The command of a word; None where its bits 0 to 3 are none."""
+    """Return the command of a word; None if its bits 0 to 3 match none."""
     return next((c for c in DrivecomCommand if word & c.value[0] == c.value[1]), None)

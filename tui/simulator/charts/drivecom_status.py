@@ -1,7 +1,4 @@
-"""Status word and extended status word of the Altivar 31, 312 and 71, and who shows them.
-
-Sources: ATV71 communication parameters list (ETA, ETI); ATV312 communication variables.
-"""
+"""Status word and extended status word of the Altivar 31, 312 and 71."""
 
 from __future__ import annotations
 
@@ -18,12 +15,12 @@ WARM_MOTOR = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """State of a chart as it is shown."""
+    """State of a chart for its status words."""
 
     state_bits: int
     channels: ChannelsInForce
     going: bool
-    """The motor is supplied."""
+    """True if the motor is supplied."""
     reached: bool
     wanted: float
     """Signed reference in Hz."""
@@ -48,7 +45,7 @@ def status_word(body: Body, seen: Appearance) -> int:
 
 
 def _remote(body: Body, channels: ChannelsInForce) -> bool:
-    """Bit 9: no forced local (ATV31/312); command or reference by a network (ATV71)."""
+    """Return bit 9: no forced local (ATV31/312); command or reference by a network (ATV71)."""
     if body.traits.remote_always:
         return not channels.local
     return channels.command.network or channels.reference.network
@@ -79,7 +76,7 @@ def extended_status_word(body: Body, seen: Appearance) -> int:
 
 
 def show_drivecom(body: Body, seen: Appearance) -> None:
-    """Put the status words, the channels and the further words into their registers."""
+    """Put the status words, the channels and the additional words into their registers."""
     body.show_raw("status_word", status_word(body, seen))
     body.show_raw("extended_status_word", extended_status_word(body, seen))
     show_channels(body, seen.channels, second_ramp=seen.second_ramp)

@@ -1,7 +1,4 @@
-"""Which words stop an Altivar 31, 312 or 71 that stays enabled, and what locks it.
-
-Sources: ATV71 communication parameters guide; ATV312 communication variables (CMD, CMI, STT).
-"""
+"""Words that stop an Altivar 31, 312 or 71 while it stays enabled, and those that lock it."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ EXTERNAL_REACTIONS: Mapping[int, Stop | None] = {
 
 
 def stop_type(body: Body) -> Stop:
-    """The normal way to stop, as STT says."""
+    """Return the normal stop type, by STT."""
     return STT.get(body.setting("STT", 0), Stop.RAMP)
 
 
@@ -48,7 +45,7 @@ def commanded_stop(body: Body, word: int, *, low_access: bool) -> Stop | None:
 
 
 def extended_command(body: Body) -> int:
-    """The extended command word CMI."""
+    """Return the extended command word CMI."""
     return body.raw("extended_command_word") & 0xFFFF
 
 
@@ -63,10 +60,10 @@ def locked(body: Body, *, stands: bool) -> bool:
 
 
 def external_fault(body: Body, is_on: Callable[[int], bool]) -> OwnFault | None:
-    """The external fault where CMI bit 3 (ATV31/312) or the assignment of ETF reports it.
+    """Return the external fault if CMI bit 3 (ATV31/312) or the assignment of ETF reports it.
 
-    LET = 0 turns an input round: it reports while it is open. EPL says how the drive stops, or
-    that it goes on.
+    LET = 0 inverts an input: it reports a fault while it is open. EPL selects the stop, or that the
+    motor continues.
     """
     assigned = body.setting("ETF", 0)
     by_input = assigned != 0 and is_on(assigned) == bool(body.setting("LET", 1))

@@ -1,4 +1,4 @@
-"""Which state chart each family of drives has, and what each chart does."""
+"""State charts by family of drives, and their functions."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ RPM_PER_HZ = 30
 
 
 class LeroySomerChart:
-    """The orders and the status of one Leroy-Somer drive."""
+    """State chart of one Leroy-Somer drive: its commands and status."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -51,11 +51,11 @@ class LeroySomerChart:
         self._last = 0
         self._target_hz = 0.0
         self._pressed = False
-        """True if RESET was closed at the last look."""
+        """True if RESET was closed at the last call."""
         body.terminals.apply("AI1", DEFAULT_HZ / LEROY_FULL_HZ)
 
     def power_up(self) -> None:
-        """Nothing is ordered by the line."""
+        """Start without commands of the line."""
         self._last = 0
 
     def run(self, hz: float) -> None:
@@ -73,14 +73,14 @@ class LeroySomerChart:
             self._body.terminals.close(name, closed=False)
 
     def follow(self) -> None:
-        """Look at the inputs: RESET resets a fault."""
+        """Read the inputs: RESET resets a fault."""
         pressed = self._body.terminals.closed("RESET")
         if pressed and not self._pressed:
             self.reset_fault()
         self._pressed = pressed
 
     def written(self, parameter: Parameter) -> None:
-        """Follow a word that the line wrote: the control word moves its bit parameters."""
+        """Process a word that the line wrote: the control word changes its bit parameters."""
         if self._by_word and parameter.code in (CONTROL_WORD, CONTROL_ON):
             word = self._body.setting(CONTROL_WORD, 0)
             for bit, code in BIT_PARAMETERS.items():
@@ -96,7 +96,7 @@ class LeroySomerChart:
         return self._body.setting(CONTROL_ON, 0) == 1
 
     def _bits(self) -> int:
-        """The orders in force, as bits of the control word."""
+        """Return the commands in force, as bits of the control word."""
         if self._by_word:
             return self._body.setting(CONTROL_WORD, 0) & 0xFFFF
         given = self._body.setting
@@ -112,17 +112,17 @@ class LeroySomerChart:
         return self._body.turning or bool(self._bits() & UNLOCKED)
 
     def trip(self, stop: Stop) -> None:
-        """Stop the motor as the fault asks."""
+        """Stop the motor as the fault demands."""
         self._stop = stop
 
     def reset_fault(self) -> None:
-        """Clear the fault if its cause is gone; a run input that is closed starts it again."""
+        """Clear the fault if its cause is removed; a closed run input starts the motor again."""
         fault = self._body.fault
         if fault is not None and not fault.persists:
             self._body.fault = None
 
     def raises(self) -> OwnFault | None:
-        """No word and no input of this family makes a fault."""
+        """Return None: no word and no input of this family causes a fault."""
         return None
 
     def order(self) -> MotorDemand:
@@ -189,5 +189,5 @@ class LeroySomerChart:
 
 
 def _signed(word: int) -> int:
-    """A word as a number with a sign."""
+    """Return a word as a signed number."""
     return word - 0x10000 if word >= 0x8000 else word

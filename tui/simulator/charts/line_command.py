@@ -1,4 +1,4 @@
-"""The command word that the line gave an Altivar 31, 312 or 71, Drivecom or I/O profile."""
+"""Command word of the line for an Altivar 31, 312 or 71, Drivecom or I/O profile."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ENABLE_WORD, IO_FORWARD, IO_REVERSE = 0x000F, 0x0001, 0x0002
 
 
 class LineCommand:
-    """The last command word, and what it orders in the I/O profile."""
+    """Last command word, and its command in the I/O profile."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -25,20 +25,20 @@ class LineCommand:
 
     @property
     def reverse(self) -> bool:
-        """True if the word asks for the other direction."""
+        """True if the word commands reverse."""
         return self.io.reverse if self.is_io else bool(self.word & CMD_REVERSE)
 
     def clear(self) -> None:
-        """Nothing was commanded since power-up."""
+        """Start without a command, as after power-up."""
         self.word = 0
         self.io = IoCommand()
 
     def let_go(self) -> None:
-        """Forget what runs in the I/O profile."""
+        """Discard the run command of the I/O profile."""
         self.io = IoCommand()
 
     def take(self, word: int, *, in_force: bool) -> int:
-        """Take a written word; the bits that have just become 1."""
+        """Accept a written word; return the bits that have just become 1."""
         rising = word & ~self.word
         self.word = word
         if in_force and self.is_io:
@@ -46,7 +46,7 @@ class LineCommand:
         return rising
 
     def enable(self, *, reverse: bool) -> None:
-        """Command running, as another master or a copied command does."""
+        """Command a run, as another master or a copied command does."""
         if self.is_io:
             self.word = IO_REVERSE if reverse else IO_FORWARD
             self.io = IoCommand(True, reverse)
@@ -55,7 +55,7 @@ class LineCommand:
         self._body.show_raw("command_word", self.word)
 
     def adopt(self) -> None:
-        """Follow the present word, now that the line commands."""
+        """Process the present word, now that the line commands."""
         self.word = self._body.raw("command_word") & 0xFFFF
         if self.is_io:
             self.io = read_io_command(IoCommand(), self.word, 0, self._wiring)

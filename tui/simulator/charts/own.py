@@ -1,7 +1,7 @@
-"""The chart of a drive of any make, played from its profile alone.
+"""State chart of a drive of any make, played from its profile alone.
 
-Its states are shown by words of its own, its commands and transitions are followed as written.
-Everything absent from a profile is plain: two-wire terminals RUN and REV, a reference AI1, a ramp.
+Its own words show its states; commands and transitions are those of the profile. Everything absent
+from a profile has a simple form: two-wire terminals RUN and REV, a reference AI1, a ramp.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STOPS_BY_ORDER: dict[OrderId, Stop] = {
 
 
 class OwnChart:
-    """The orders and the status of one drive, after its profile."""
+    """State chart of one drive by its profile: its commands and status."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -36,24 +36,25 @@ class OwnChart:
         self._reference = OwnReference(body)
         self._stop = Stop.RAMP
         self._runs = False
-        """True if the line has ordered a run."""
+        """True if the line has commanded a run."""
         self._reverse = False
         self._idle: State | None = None
-        """The state at rest that the line has led it to; None: the one it starts in."""
+        """State at standstill to which the line has led; None: the initial state."""
         self._pressed = False
         self._target_hz = 0.0
 
     def power_up(self) -> None:
-        """Nothing was ordered by the line."""
+        """Start without commands of the line."""
         self._runs = self._reverse = False
         self._stop = Stop.RAMP
         self._idle = None
         self._orders.forget()
 
-    # Orders from outside
+    # Commands from outside
 
     def run(self, hz: float) -> None:
-        """Run as another master left it where the line can order a run, else by the inputs."""
+        """Run as if by an earlier command of another master if the line can command a run, else by
+        the inputs."""
         chart = self._chart
         if chart is not None and any(order.id == "forward" for order in chart.orders):
             self._runs, self._reverse = True, hz < 0
@@ -70,20 +71,20 @@ class OwnChart:
             self._reference.wire(abs(hz))
 
     def halt(self) -> None:
-        """Open the run inputs, and end what another master left."""
+        """Open the run inputs, and end the command of another master."""
         for name in ("RUN", "REV"):
             self._body.terminals.close(name, closed=False)
         self._end(Stop.RAMP)
 
     def follow(self) -> None:
-        """Look at the inputs: RESET resets a fault."""
+        """Read the inputs: RESET resets a fault."""
         pressed = self._body.terminals.closed("RESET")
         if pressed and not self._pressed:
             self.reset_fault()
         self._pressed = pressed
 
     def written(self, parameter: Parameter) -> None:
-        """Follow a word that the line wrote."""
+        """Process a word that the line wrote."""
         chart = self._chart
         if chart is None:
             return
@@ -110,7 +111,7 @@ class OwnChart:
             self._end(way)
 
     def _go(self, state: State) -> None:
-        """A transition that no order names leads to a state."""
+        """Go to a state by a transition that no command names."""
         if state.kind == "running":
             self._runs = self._body.fault is None
         elif state.kind == "fault":
@@ -130,19 +131,19 @@ class OwnChart:
         self._body.earlier_hz = None
 
     def trip(self, stop: Stop) -> None:
-        """Stop the motor as the fault asks; what the line ordered is over."""
+        """Stop the motor as the fault demands, and discard the commands of the line."""
         self._end(stop)
         self._idle = None
 
     def reset_fault(self) -> None:
-        """Clear the fault if its cause is gone; a run input that is closed starts it again."""
+        """Clear the fault if its cause is removed; a closed run input starts the motor again."""
         fault = self._body.fault
         if fault is not None and not fault.persists:
             self._body.fault = None
             self._stop = Stop.RAMP
 
     def raises(self) -> OwnFault | None:
-        """No word and no input is known to make a fault."""
+        """Return None: no word and no input is known to cause a fault."""
         return None
 
     @property
@@ -150,7 +151,7 @@ class OwnChart:
         """True if stopped-only words are locked."""
         return self._body.turning
 
-    # What the motor is told
+    # Demand on the motor
 
     @property
     def _wired(self) -> bool:
@@ -184,7 +185,7 @@ class OwnChart:
         backward = closed("REV") and not closed("RUN")
         return -hz if (self._reverse if self._runs else backward) else hz
 
-    # What the line is shown
+    # Words for the line
 
     def _raws(self) -> dict[str, int]:
         registers = self._body.registers

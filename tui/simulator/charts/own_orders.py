@@ -12,10 +12,10 @@ Raws = Callable[[], Mapping[str, int]]
 
 
 class OwnOrders:
-    """Follows the words that the line writes, and shows what they complete.
+    """Follower of the words that the line writes; reports the commands that they complete.
 
-    Bits of options stay out of every comparison; an order of several words is complete with the
-    last of them, begun in a state in which it may be given.
+    Bits of options are ignored in every comparison. A command of several words is complete with the
+    last of them, if it began in a state that allows it.
     """
 
     def __init__(self, profile: Profile, raws: Raws) -> None:
@@ -26,12 +26,12 @@ class OwnOrders:
         self._last: dict[str, int] = {}
 
     def forget(self) -> None:
-        """Nothing was written yet."""
+        """Forget all written words."""
         self._places.clear()
         self._last.clear()
 
     def transition(self, chart: Chart, state: State, where: Parameter, raw: int) -> str:
-        """The state that a written command word leads to; empty where it leads nowhere."""
+        """Return the next state by a written command word; empty if it leads to none."""
         if not chart.command or self._profile[chart.command] is not where:
             return ""
         steps = [s for s in chart.transitions if s.source == state.id and s.command is not None]
@@ -46,7 +46,7 @@ class OwnOrders:
         return self._same(chart, where, raw, step.command or 0)
 
     def complete(self, chart: Chart, state: State, where: Parameter, raw: int) -> Order | None:
-        """The order that a written word completes in this state."""
+        """Return the command that a written word completes in this state."""
         raws = self._raws()
         done = None
         for place, order in enumerate(chart.orders):
@@ -71,7 +71,7 @@ class OwnOrders:
         return int(self._same(chart, where, raw, order.words[0]))
 
     def note(self, where: Parameter, raw: int) -> None:
-        """Remember a written word, for the edges of the next."""
+        """Record a written word, to detect the edges of the next."""
         self._last[where.code] = raw
 
     @staticmethod

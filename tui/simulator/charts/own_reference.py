@@ -1,4 +1,4 @@
-"""The reference of a drive of any make: the word that the line wrote last, or an analog input."""
+"""Reference of a drive of any make: the word that the line wrote last, or an analog input."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from tui.drive.profile.schema import Parameter
 from ..body import Body
 
 FULL_REFERENCES = {"%": 100.0, "V": 10.0}
-"""The full reference in units that are parts of it."""
+"""Full reference in relative units."""
 UNGIVEN_HZ = 30.0
-"""Reference in Hz of a drive that the line can run but gives no reference."""
+"""Reference in Hz of a drive that the line can run without giving a reference."""
 
 
 class OwnReference:
@@ -19,7 +19,7 @@ class OwnReference:
         self._body = body
 
     def hz(self, *, by_line: bool) -> float:
-        """The reference in Hz, in the limits that the profile's words give."""
+        """Return the reference in Hz, within the limits of the profile's words."""
         body = self._body
         size = self._given() if by_line else self._full * body.terminals.level("AI1")
         high = min(body.value("high_speed", 1e9) or 1e9, body.value("max_frequency", 1e9) or 1e9)
@@ -47,7 +47,7 @@ class OwnReference:
         return list({p.code: p for p in (*known, *named) if p is not None}.values())
 
     def _latest(self) -> Parameter | None:
-        """The reference word that the line wrote last; None if it wrote none."""
+        """Return the reference word that the line wrote last; None if it wrote none."""
         orders = self._body.line_orders
         words = [word for word in self._words() if orders.given_at(word)]
         return max(words, key=orders.given_at, default=None)
@@ -56,8 +56,8 @@ class OwnReference:
         return self._body.engineering(word) * self._hertz_of_one(word)
 
     def _hertz_of_one(self, word: Parameter) -> float:
-        """Return the Hz of 1 in the unit of a word: a percentage and volts are parts of the
-        whole."""
+        """Return the Hz of one unit of a word; percentages and volts are relative to the full
+        reference."""
         if word.unit in FULL_REFERENCES:
             return self._whole(word) / FULL_REFERENCES[word.unit]
         if not self._is_speed(word) and word.unit != "rpm":
@@ -79,7 +79,7 @@ class OwnReference:
 
     @property
     def is_earlier(self) -> bool:
-        """True if the reference is still what another master left."""
+        """True if the reference is still that of another master."""
         return self._body.earlier_hz is not None and self._latest() is None
 
     def leave(self, hz: float) -> None:
@@ -91,5 +91,5 @@ class OwnReference:
             self._body.registers.put(words[0], round(hz / value))
 
     def wire(self, hz: float) -> None:
-        """Put the analog input to the value for this reference in Hz."""
+        """Set the analog input to the value for this reference in Hz."""
         self._body.terminals.apply("AI1", hz / self._full)

@@ -1,4 +1,4 @@
-"""From a profile's own states to the status words that show them; pure functions."""
+"""Status words for the states of a profile's chart; pure functions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from tui.drive.chart import state_of
 from tui.drive.profile.schema import Chart, State, StateKind
 
 MOST_CLEARED = 3
-"""Bits beside a state's own that are tried together until no state before it fits."""
+"""Most bits, in addition to a state's own, that are tried in combination until no earlier state
+fits."""
 REST_KINDS: tuple[StateKind, ...] = ("ready", "stopped", "blocked", "starting")
 
 
 def word_of(chart: Chart, state: State) -> int:
-    """A status word that means this state; its value where no state before it is in the way."""
+    """Return a status word that means this state; its value if no earlier state matches that."""
     if state_of(chart, state.value) is state:
         return state.value
     others = 0
@@ -29,7 +30,7 @@ def word_of(chart: Chart, state: State) -> int:
 
 
 def state_of_kind(chart: Chart, *kinds: StateKind) -> State | None:
-    """The first state of the first of these kinds that the chart has."""
+    """Return the first state of the first of these kinds that the chart has."""
     for kind in kinds:
         for state in chart.states:
             if state.kind == kind:
@@ -38,6 +39,6 @@ def state_of_kind(chart: Chart, *kinds: StateKind) -> State | None:
 
 
 def with_bit(chart: Chart, word: int, bit: int, *, on: bool) -> int:
-    """A status word with a bit of its own meaning, unless that would show another state."""
+    """Return a status word with a bit of separate meaning, unless that would show another state."""
     marked = word | 1 << bit if on else word & ~(1 << bit)
     return marked if state_of(chart, marked) is state_of(chart, word) else word

@@ -1,4 +1,4 @@
-"""Commands from the inputs of an Altivar 31, 312 or 71: two wires or three, levels or edges.
+"""Commands from the inputs of an Altivar 31, 312 or 71: two-wire or three-wire, levels or edges.
 
 Sources: ATV71 communication parameters list and ATV312 communication variables (TCC, TCT, RRS).
 """
@@ -24,12 +24,12 @@ class WiredOrder:
 
 
 class TerminalWiring:
-    """Follows the inputs that run one drive.
+    """Follower of the run inputs of one drive.
 
-    On two wires a closed contact runs the motor for as long as it is closed, after a reset too;
-    where TCT wants a transition it must have been open once since power-up, reset or change of
-    channel. On three wires LI1 allows running, a pulse of LI2 starts, one of LI3 or
-    the input of RRS starts the other way.
+    With two wires, a closed contact runs the motor for as long as it is closed, also after a reset.
+    If TCT requires a transition, it must have been open once since power-up, reset or change of
+    channel. With three wires, LI1 allows running, a pulse of LI2 starts, one of LI3 or of the input
+    of RRS starts reverse.
     """
 
     def __init__(self, body: Body) -> None:
@@ -37,15 +37,15 @@ class TerminalWiring:
         self.order = WiredOrder()
         self._before: frozenset[str] = frozenset()
         self._spent = False
-        """True if what is closed has to open first."""
+        """True if the closed inputs must open first."""
 
     def renew(self) -> None:
-        """Something ended what the inputs ordered: a fault, a loss of supply, another channel."""
+        """Require a new transition after a fault, a loss of supply or a change of channel."""
         self.order = WiredOrder()
         self._spent = self._body.setting("TCT", 0) == TRANSITION
 
     def follow(self) -> None:
-        """Look at the inputs as they are now."""
+        """Read the present inputs."""
         terminals = self._body.terminals
         closed = frozenset(name for name in terminals.names.logic if terminals.closed(name))
         pressed = closed - self._before
@@ -75,7 +75,8 @@ class TerminalWiring:
         return f"LI{raw - 128}" if 129 <= raw <= 142 else "LI2"
 
     def stop(self) -> Stop | None:
-        """A stop by an input that must be closed to run (NST, FST), whatever commands."""
+        """Return the stop by an input that must be closed to run (NST, FST), from any command
+        source."""
         for code, way in ((FREEWHEEL_INPUT, Stop.FREEWHEEL), (FAST_INPUT, Stop.FAST)):
             raw = self._body.setting(code, 0)
             if 129 <= raw <= 142 and not self._body.terminals.closed(f"LI{raw - 128}"):

@@ -1,1 +1,1 @@
-"""Plant of a simulated drive: motor, load, faults, memory, watch of the line."""
+"""Plant of a simulated drive: motor, load, faults, memory, line timeout."""

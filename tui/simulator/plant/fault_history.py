@@ -1,4 +1,4 @@
-"""Faults of a drive: from code to raw value, shown, and moved through the history."""
+"""Faults of a drive: raw values of codes, fault words, and history."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from .motor import Stop
 
 @dataclass(frozen=True, slots=True)
 class OwnFault:
-    """A fault that a word or an input makes the drive have, and how it stops then."""
+    """Fault caused by a word or an input, and its kind of stop."""
 
     raw: int
     stop: Stop | None
-    """None: as the reaction to a silent line says."""
+    """Kind of stop; None: the configured reaction to communication loss."""
     persists: bool = False
-    """True if no reset helps for as long as it is raised."""
+    """True if the fault cannot be reset while it is raised."""
 
 
 def fault_raw(profile: Profile, fault: str | int) -> int:
-    """The raw value of a fault given by code in any case, or by its raw value.
+    """Return the raw value of a fault given by code in any case, or by its raw value.
 
-    Raises SimulatorError for a code that the profile does not know.
+    Raises SimulatorError for a code that the profile does not have.
     """
     if isinstance(fault, int):
         return fault
@@ -41,7 +41,7 @@ def fault_raw(profile: Profile, fault: str | int) -> int:
 
 
 class FaultHistory:
-    """The fault words of one drive."""
+    """Fault words of one drive."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -49,10 +49,10 @@ class FaultHistory:
         self._records = FaultRecords(body)
 
     def enter(self, raw: int, *, persists: bool) -> None:
-        """Give the drive a fault: keep its record, show it, and move the history on.
+        """Enter a fault: store its record, show it, and shift the history.
 
-        The history moves on by the new fault, or by the one before it where the word of the
-        last fault is its first place.
+        The new fault enters the history, or the one before it if the word of the last fault is the
+        first place of the history.
         """
         body = self._body
         self._records.take()
@@ -77,7 +77,7 @@ class FaultHistory:
             registers.put(place, value)
 
     def show(self) -> None:
-        """Show the present fault where its word does not keep the last one."""
+        """Show the present fault, unless its word keeps the last one."""
         if self._faults.parameter and not self._faults.shows_last:
             fault = self._body.fault
             self._body.show_code(self._faults.parameter, fault.raw if fault else self._faults.none)

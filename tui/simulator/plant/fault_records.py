@@ -20,7 +20,7 @@ RECORDED: Mapping[str, str] = {
     "THP": "THR",
     "RTP": "RTH",
 }
-"""Beginnings of the codes of a fault's record, and the word that each keeps; 0 is the last."""
+"""Code prefixes of a fault's record, and the word that each stores; 0 is the last fault."""
 RECORDS = 9
 
 
@@ -32,7 +32,7 @@ class FaultRecords:
         self._records: list[dict[str, int]] = []
 
     def take(self) -> None:
-        """Keep the words of this moment as the record of a fault."""
+        """Store the present words as the record of a fault."""
         registers = self._body.registers
         record = {
             start: registers.present(parameter)

@@ -1,4 +1,4 @@
-"""The words a simulated drive has when it leaves the factory and was set up for its motor."""
+"""Initial words of a simulated drive with factory settings, set up for its motor."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from .motor import RatingPlate
 def first_values(
     profile: Profile, rating: RatingPlate, line_first: Mapping[str, int]
 ) -> dict[str, int]:
-    """A raw value for every parameter: commissioned, factory, from the rating, or the lowest.
+    """Return a raw value for every parameter: commissioned, factory, from the rating, or the
+    lowest.
 
     `line_first` are raw values by code, in any case, of a drive set up for its line.
     """
@@ -31,7 +32,7 @@ def first_values(
             raw = to_raw(profile, parameter, plate[parameter.quantity])
         values[parameter.code] = _lowest(profile, parameter) if raw is None else raw
     for parameter in profile.parameters:
-        # what follows the drive's rated current, once that is known
+        # values that depend on the drive's rated current, once that is known
         if parameter.factory_of is not None and parameter.code.casefold() not in chosen:
             raw = counts_of(profile, parameter, parameter.factory_of, values)
             values[parameter.code] = values[parameter.code] if raw is None else raw
@@ -67,7 +68,7 @@ def _plate(rating: RatingPlate) -> dict[Quantity | None, float]:
 
 
 def _lowest(profile: Profile, parameter: Parameter) -> int:
-    """0, or the nearest value that the parameter may have."""
+    """Return 0, or the nearest value that the parameter allows."""
     if parameter.access == "r":
         return 0
     names = profile.names(parameter)
@@ -78,7 +79,7 @@ def _lowest(profile: Profile, parameter: Parameter) -> int:
 
 
 def to_raw(profile: Profile, parameter: Parameter, value: float) -> int:
-    """The raw value nearest to an engineering value, within the type; factory scale."""
+    """Return the raw value nearest to an engineering value, within the type; factory scale."""
     counts = Decimal(repr(float(value))) / Decimal(parameter.scale)
     low, high = type_range(parameter)
     return min(max(int(counts.to_integral_value(ROUND_HALF_UP)), low), high)

@@ -1,5 +1,5 @@
-"""Load of the machine: slowly changing, with a varying mains, and a person who changes the
-reference now and then. Seeded, so that a run can be repeated."""
+"""Load of the machine: slowly changing, with a varying supply voltage, and an operator who changes
+the reference at intervals. Seeded, so that a run can be repeated."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 from random import Random
 
 REFERENCE_STEPS = (0.5, 0.65, 0.8, 0.9, 1.0)
-"""Parts of the first reference that a wandering one takes."""
+"""Factors of the initial reference that a wandering one takes."""
 REFERENCE_PAUSE = (12.0, 30.0)
 
 
 class Load:
-    """Load in rated torque and mains in parts of the rated voltage, over time."""
+    """Load as a share of rated torque, and supply as a share of rated voltage, over time."""
 
     def __init__(self, random: Random) -> None:
         self._random = random
@@ -21,7 +21,7 @@ class Load:
         self._time = 0.0
 
     def step(self, dt: float) -> None:
-        """Let time pass."""
+        """Advance the time by `dt` seconds."""
         self._time += dt
 
     @property
@@ -38,7 +38,7 @@ class Load:
 
 
 class Wanderer:
-    """A reference at the terminals that is changed now and then."""
+    """Reference at the terminals that changes at intervals."""
 
     def __init__(self, random: Random) -> None:
         self._random = random
@@ -46,12 +46,13 @@ class Wanderer:
         self._left = 0.0
 
     def begin(self, hz: float | None) -> None:
-        """Wander around a reference in Hz; None: leave it alone."""
+        """Start changes around a reference in Hz; None: no changes."""
         self._first = hz
         self._left = self._random.uniform(*REFERENCE_PAUSE)
 
     def step(self, dt: float) -> float | None:
-        """The new reference in Hz if it is changed now, else None."""
+        """Advance the time by `dt` seconds; return the new reference in Hz if it changes, else
+        None."""
         if self._first is None:
             return None
         self._left -= dt

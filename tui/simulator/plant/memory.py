@@ -1,7 +1,7 @@
 """Commands that move a drive's settings between working memory, EEPROM and factory values.
 
-Sources: ATV312 communication variables, CMI and SCS; ATV71 communication parameters guide.
-A save, and a recall, are only taken while the motor is not supplied.
+Sources: ATV312 communication variables, CMI and SCS; ATV71 communication parameters guide. A save
+and a recall are only accepted while the motor is not supplied.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ LINE_ROLES = frozenset({"address", "baud", "format", "parity", "protocol", "time
 
 
 class SettingsMemory:
-    """Follows the words that save, recall and restore settings."""
+    """Follower of the words that save, recall and restore settings."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -26,12 +26,12 @@ class SettingsMemory:
         self._level = 0
 
     def power_up(self) -> None:
-        """No command is pending."""
+        """Start without a pending command."""
         self._last = 0
         self._level = self._body.setting("LAC", 0)
 
     def written(self, parameter: Parameter) -> None:
-        """Follow a word that the line wrote."""
+        """Process a word that the line wrote."""
         if parameter.quantity == "extended_command_word":
             self._extended(parameter)
         elif parameter.quantity == "save_settings" and self._body.registers.present(parameter):
@@ -52,7 +52,7 @@ class SettingsMemory:
                     registers.put(parameter, raw)
 
     def _access_level(self, parameter: Parameter) -> None:
-        """Reaching level L3 makes the channels their factory values (ATV31/312)."""
+        """Set the channels to their factory values at access level L3 (ATV31/312)."""
         level = self._body.registers.present(parameter)
         if level == LEVEL_3 and self._level != LEVEL_3:
             for code in CHANNEL_CODES:
@@ -80,6 +80,6 @@ class SettingsMemory:
             self._body.saving = SAVE_TIME
 
     def _kept(self) -> frozenset[str]:
-        """Settings of the line keep their value when others are recalled."""
+        """Return the line settings, which keep their value when others are recalled."""
         settings = self._body.profile.data.link.settings
         return frozenset(s.parameter for s in settings if s.role in LINE_ROLES)

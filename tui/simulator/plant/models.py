@@ -1,4 +1,4 @@
-"""The words that show a drive's model, from the reference it identifies itself with."""
+"""Words that show a drive's model, from the reference in its identity."""
 
 from __future__ import annotations
 
@@ -39,5 +39,5 @@ def _model(models: list[Model], reference: str) -> Model | None:
 
 
 def _has_power(model: Model, power: float) -> bool:
-    """Return True if it is one of a model's powers: 0.37/0.4 by 50 Hz and 60 Hz motors."""
+    """Return True if a model has this power: 0.37/0.4 kW by 50 Hz and 60 Hz motors."""
     return any(math.isclose(float(part), power) for part in model.power_kw.split("/"))

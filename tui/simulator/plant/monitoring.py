@@ -1,4 +1,4 @@
-"""From the motor's physical values to a drive's monitoring words, in the profile's units."""
+"""Monitoring words of a drive from the motor's physical values, in the profile's units."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ BY_UNIT: Mapping[Quantity, Mapping[str, Converter]] = {
     "run_hours": _hours("run_hours"),
     "power_on_hours": _hours("on_hours"),
 }
-"""Quantities by the units that profiles may give them; the first stands for a missing unit."""
+"""Conversions of quantities by unit in the profile; the first applies if the unit is missing."""
 
 UNCONFIRMED: Mapping[str, Mapping[str, Callable[[MotorState], float]]] = {
     "leroy-somer": {
@@ -74,7 +74,8 @@ UNCONFIRMED: Mapping[str, Mapping[str, Callable[[MotorState], float]]] = {
         "5.04": lambda motor: abs(motor.rotor) * 30,
     }
 }
-"""Words of unknown scale, by kind of chart: they move with the motor and prove nothing."""
+"""Words of unknown scale, by kind of chart: they change with the motor, without a verified
+value."""
 
 COUNTER_UNITS = 1 | 2 << 2 | 2 << 4
 """UNT of the ATV71: energy in kWh, times in h."""
@@ -96,7 +97,8 @@ def show_motor(body: Body) -> None:
 
 
 def _show_speed(body: Body) -> None:
-    """Speed as the profile's formula gives it, else that of the rotor, signed where it can be."""
+    """Show the speed by the profile's formula, else that of the rotor, signed if the word allows
+    it."""
     poles = round(body.value("motor_poles", body.rating.poles))
     poles = poles if poles >= 2 else body.rating.poles
     formula = body.profile.data.monitoring.speed_from
@@ -115,10 +117,10 @@ def _show_speed(body: Body) -> None:
 
 
 def speed_from_frequency(raw_frequency: int, poles: int) -> int:
-    """Speed in rpm from a raw output frequency in 0.01 Hz and the number of poles.
+    """Return the speed in rpm from a raw output frequency in 0.01 Hz and the number of poles.
 
-    The drive's own rounding: (F x 12 + 5 x poles) / (poles x 10), cut to an integer.
-    Source: ATV21 Modbus manual 8.3, FE90. Raises ValueRefused for less than one pole.
+    The drive's own rounding: (F x 12 + 5 x poles) / (poles x 10), cut to an integer. Source: ATV21
+    Modbus manual 8.3, FE90. Raises ValueRefused for less than one pole.
     """
     if poles < 1:
         raise ValueRefused(f"{poles} poles: a motor has at least 2.")

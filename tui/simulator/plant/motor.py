@@ -1,7 +1,7 @@
-"""The motor behind a simulated drive: a pure step from one state to the next.
+"""Motor of a simulated drive: a pure step from one state to the next.
 
-Plausible, not exact: straight ramps, slip in proportion to torque, first-order thermal
-states, a DC bus that sags under load and rises while braking.
+Plausible, not exact: straight ramps, slip in proportion to torque, first-order thermal states, a DC
+bus that sags under load and rises while braking.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 MAX_STEP = 0.05
-"""Longest step in s; a longer time is cut into such steps."""
+"""Longest step in s; a longer time is divided into such steps."""
 
 _MAGNETISING = 0.45
 _INERTIA = 0.02
@@ -36,7 +36,7 @@ class Stop(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RatingPlate:
-    """A drive and its motor as on their rating plates: kW, V, Hz, rpm, A."""
+    """Rating plate of a drive and its motor: kW, V, Hz, rpm, A."""
 
     power: float
     voltage: float
@@ -48,7 +48,7 @@ class RatingPlate:
 
     @property
     def slip(self) -> float:
-        """Slip at rated torque, as a part of the synchronous speed."""
+        """Slip at rated torque, as a share of the synchronous speed."""
         synchronous = 120 * self.frequency / self.poles
         return max(0.0, 1 - self.speed / synchronous)
 
@@ -94,7 +94,8 @@ class MotorDemand:
 def step(
     state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, mains: float, dt: float
 ) -> MotorState:
-    """The state after `dt` seconds at a load (1.0 is rated torque) and a mains voltage in V."""
+    """Return the state after `dt` seconds at a load (1.0 is rated torque) and a supply voltage in
+    V."""
     while dt > MAX_STEP:
         state = _step(state, rating, order, load, mains, MAX_STEP)
         dt -= MAX_STEP
@@ -138,7 +139,7 @@ def _drive(
 
 
 def approach(frequency: float, order: MotorDemand, dt: float) -> float:
-    """The ramp's output after `dt`: towards the target, through zero where it must reverse."""
+    """Return the ramp's output after `dt`: towards the target, through zero if it must reverse."""
     target = order.target
     if frequency * target < 0:
         target = 0.0
@@ -213,7 +214,8 @@ _STANDARD = RatingPlate(4.0, 400.0, speed=1440.0)
 
 
 def rating_of(reference: str) -> RatingPlate:
-    """A rating after a drive's reference (ATV71HU15M3: 1.5 kW, 230 V); 4 kW, 400 V otherwise."""
+    """Return the rating of a drive's reference (ATV71HU15M3: 1.5 kW, 230 V); 4 kW, 400 V
+    otherwise."""
     match = _PLATE.search(reference.upper()[5:]) or _PLATE.search(reference.upper())
     if match is None:
         return _with_currents(_STANDARD)

@@ -1,7 +1,7 @@
-"""The terminals of a simulated drive: logic inputs that keep their state, analog inputs.
+"""Terminals of a simulated drive: logic inputs that keep their state, analog inputs.
 
-A contact that is closed stays closed, through a trip, a reset and a loss of the supply. An analog
-input is kept as a part of its full scale, 0..1, with any wiring.
+A closed contact stays closed, through a trip, a reset and a loss of the supply. An analog input is
+stored as a share of its full scale, 0..1, for any wiring.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..rules import ChartKind
 
 FULL_VOLTS, FULL_MILLIAMPERES = 10.0, 20.0
 SHORT_LIST = 3
-"""Names of inputs that are shown one by one."""
+"""Greatest number of input names that are listed one by one."""
 _LEVEL = re.compile(r"(\d+(?:\.\d+)?)\s*(v|ma|%)?", re.IGNORECASE)
 _OPEN, _CLOSED = frozenset({"0", "off", "open"}), frozenset({"1", "on", "closed"})
 
@@ -41,7 +41,7 @@ def _altivar(logic: int, analog: int) -> TerminalNames:
 
 
 PLAIN_TERMINALS = TerminalNames(("RUN", "REV", "RESET"), ("AI1",), "RUN", "REV", "RESET")
-"""Terminals of a drive whose own names are not known."""
+"""Terminals of a drive whose own names are unknown."""
 BY_KIND: Mapping[ChartKind, TerminalNames] = {
     "drivecom": _altivar(14, 4),
     "altivar21": TerminalNames(("F", "R", "RES"), ("VIA", "VIB"), "F", "R", "RES"),
@@ -54,32 +54,32 @@ COMPACT = _altivar(6, 3)
 
 @dataclass
 class Terminals:
-    """The inputs of one drive as they are now."""
+    """Present inputs of one drive."""
 
     names: TerminalNames
     _closed: set[str] = field(default_factory=set)
     _levels: dict[str, float] = field(default_factory=dict)
 
     def closed(self, name: str) -> bool:
-        """Return True if a logic input has its signal."""
+        """Return True if a logic input is on."""
         return name in self._closed
 
     def level(self, name: str) -> float:
-        """An analog input as a part of its full scale, 0..1."""
+        """Return an analog input as a share of its full scale, 0..1."""
         return self._levels.get(name, 0.0)
 
     def close(self, name: str, closed: bool = True) -> None:
-        """Give a logic input its signal, or take it away."""
+        """Switch a logic input on or off."""
         (self._closed.add if closed else self._closed.discard)(name)
 
     def apply(self, name: str, level: float) -> None:
-        """Put an analog input to a part of its full scale; what lies beyond is cut."""
+        """Set an analog input to a share of its full scale; values outside 0..1 are limited."""
         self._levels[name] = min(max(level, 0.0), 1.0)
 
     def set(self, name: str, text: str) -> str:
         """Set an input by name (`LI1`, `ai1`) to `1`, `0`, `5`, `5V`, `12mA` or `50%`.
 
-        Returns what it is now, for a person. Raises SimulatorError.
+        Returns the resulting text for a person. Raises SimulatorError.
         """
         wanted, value = self.check(name, text)
         if isinstance(value, bool):
@@ -89,7 +89,7 @@ class Terminals:
         return f"{wanted} = {100 * value:g} %"
 
     def check(self, name: str, text: str) -> tuple[str, bool | float]:
-        """The input that is meant and what it would be set to; raises SimulatorError."""
+        """Return the input of a name and its new value; raises SimulatorError."""
         wanted = name.strip().upper()
         if wanted in self.names.logic:
             return wanted, _switch(wanted, text)
@@ -99,11 +99,11 @@ class Terminals:
         raise SimulatorError(f"No input is called {name.strip()!r} here. Inputs: {known}.")
 
     def bits(self) -> int:
-        """The logic inputs as bits, the first in bit 0."""
+        """Return the logic inputs as bits, the first in bit 0."""
         return sum(1 << bit for bit, name in enumerate(self.names.logic) if self.closed(name))
 
     def reported(self) -> str:
-        """All inputs in a line, for a person."""
+        """Return all inputs as one line, for a person."""
         logic = self.names.logic
         group = f"{logic[0]} to {logic[-1]}" if len(logic) > SHORT_LIST else ", ".join(logic)
         closed = ", ".join(name for name in logic if self.closed(name)) or "none"

@@ -1,7 +1,7 @@
-"""The drive's watch over the line: timeout, when it starts, and what the drive does then.
+"""Communication timeout of a drive: its time, its start, and the drive's reaction.
 
-Sources: ATV21 Modbus manual 6.4 (F803, F603); ATV71 Modbus manual, communication fault
-management, and ATV312 communication variables (ttO, SLL); PX-MODBUS manual 4 (15.07).
+Sources: ATV21 Modbus manual 6.4 (F803, F603); ATV71 Modbus manual, communication fault management,
+and ATV312 communication variables (ttO, SLL); PX-MODBUS manual 4 (15.07).
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from ..body import Body, Fallback
 from .motor import Stop
 
 NO_MONITORING = 1 << 14
-"""CMI bit 14 of the ATV31 and ATV312: the line is not watched."""
+"""CMI bit 14 of the ATV31 and ATV312: the timeout is off."""
 
 
 @dataclass(frozen=True, slots=True)
 class Consequence:
-    """Reaction to a silent line: a fault with a kind of stop, or a fallback without one."""
+    """Reaction to communication loss: a fault with a kind of stop, or a fallback without a
+    fault."""
 
     trip: Stop | None = None
     fallback: Fallback | None = None
@@ -38,7 +39,7 @@ ALTIVAR_REACTIONS: Mapping[str, Consequence] = {
 }
 """Reactions by their code on the keypad."""
 ALTIVAR_RAW: Mapping[int, str] = {0: "no", 1: "yes", 6: "rmp", 7: "fst"}
-"""Raw values of SLL that the ATV312 manual gives, for a profile without codes."""
+"""Raw values of SLL from the ATV312 manual, for a profile without codes."""
 ALTIVAR_21_REACTIONS: Mapping[int, Consequence] = {
     0: Consequence(trip=Stop.FREEWHEEL),
     1: Consequence(trip=Stop.RAMP),
@@ -48,7 +49,7 @@ FREEWHEEL = Consequence(trip=Stop.FREEWHEEL)
 
 
 class SilenceWatch:
-    """Counts the silence of the line towards one drive."""
+    """Timer of the communication loss of one drive."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -58,12 +59,12 @@ class SilenceWatch:
         self._silent = 0.0
 
     def power_up(self) -> None:
-        """Wait for the line to speak again before watching it."""
+        """Wait for a new request before monitoring the timeout."""
         self._spoken = self._expired = False
         self._silent = 0.0
 
     def heard(self) -> None:
-        """A valid request to the drive's own address came."""
+        """Restart the timeout after a valid request to the drive's own address."""
         self._spoken = True
         self._expired = False
         self._silent = 0.0
@@ -71,7 +72,7 @@ class SilenceWatch:
 
     @property
     def timeout(self) -> float | None:
-        """Timeout in force, in s; None where the watch is off."""
+        """Timeout in force, in s; None if it is off."""
         if self._data is None:
             return None
         parameter = self._body.registers.named(self._data.timeout)
@@ -83,7 +84,7 @@ class SilenceWatch:
 
     @property
     def watching(self) -> bool:
-        """True if the watch has started and is not switched off."""
+        """True if the timeout has started and is not off."""
         if self._data is None or self.timeout is None:
             return False
         if self._body.traits.access_levels:
@@ -95,7 +96,7 @@ class SilenceWatch:
         return self._spoken and (given or not self._data.needs_write)
 
     def step(self, dt: float) -> Consequence | None:
-        """Let time pass; what has to happen if the timeout has just run out."""
+        """Advance the time by `dt` seconds; return the reaction if the timeout has just expired."""
         if self._body.forced_local:
             self._silent = -self._resumes_after
             return None
@@ -109,7 +110,8 @@ class SilenceWatch:
 
     @property
     def _resumes_after(self) -> float:
-        """Time in s after forced local control before the line is watched again (FLOT)."""
+        """Return the time in s after forced local control before the timeout is monitored again
+        (FLOT)."""
         parameter = self._body.registers.named("FLOT")
         return self._body.engineering(parameter) if parameter else 0.0
 
@@ -126,7 +128,7 @@ class SilenceWatch:
 
     @property
     def fault(self) -> int | None:
-        """Raw code of the fault that a silent line causes, where the profile knows it."""
+        """Return the raw code of the communication fault, if the profile has it."""
         return self._data.fault if self._data else None
 
 

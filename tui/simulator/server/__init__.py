@@ -1,1 +1,1 @@
-"""A simulated drive as a Modbus server: functions, access, conversation, endpoints."""
+"""Modbus server of a simulated drive: functions, access, conversation, endpoints."""

@@ -1,4 +1,5 @@
-"""Reading and writing a drive's words as its manual allows: limits, blocks, scanner, ranges."""
+"""Read and write access to a drive's words as its manual allows: limits, blocks, scanner,
+ranges."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ NO_VALUE = 0x8000
 
 
 class Refused(Exception):
-    """A request the drive does not fulfil: an exception code, or None for silence."""
+    """A request that the drive refuses: an exception code, or None for no reply."""
 
     def __init__(self, code: int | None) -> None:
         super().__init__(code)
@@ -25,7 +26,7 @@ class Refused(Exception):
 
 
 class DriveWords:
-    """The words of the drive's own server, with everything the manual says about access."""
+    """Words of the drive's own server, with the access rules of its manual."""
 
     def __init__(
         self,
@@ -45,9 +46,9 @@ class DriveWords:
         self._written = written
         self._reading = profile.data.reading
         self._taught = {reference.parameter for reference in profile.data.teachable_references}
-        """Words that take a reference though no document says that they can be written."""
+        """Words that accept a reference although no document describes them as writable."""
         self._scanner: dict[int, tuple[Block, int]] = {}
-        """Words that stand for another parameter: their block and place in it."""
+        """Words that mirror another parameter: their block and place in it."""
         for block in profile.data.blocks:
             if not block.fixed_start:
                 for place, address in enumerate(self._value_addresses(block)):
@@ -61,7 +62,7 @@ class DriveWords:
     # Reading
 
     def read(self, address: int, count: int, function: Function) -> list[int]:
-        """The words of a read; raises Refused as the drive would."""
+        """Return the words of a read; raises Refused as the drive would."""
         self._check_count(count, function.max_read, function)
         block = self._fixed_block(address, count, "read")
         if block is not None:
@@ -105,7 +106,7 @@ class DriveWords:
         return None
 
     def _slot_word(self, block: Block, place: int) -> int:
-        """The live word behind a place of a block; no value where none or nothing known is."""
+        """Return the live word of a place of a block; 0 or `NO_VALUE` if it has no known target."""
         target = self._target(block, place)
         if target is None:
             return NO_VALUE if block.selects_by == "choice" else 0
@@ -113,7 +114,7 @@ class DriveWords:
         return self._registers.word(target) if known else NO_VALUE
 
     def _target(self, block: Block, place: int) -> int | None:
-        """The address that a place of a block stands for; None where it stands for nothing."""
+        """Return the target address of a place of a block; None if it has none."""
         if place >= len(block.slots):
             return None
         raw = self._registers.in_force(self._profile[block.slots[place]])
@@ -125,10 +126,10 @@ class DriveWords:
     # Writing
 
     def write(self, address: int, words: Sequence[int], function: Function) -> None:
-        """Take words as the drive does; raises Refused.
+        """Write words as the drive does; raises Refused.
 
         Unknown addresses and forbidden values refuse the whole request. A word that cannot be
-        written now refuses the rest of it: what stood before it has been written.
+        written now refuses the rest of it: the words before it have been written.
         """
         self._check_count(len(words), function.max_write, function)
         block = self._fixed_block(address, len(words), "write") if len(words) > 1 else None
@@ -176,7 +177,7 @@ class DriveWords:
             raise Refused(self._refusals.out_of_range)
 
     def _within(self, parameter: Parameter, raw: int) -> int:
-        """The raw value cut to the parameters that limit it."""
+        """Return the raw value reduced to the parameters that limit it."""
         for code, bound in ((parameter.min_from, max), (parameter.max_from, min)):
             limit = self._registers.named(code) if code else None
             if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):
@@ -216,7 +217,7 @@ class DriveWords:
 
 
 def past_limit(function: Function, refusal: int | None) -> int | None:
-    """Return the refusal of a request beyond a function's limit: an exception, or None for
-    silence."""
+    """Return the refusal of a request beyond a function's limit: an exception, or None for no
+    reply."""
     silent = function.past_limit == "silence" or refusal is None
     return None if silent else function.past_limit_exception

@@ -1,6 +1,6 @@
 """Addresses of a drive: its own server and those of its cards.
 
-May be asked from several threads; what changes a word holds the drive's lock.
+Thread-safe: every change of a word holds the drive's lock.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from .functions import Server
 from .station import Station
 
 CARD_FUNCTIONS = (3, 6, 16, 23)
-"""Functions that the servers of cards have, of those of the drive."""
+"""Functions of the drive that the servers of its cards support."""
 
 
 class Answering:
-    """Answers of a drive on the line; silent while its supply is off."""
+    """Replies of a drive on the line; none while its supply is off."""
 
     def __init__(
         self,
@@ -43,7 +43,8 @@ class Answering:
                 self._cards[server.parameter.casefold()] = (words, card)
 
     def put_card_word(self, name: str, raw: int) -> bool:
-        """Put a raw value into a card's word (`%MW..`, `IPC1`..`IPC4`); False where it is none."""
+        """Put a raw value into a card's word (`%MW..`, `IPC1`..`IPC4`); False if it has another
+        name."""
         found = card_word(name)
         if found is None or found[0] not in self._cards:
             return False
@@ -51,7 +52,7 @@ class Answering:
         return True
 
     def answers_at(self, address: int) -> bool:
-        """Return True if one of the drive's servers has this address and replies there."""
+        """Return True if one of the drive's servers has this address and replies at it."""
         return self._body.powered and self._server_at(address) is not None
 
     def _server_at(self, address: int) -> Server | None:
@@ -73,7 +74,7 @@ class Answering:
         return self._body.powered and self._station.is_called(address)
 
     def answer(self, address: int, pdu: bytes) -> bytes | None:
-        """The reply of the server at an address; None where it stays silent."""
+        """Return the reply of the server at an address; None for no reply."""
         with self._lock:
             server = self._server_at(address) if self._body.powered else None
             if server is None:
@@ -87,14 +88,14 @@ class Answering:
             return reply
 
     def obey(self, pdu: bytes) -> None:
-        """Do what a broadcast or a call to a group says, without a word."""
+        """Execute a broadcast or a call to a group, without a reply."""
         with self._lock:
             function = self._body.profile.function(pdu[0]) if pdu else None
             if self._body.powered and function is not None and function.broadcast:
                 self._own.answer(pdu)
 
     def count_checksum_error(self) -> None:
-        """A frame to this drive came with a wrong checksum."""
+        """Count a frame to this drive with a wrong checksum."""
         with self._lock:
             self._own.counters.count_checksum_error()
             self._show_counters()

@@ -1,4 +1,4 @@
-"""The words behind an Altivar 71's further servers: programmable card, communication card.
+"""Words of an Altivar 71's additional servers: programmable card, communication card.
 
 Source: ATV71 Modbus manual, function 3, examples 2 and 3; each server has an address of its own.
 """
@@ -19,7 +19,7 @@ IP_ADDRESS = range(60006, 60010)
 
 
 class CardWords:
-    """Words of a card: some known, of those some writable."""
+    """Known words of a card, some of them writable."""
 
     def __init__(self, known: Mapping[int, int], *, writable: bool, refusals: Refusals) -> None:
         self.words = dict(known)
@@ -27,12 +27,12 @@ class CardWords:
         self._refusals = refusals
 
     def read(self, address: int, count: int, function: Function) -> list[int]:
-        """The words of a read; raises Refused where one does not exist."""
+        """Return the words of a read; raises Refused if one does not exist."""
         self._check(address, count, function.max_read, function)
         return [self.words[a] for a in range(address, address + count)]
 
     def write(self, address: int, words: Sequence[int], function: Function) -> None:
-        """Take words; raises Refused where one does not exist or cannot be written."""
+        """Write words; raises Refused if one does not exist or is read-only."""
         self._check(address, len(words), function.max_write, function)
         if not self._writable:
             raise Refused(self._refusals.read_only)
@@ -48,7 +48,7 @@ class CardWords:
 
 
 def card_words(parameter: str, refusals: Refusals) -> CardWords | None:
-    """The words behind the server whose address is set by this parameter; None if unknown."""
+    """Return the words of the server whose address this parameter sets; None if unknown."""
     if parameter.casefold() == "amoa":
         return CardWords(dict.fromkeys(range(MEMORY_WORDS), 0), writable=True, refusals=refusals)
     if parameter.casefold() == "amoc":
@@ -57,7 +57,7 @@ def card_words(parameter: str, refusals: Refusals) -> CardWords | None:
 
 
 def card_word(name: str) -> tuple[str, int] | None:
-    """Server and address of a card's word by its name (`%MW20`, `IPC1`); None for others."""
+    """Return server and address of a card's word by its name (`%MW20`, `IPC1`); None for others."""
     folded = name.strip().casefold()
     if folded.startswith("%mw") and folded[3:].isdecimal():
         return "amoa", int(folded[3:])

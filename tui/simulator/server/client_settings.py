@@ -1,4 +1,4 @@
-"""Settings of the other side of a simulated line, as far as the simulator can see them."""
+"""Settings of the client of a simulated line, as far as the simulator can see them."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ _ISPEED, _OSPEED, _CFLAG = 4, 5, 2
 
 @dataclass(frozen=True, slots=True)
 class ClientSettings:
-    """Baud, parity and stop bits on the client's side; None: it cannot be seen."""
+    """Baud, parity and stop bits of the client; None if not visible."""
 
     baud: int | None = None
     parity: str | None = None
     stop_bits: int | None = None
 
     def fits(self, baud: int, form: str) -> bool:
-        """Return True if a drive with this baud and format understands what comes and is
-        understood."""
+        """Return True if a drive with this baud and format can communicate with the client."""
         return (
             self.baud in (None, baud)
             and self.parity in (None, form[1])
@@ -29,7 +28,7 @@ class ClientSettings:
         )
 
     def pace(self, timing: LineTiming) -> LineTiming:
-        """The line's timing with what the client is set to in place of its own."""
+        """Return the line's timing with the client's settings instead of its own."""
         form = timing.format
         if self.stop_bits is not None:
             form = f"{form[:2]}{self.stop_bits}"
@@ -37,7 +36,7 @@ class ClientSettings:
 
 
 def settings_of_terminal(handle: int) -> ClientSettings:
-    """Baud and stop bits of a pseudo-terminal; the kernel keeps no parity there."""
+    """Return baud and stop bits of a pseudo-terminal; the kernel keeps no parity there."""
     import termios
 
     with contextlib.suppress(termios.error):
@@ -49,9 +48,9 @@ def settings_of_terminal(handle: int) -> ClientSettings:
 
 
 def set_up_terminal(handle: int, timing: LineTiming) -> bool:
-    """Put a pseudo-terminal to a line's baud and stop bits, so that who sets nothing hears it.
+    """Set a pseudo-terminal to a line's baud and stop bits, for clients that set nothing.
 
-    False if the system has no such baud: then its settings show nothing.
+    Returns False if the system has no such baud: then its settings show nothing.
     """
     import termios
 
@@ -68,7 +67,7 @@ def set_up_terminal(handle: int, timing: LineTiming) -> bool:
 
 
 def _bauds() -> dict[int, int]:
-    """The system's constants by baud."""
+    """Return the system's constants by baud."""
     import termios
 
     return {

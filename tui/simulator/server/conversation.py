@@ -1,7 +1,7 @@
-"""Bytes in, bytes out: where a frame ends and when its reply is on the wire.
+"""Conversion of received bytes to frames, and of replies to timed bytes.
 
-No input, no output, no clock of its own: an endpoint feeds what it reads, asks when it has to
-come back, and writes what is due. Times are those of a monotonic clock, in s.
+It has no input, output or clock of its own. An endpoint passes the bytes that it reads, requests
+the next due time, and writes due bytes. Times are those of a monotonic clock, in s.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from .line import SimulatedLine
 from .master import PollingMaster
 
 SILENCE_ENDS_FRAME = 0.05
-"""Silence in s that ends a frame of unknown length where the line does not keep real time."""
+"""Pause in s that ends a frame of unknown length if the line does not keep real time."""
 MBAP = 7
 MAX_MBAP_LENGTH = 254
 
 
 class Conversation(Protocol):
-    """One end of the line, as an endpoint uses it."""
+    """One end of the line, for an endpoint."""
 
     def feed(self, data: bytes, now: float, /) -> None:
-        """Take bytes that have just come in."""
+        """Process received bytes."""
 
     def poll(self, now: float, /) -> bytes:
-        """The bytes that are due to be written by now."""
+        """Return the bytes due by now."""
 
     @property
     def due(self) -> float | None:
-        """When `poll` has to be called next; None: not before more bytes come."""
+        """Return the time of the next `poll`; None: not before more bytes arrive."""
 
 
 @dataclass(order=True)
@@ -80,11 +80,10 @@ class _Outbox:
 class RtuConversation:
     """Modbus RTU on one medium.
 
-    In real time a frame ends with 3.5 characters of silence, and what comes sooner belongs to it:
-    two requests without that silence between them are one blob that no drive understands. `client`
-    holds the settings of the other side. A `paced` medium (a real port) spends the time of its
-    characters itself. Without real time a frame ends as soon as it has the length it announces, or
-    after a short silence.
+    In real time, a frame ends with a pause of 3.5 characters. Two requests without that pause
+    between them are one unit that no drive understands. `client` holds the settings of the other
+    side. A `paced` medium (a real port) spends the time of its characters itself. Without real
+    time, a frame ends as soon as it has the length it announces, or after a short pause.
     """
 
     def __init__(
@@ -99,17 +98,17 @@ class RtuConversation:
         self._timing = line.timing
         self._look = client
         self._client: ClientSettings | None = None
-        """Settings of the client with its last bytes, if they can be seen."""
+        """Settings of the client at its last bytes, if visible."""
         self._faults = faults
         self._paced = paced
         self._buffer = b""
         self._received = 0.0
-        """When the last character was, or will have been, on the wire."""
+        """Time when the last character was, or will have been, on the wire."""
         self._outbox = _Outbox()
         self._master = PollingMaster(line, faults.habits.master)
 
     def feed(self, data: bytes, now: float) -> None:
-        """Take bytes that have just come in."""
+        """Process received bytes."""
         if self._buffer and now >= self._end:
             self._finish()
         if self._look is not None:
@@ -127,12 +126,12 @@ class RtuConversation:
 
     @property
     def _end(self) -> float:
-        """When the silence after the received bytes has lasted long enough."""
+        """Return the time when the pause after the received bytes is long enough."""
         silence = self._timing.silence if self._timing.real_time else SILENCE_ENDS_FRAME
         return self._received + (max(silence, SILENCE_ENDS_FRAME) if self._paced else silence)
 
     def poll(self, now: float) -> bytes:
-        """The bytes that are due to be written by now."""
+        """Return the bytes due by now."""
         if self._buffer and now >= self._end:
             self._finish()
         for delay, data in self._master.talk(now):
@@ -141,12 +140,13 @@ class RtuConversation:
 
     @property
     def _pace(self) -> float:
-        """Time of each character that is sent here; none on a medium that spends it itself."""
+        """Return the time of each character sent by the simulator; 0 on a medium that spends it
+        itself."""
         return self._timing.character if self._timing.real_time and not self._paced else 0.0
 
     @property
     def due(self) -> float | None:
-        """When `poll` has to be called next."""
+        """Return the time of the next `poll`."""
         times = [self._end] if self._buffer else []
         times += [due for due in (self._outbox.due, self._master.due) if due is not None]
         return min(times, default=None)
@@ -175,7 +175,7 @@ class TcpConversation:
         """True once the client sent bytes that are not Modbus TCP."""
 
     def feed(self, data: bytes, now: float) -> None:
-        """Take bytes that have just come in."""
+        """Process received bytes."""
         self._buffer += data
         while not self.broken and len(self._buffer) >= MBAP:
             length = int.from_bytes(self._buffer[4:6], "big")
@@ -202,10 +202,10 @@ class TcpConversation:
             self._outbox.put(now + wait + delay, head + pdu, 0.0)
 
     def poll(self, now: float) -> bytes:
-        """The bytes that are due to be written by now."""
+        """Return the bytes due by now."""
         return self._outbox.take(now)
 
     @property
     def due(self) -> float | None:
-        """When `poll` has to be called next."""
+        """Return the time of the next `poll`."""
         return self._outbox.due

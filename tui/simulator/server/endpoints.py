@@ -1,7 +1,7 @@
-"""Ways to reach a simulated line: pseudo-terminal, TCP; what all of them have.
+"""Endpoints of a simulated line: pseudo-terminal, TCP; and their common part.
 
-Each endpoint has a thread that waits for bytes and for the moment when its conversation has
-something to do, with the resolution of `select`, not of an event loop's timers.
+Each endpoint has a thread that waits for bytes and for the next action of its conversation, with
+the resolution of `select`, not of an event loop's timers.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CHUNK = 4096
 
 
 class Endpoint(ABC):
-    """One way to reach the line, with a thread of its own while it is plugged in."""
+    """Endpoint of the line, with a thread of its own while it is plugged in."""
 
     def __init__(self, name: str, converse: Callable[[], Conversation]) -> None:
         self._name = name
@@ -36,7 +36,7 @@ class Endpoint(ABC):
         self._stopping = threading.Event()
 
     def plug(self) -> None:
-        """Open it and start its thread; nothing happens where it is plugged in already."""
+        """Open it and start its thread; does nothing if it is plugged in already."""
         if self._thread is not None:
             return
         self._stopping.clear()
@@ -77,10 +77,10 @@ def wait_time(conversation: Conversation, longest: float | None) -> float | None
 
 
 class PtyEndpoint(Endpoint):
-    """A pseudo-terminal; what is opened at `path` is the line.
+    """Pseudo-terminal; a client opens the line at `path`.
 
-    `converse` is given a look at what the client has set there, or nothing where the settings
-    do not matter. It begins with those of `timing`, so that a client that sets nothing is heard.
+    `converse` receives a function that reads the client's settings, or None if the settings do not
+    matter. The terminal begins with the settings of `timing`, for clients that set nothing.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class PtyEndpoint(Endpoint):
         super().__init__("simulated line, pseudo-terminal", lambda: converse(self._look()))
         self._timing = timing
         self._any_settings = any_settings
-        # a number of a pseudo-terminal is given away again as soon as it is unplugged
+        # the system reuses the number of a pseudo-terminal as soon as it is unplugged
         self._folder = None if link else Path(tempfile.mkdtemp(prefix="drivepanel-"))
         self._link = Path(link) if link else Path(f"{self._folder}/line")
         self._master = self._slave = -1
@@ -102,7 +102,7 @@ class PtyEndpoint(Endpoint):
         self._seen = False
         """True if the terminal's settings are known."""
         self.path = ""
-        """Path of the link to the slave side; it stays the same however often it is plugged in."""
+        """Path of the link to the slave side; constant over all plugs and unplugs."""
 
     def _open(self) -> None:
         try:
@@ -166,9 +166,9 @@ class PtyEndpoint(Endpoint):
 
 
 class TcpEndpoint(Endpoint):
-    """A TCP port; each connection has a conversation of its own.
+    """TCP port; each connection has a conversation of its own.
 
-    One without bytes from its client for `idle_close` seconds is closed.
+    A connection without bytes from its client for `idle_close` seconds is closed.
     """
 
     def __init__(
@@ -189,7 +189,7 @@ class TcpEndpoint(Endpoint):
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port it listens at."""
+        """Host and port of the listening socket."""
         return self._host, self._port
 
     def _open(self) -> None:
@@ -227,7 +227,7 @@ class TcpEndpoint(Endpoint):
         try:
             connection, _ = listener.accept()
         except OSError:
-            return  # The client went away before it was served.
+            return  # The client disconnected before it was served.
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.settimeout(1.0)
         self._talks[connection] = self._converse()

@@ -1,4 +1,4 @@
-"""Line faults on demand: changes of a reply on its way. Seeded, so they can be repeated."""
+"""Line faults on demand: changes of replies in transit. Seeded, so that they can be repeated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..troubles import FaultRates, Habits
 from .frames import seal
 
 Sendings = list[tuple[float, bytes]]
-"""Output instead of a reply: delays in s, and bytes."""
+"""Bytes sent instead of a reply, each with its delay in s."""
 
 DUPLICATE_AFTER = 0.02
 TWIN_AFTER = 0.004
@@ -20,12 +20,12 @@ REPLIED_EXCEPTION = 0x80
 MESSAGE_KINDS = frozenset(
     {"late", "lost", "duplicated", "foreign", "twin", "swapped", "exception-0a", "exception-0b"}
 )
-"""Faults that can hit a message of Modbus TCP too, which has no broken bytes."""
+"""Faults that also apply to Modbus TCP, which has no damaged bytes."""
 NO_HABITS = Habits()
 
 
 class FaultPlan:
-    """Decides, reply by reply, which fault hits it."""
+    """Plan of faults: decides for each reply which fault applies."""
 
     def __init__(self, rates: FaultRates, seed: int, habits: Habits = NO_HABITS) -> None:
         self.rates = rates
@@ -34,7 +34,7 @@ class FaultPlan:
         self.hits: dict[str, int] = dict.fromkeys(rates.by_kind(), 0)
         self._requests = 0
         self._held: deque[bytes] = deque()
-        """Replies that wait for a later request, on a line that is behind."""
+        """Replies held until a later request, on a line that is one behind."""
         self._twins = 0
 
     def reaches(self) -> bool:
@@ -43,20 +43,21 @@ class FaultPlan:
         return not self.habits.lost_every or self._requests % self.habits.lost_every != 0
 
     def served(self, unit: int, only: int) -> int | None:
-        """The address that a gateway asks for a unit; None where it does not answer it."""
+        """Return the address to which a gateway forwards a unit; None if it does not answer the
+        unit."""
         if self.habits.only_unit is None:
             return unit
         return only if unit == self.habits.only_unit else None
 
     def _turn(self, reply: bytes) -> bytes | None:
-        """The reply that a line sends in place of this one; None where it sends nothing."""
+        """Return the reply sent instead of this one; None for no reply."""
         if not self.habits.behind:
             return reply
         self._held.append(reply)
         return self._held.popleft() if len(self._held) > self.habits.behind else None
 
     def choose(self) -> str:
-        """The kind of fault for the next reply; empty for none."""
+        """Return the kind of fault for the next reply; empty for none."""
         drawn = self._random.random()
         for kind, rate in self.rates.by_kind().items():
             if drawn < rate:
@@ -91,14 +92,14 @@ class FaultPlan:
         if kind == "foreign":
             return [(0.0, self._other_unit(unit), pdu)]
         if kind == "twin":
-            # a gateway passes on the first of two replies, and none that is broken
+            # a gateway forwards the first of two replies, and no damaged one
             return [(0.0, unit, _refusal(pdu, 0x0B) if self._overlaps() else pdu)]
         if kind in _CHANGES:
             return [(0.0, unit, _CHANGES[kind](pdu))]
         return [(0.0, unit, pdu)]
 
     def lateness(self) -> float:
-        """Extra delay of a late reply, in s."""
+        """Return the extra delay of a late reply, in s."""
         return self._random.uniform(*self.rates.late_by)
 
     def _other_unit(self, unit: int) -> int:
@@ -130,18 +131,18 @@ class FaultPlan:
         return [(0.0, seal(body))]
 
     def _overlaps(self) -> bool:
-        """True if two drives at one address talk at once: every other time."""
+        """Return True if two drives at one address send at once: every second time."""
         self._twins += 1
         return bool(self._twins % 2)
 
     def _twin(self, frame: bytes) -> Sendings:
         other = bytearray(frame[:-2])
         if frame[1] in WORD_READS:
-            other[-1] ^= 1  # its values are not the same
+            other[-1] ^= 1  # its values differ
         second = seal(bytes(other))
         if not self._overlaps():
             return [(0.0, frame), (TWIN_AFTER, second)]
-        # the pair of wires carries both: a zero of either wins
+        # both share the pair of wires: a zero of either dominates
         shifted = frame[:1] + bytes(a & b for a, b in zip(frame[1:], second, strict=False))
         return [(0.0, shifted + second[-1:])]
 

@@ -1,7 +1,7 @@
-"""Modbus RTU frames as a drive sees them: checksum and the length a request announces.
+"""Modbus RTU frames as a drive sees them: checksum and the length that a request announces.
 
-Pure functions. The checksum is written here once more, beside that of tui.wire: a simulated drive
-is an independent witness, which would not notice a fault that it shares with the line.
+Pure functions. The checksum is implemented separately from that of tui.wire: an independent
+simulated drive does not share a defect with the line.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ _CRC = _table()
 _MIN_FRAME = 4
 _LENGTHS = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
 _COUNTED = {15: (6, 9), 16: (6, 9), 23: (10, 13)}
-"""Functions whose request carries a byte count: its place, and the bytes beside the counted."""
+"""Functions whose request has a byte count: its position, and the number of bytes not counted."""
 
 
 def checksum(data: bytes) -> int:
-    """Checksum of a frame's bytes: polynomial 16#A001, start 16#FFFF."""
+    """Return the checksum of a frame's bytes: polynomial 16#A001, start 16#FFFF."""
     crc = 0xFFFF
     for byte in data:
         crc = (crc >> 8) ^ _CRC[(crc ^ byte) & 0xFF]
@@ -33,12 +33,12 @@ def checksum(data: bytes) -> int:
 
 
 def seal(body: bytes) -> bytes:
-    """A whole frame: the body with its checksum, low byte first."""
+    """Return the frame of a body: with its checksum, low byte first."""
     return body + checksum(body).to_bytes(2, "little")
 
 
 def is_sealed(frame: bytes) -> bool:
-    """Return True if the bytes are one frame with a right checksum."""
+    """Return True if the bytes are one frame with a correct checksum."""
     return len(frame) >= _MIN_FRAME and checksum(frame[:-2]) == int.from_bytes(frame[-2:], "little")
 
 

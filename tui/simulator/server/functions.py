@@ -1,4 +1,4 @@
-"""The Modbus functions of a simulated server: request in, reply or silence out."""
+"""Modbus functions of a simulated server: request in, reply or None out."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ NAME_LENGTH = 16
 
 
 class Words(Protocol):
-    """Words a server reads and writes."""
+    """Words that a server reads and writes."""
 
     def read(self, address: int, count: int, function: Function, /) -> list[int]:
-        """Words from an address; raises Refused."""
+        """Read words from an address; raises Refused."""
 
     def write(self, address: int, words: Sequence[int], function: Function, /) -> None:
         """Write words at an address; raises Refused."""
@@ -38,22 +38,22 @@ class DiagnosticCounters:
     checksum_errors: int = 0
 
     def count_frame(self) -> None:
-        """One more frame, modulo 65536."""
+        """Count a frame, modulo 65536."""
         self.frames = (self.frames + 1) & 0xFFFF
 
     def count_checksum_error(self) -> None:
-        """One more frame, with a wrong checksum; that count stays at 65535."""
+        """Count a frame with a wrong checksum; that count stays at 65535."""
         self.count_frame()
         self.checksum_errors = min(self.checksum_errors + 1, 0xFFFF)
 
     def reset(self) -> None:
-        """All counters to 0."""
+        """Set all counters to 0."""
         self.frames = self.checksum_errors = 0
 
 
 @dataclass
 class Server:
-    """One Modbus server: its words, functions, identity and counters."""
+    """Modbus server: its words, functions, identity and counters."""
 
     words: Words
     functions: Mapping[int, Function]
@@ -63,7 +63,7 @@ class Server:
     counters: DiagnosticCounters = field(default_factory=DiagnosticCounters)
 
     def answer(self, pdu: bytes) -> bytes | None:
-        """The reply to a request without address and checksum; None where it stays silent."""
+        """Return the reply to a request without address and checksum; None for no reply."""
         if not pdu:
             return None
         function = self.functions.get(pdu[0])
@@ -114,7 +114,7 @@ def _write_many(server: Server, function: Function, body: bytes) -> bytes:
 
 
 def _written_words(server: Server, body: bytes, function: Function) -> tuple[int, list[int]]:
-    """Address and words of a write; a count past the limit is judged before its bytes."""
+    """Return address and words of a write; a count above the limit is checked before its bytes."""
     if len(body) < 5:
         raise _wrong_shape(server)
     address, count, size = struct.unpack(">HHB", body[:5])
@@ -126,7 +126,7 @@ def _written_words(server: Server, body: bytes, function: Function) -> tuple[int
 
 
 def _read_write(server: Server, function: Function, body: bytes) -> bytes:
-    """Function 23: the write is made first, as the Modbus specification says."""
+    """Execute function 23: the write precedes the read, as the Modbus specification says."""
     if len(body) < 9:
         raise _wrong_shape(server)
     address, count = struct.unpack(">HH", body[:4])
@@ -157,7 +157,7 @@ def _diagnose(server: Server, function: Function, body: bytes) -> bytes:
 
 
 def _identify(server: Server, function: Function, body: bytes) -> bytes:
-    """Function 43/14; the ATV21 has its own codes for a wrong field, the others 1 and 2."""
+    """Execute function 43/14; the ATV21 has its own codes for a wrong field, the others 1 and 2."""
     own_codes = not server.identification.exception_has_mei_byte
     if len(body) != 3 or body[0] != IDENTIFICATION_TYPE:
         raise Refused(1)
@@ -187,7 +187,8 @@ _HANDLERS: Mapping[int, Callable[[Server, Function, bytes], bytes]] = {
 def identity_of(
     identification: Identification, name: str, replaced: Mapping[int, str]
 ) -> dict[int, bytes]:
-    """The objects a drive identifies itself with: the profile's examples, its name, its own."""
+    """Return a drive's identification objects: the profile's examples, its name, and
+    replacements."""
     objects = {o.id: o.example for o in identification.objects if o.example}
     for item in identification.objects:
         if name and item.meaning == "name":

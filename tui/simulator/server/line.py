@@ -1,4 +1,4 @@
-"""One simulated line: which drive a frame is for, and what comes back."""
+"""Simulated line: forwards each frame to its drive, and returns the reply."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from .client_settings import ClientSettings
 from .frames import is_sealed, seal
 
 FRESH_VALUES = 0.004
-"""Age in s up to which the drives' values are fresh enough to answer with."""
+"""Age in s up to which the drives' values are recent enough for a reply."""
 ANY_UNIT = 255
 """Unit that Modbus TCP clients use for the only device behind an address."""
 
 
 @dataclass(frozen=True, slots=True)
 class PendingReply:
-    """A reply on its way: its bytes, and the drive's turnaround in s."""
+    """Reply in transit: its bytes, and the drive's turnaround in s."""
 
     data: bytes
     turnaround: float
 
 
 class SimulatedLine:
-    """Drives on one line, in one simulated time."""
+    """Drives on one line with a common simulated time."""
 
     def __init__(
         self,
@@ -45,13 +45,13 @@ class SimulatedLine:
         """True if the drives' time passes with the clock."""
 
     def start(self) -> None:
-        """Let the drives' time pass from now on."""
+        """Start the drives' time."""
         with self._lock:
             self._last = self._clock()
             self.running = True
 
     def advance(self, at_least: float = 0.0) -> None:
-        """Bring the drives' time up to the clock, if they are behind by more than this, in s."""
+        """Advance the drives' time to the clock, if it is behind by more than this, in s."""
         with self._lock:
             now = self._clock()
             elapsed = now - self._last
@@ -62,7 +62,7 @@ class SimulatedLine:
             drive.step(elapsed)
 
     def drive(self, address: int) -> SimulatedDrive:
-        """The drive that has this address now; raises SimulatorError."""
+        """Return the drive with this address at present; raises SimulatorError."""
         for drive in self.drives:
             if drive.address == address:
                 return drive
@@ -70,9 +70,9 @@ class SimulatedLine:
         raise SimulatorError(f"No simulated drive has address {address}. Addresses: {known}.")
 
     def receive(self, frame: bytes, client: ClientSettings | None = None) -> PendingReply | None:
-        """Return the reply to the bytes between two silences; None for silence.
+        """Return the reply to the bytes between two pauses; None for no reply.
 
-        A drive whose baud, parity or stop bits are not those of the `client` makes nothing of it.
+        A drive whose baud, parity or stop bits differ from those of the `client` ignores the bytes.
         """
         listening = [d for d in self.drives if d.station.hears(self.timing, client)]
         if not is_sealed(frame):

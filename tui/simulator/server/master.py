@@ -1,4 +1,4 @@
-"""Another master on a simulated line: what it asks, and what the drives reply to it."""
+"""Another master on a simulated line: its requests, and the drives' replies."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from .frames import seal
 from .line import SimulatedLine
 
 PAUSE = 0.01
-"""Least time in s from a request of the master to the reply."""
+"""Least time in s from a master's request to the reply."""
 READ = 3
 
 
 class PollingMaster:
-    """Polls one drive after another; `period` in s passes between two requests, 0 for never."""
+    """Master that polls one drive after another; `period` in s between two requests, 0 for
+    never."""
 
     def __init__(self, line: SimulatedLine, period: float) -> None:
         self._line = line
@@ -21,7 +22,7 @@ class PollingMaster:
         """Time of its next request, on a monotonic clock."""
 
     def talk(self, now: float) -> list[tuple[float, bytes]]:
-        """Its request that is due and the reply to it: delays in s, and bytes."""
+        """Return its due request and the reply to it: delays in s, and bytes."""
         if self.due is None or now < self.due:
             return []
         self.due = now + self._period

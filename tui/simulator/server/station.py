@@ -1,4 +1,4 @@
-"""A drive's place on the line: its address, groups, baud and format, and its turnaround."""
+"""Station of a drive on the line: its address, groups, baud and format, and its turnaround."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..spec import LineTiming
 from .client_settings import ClientSettings
 
 SHORTEST_TURNAROUND = 0.0015
-"""PX-MODBUS manual 4, 15.06: never less, in s."""
+"""Least turnaround in s: PX-MODBUS manual 4, 15.06."""
 FORMAT_ROLES = ("baud", "format", "parity")
 
 
@@ -24,7 +24,7 @@ class Station:
         self._settings: list[tuple[LinkSetting, Parameter]] = []
 
     def settle(self, timing: LineTiming) -> None:
-        """Give the drive the settings of the line, as far as its own choices allow."""
+        """Set the drive to the settings of the line, as far as its choices allow."""
         roles: set[str] = set()
         for setting in self._profile.data.link.settings:
             fitting = [c.raw for c in setting.choices if _fits(c, timing)]
@@ -35,7 +35,7 @@ class Station:
                 roles.add(setting.role)
 
     def settle_address(self) -> None:
-        """Give the drive its address."""
+        """Set the drive's address parameter."""
         if parameter := self._address_parameter():
             self._registers.settle(parameter, self._given)
 
@@ -47,7 +47,7 @@ class Station:
 
     @property
     def address(self) -> int:
-        """The address the drive answers at now."""
+        """The present address of the drive."""
         parameter = self._address_parameter()
         return self._registers.in_force(parameter) if parameter else self._given
 
@@ -57,7 +57,7 @@ class Station:
         return self._profile.data.addresses.zero_digit_is_group and "0" in str(self.address)
 
     def is_called(self, address: int) -> bool:
-        """Return True if a broadcast or group address means this drive too."""
+        """Return True if a broadcast or group address includes this drive."""
         addresses = self._profile.data.addresses
         if not self.address:
             return False
@@ -67,7 +67,7 @@ class Station:
 
     @property
     def turnaround(self) -> float:
-        """Time from the end of a request to the start of the reply, in s."""
+        """Return the time from the end of a request to the start of the reply, in s."""
         for setting in self._profile.data.link.settings:
             if setting.role == "delay":
                 delay = self._registers.in_force(self._profile[setting.parameter])
@@ -77,7 +77,7 @@ class Station:
     def hears(self, timing: LineTiming, client: ClientSettings | None = None) -> bool:
         """Return True if the drive's protocol, baud and format in force are those of the line.
 
-        `client` is what the other side is set to, where that can be seen; then it counts.
+        `client` holds the settings of the other side; if visible, they replace those of the line.
         """
         for setting in self._profile.data.link.settings:
             if setting.role == "protocol" and setting.factory is not None:
@@ -90,7 +90,8 @@ class Station:
         return all(_fits(choice, timing) for choice in choices)
 
     def own(self, timing: LineTiming) -> LineTiming:
-        """The line as the drive itself is set; what no word of it says is that of the line."""
+        """Return the timing by the drive's own settings; those of the line if no word of the drive
+        sets them."""
         baud, form = _own(self._chosen(), timing)
         return LineTiming(baud, form, timing.real_time)
 
@@ -104,8 +105,7 @@ class Station:
 
 
 def in_group(own: int, called: int) -> bool:
-    """Return True if a group address calls an address: each zero digit stands for any digit but
-    0."""
+    """Return True if a group address includes an address: a zero digit matches any digit but 0."""
     mine, theirs = str(own), str(called)
     if called == 0 or "0" not in theirs or "0" in mine or len(mine) != len(theirs):
         return False
@@ -113,7 +113,7 @@ def in_group(own: int, called: int) -> bool:
 
 
 def _own(choices: list[LinkChoice], timing: LineTiming) -> tuple[int, str]:
-    """Baud and format of a drive; those of the line where no word of the drive says them."""
+    """Return baud and format of a drive; those of the line if no word of the drive sets them."""
     baud, form = timing.baud, timing.format
     for choice in choices:
         baud = choice.baud or baud
@@ -122,7 +122,7 @@ def _own(choices: list[LinkChoice], timing: LineTiming) -> tuple[int, str]:
 
 
 def _fits(choice: LinkChoice, timing: LineTiming) -> bool:
-    """Return True if a choice agrees with the line, as far as it says anything."""
+    """Return True if a choice agrees with the line, as far as it defines baud or format."""
     return (
         choice.baud in (None, timing.baud)
         and choice.format in (None, timing.format)

@@ -1,4 +1,4 @@
-"""A simulated line on a port that the caller opened."""
+"""Endpoint of a simulated line on a port that the caller opened."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from .conversation import Conversation
 from .endpoints import CHUNK, Endpoint, wait_time
 
 STREAM_PAUSE = 0.005
-"""Longest pause between two looks at an opened port that has nothing to read, in s."""
+"""Longest pause in s between two reads of an opened port without data."""
 
 
 class ByteStream(Protocol):
-    """An opened port that the caller gives: reads with a short timeout, writes, closes."""
+    """Open port of the caller: reads with a short timeout, writes, closes."""
 
     def read(self, size: int, /) -> bytes:
-        """Up to `size` bytes; b"" when the timeout passes."""
+        """Return up to `size` bytes; b"" after the timeout."""
 
     def write(self, data: bytes, /) -> int | None:
         """Write all bytes."""
@@ -27,7 +27,7 @@ class ByteStream(Protocol):
 
 
 class StreamEndpoint(Endpoint):
-    """A port that the caller opened; it is closed at the end, and cannot be plugged in again."""
+    """Port that the caller opened; it is closed at the end, and cannot be plugged in again."""
 
     def __init__(self, converse: Callable[[], Conversation], stream: ByteStream) -> None:
         super().__init__("simulated line, port", converse)
