@@ -300,6 +300,7 @@ def test_broken_frames_and_silences_are_reported() -> None:
 def test_silences_are_not_judged_where_readings_tell_none() -> None:
     heard = Heard(times=False).say(READ, WORDS[:4], WORDS[4:])
     assert "Silences are not judged" in heard.lines
+    assert "Silences between frames" not in heard.lines
     assert heard.summary.tally.cut == 0
     together = Heard().say(READ + WORDS, READ + WORDS)
     assert "several frames at once: silences between them are not known" in together.lines
