@@ -1,4 +1,4 @@
-"""Parameters and values in requests and replies that were heard. Pure functions."""
+"""Parameters and values in observed requests and replies. Pure functions."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ FUNCTION_NAMES: Mapping[int, str] = {
     WHO: "identify",
 }
 _OBJECTS_FROM = 7
-"""Offset of the objects in a reply to function 43, function included."""
+"""Offset of the objects in a reply to function 43, including the function byte."""
 
 
 @dataclass(frozen=True, slots=True)
 class WordSpan:
-    """Neighboring words of a request: those that are read, or those that are written."""
+    """Adjacent words of a request, either read or written."""
 
     function: int
-    """That of the addresses: 4 for input registers, else 3."""
+    """Function of the address space: 4 for input registers, else 3."""
     address: int
     count: int
     written: tuple[int, ...] = ()
-    """The words that are written; empty of a read."""
+    """Words written; empty for a read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class HeardValue:
     """One parameter, or a word that no profile names, with its value."""
 
     code: str
-    """The parameter's code; the address in decimal where none is known."""
+    """The parameter's code; the decimal address if no code is known."""
     address: int
     raw: int
     value: Value
@@ -85,7 +85,7 @@ def _spans(request: bytes) -> Iterator[WordSpan]:
 
 
 def words_read(exchange: HeardExchange) -> tuple[int, ...]:
-    """The words that a good reply brings; none of any other."""
+    """Return the words of a good read reply; empty for any other exchange."""
     if exchange.answer != "ok" or exchange.function not in (HOLDING, INPUT, READ_AND_WRITE):
         return ()
     count = exchange.reply[1] // 2
@@ -111,7 +111,7 @@ def values_of(
 
 
 def names_of_words(span: WordSpan, profile: Profile | None) -> list[str]:
-    """The parameters of a stretch of words; addresses where none is known."""
+    """Return the parameters of adjacent words; addresses for unknown ones."""
     return [code for code, _, _, _ in _parts(span, profile)]
 
 
@@ -132,7 +132,7 @@ def _cut(
 def _parts(
     span: WordSpan, profile: Profile | None
 ) -> Iterator[tuple[str, int, Parameter | None, int]]:
-    """Code, offset, parameter and width of each part of a stretch of words."""
+    """Yield code, offset, parameter and width in words of each part of a span."""
     at = 0
     while at < span.count:
         address = span.address + at
