@@ -50,7 +50,7 @@ class Bench:
         self.programs.append(job.program)
         if self.answers:
             self.devices[job.request.device].heard = self.now
-            job.finish(honest_pdu(job.pdu), self.now)
+            job.finish(job.reply(honest_pdu(job.pdu), self.now))
         else:
             job.fail(NoAnswer(1, 3, 77))
 

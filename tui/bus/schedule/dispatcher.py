@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from ..errors import LineBehind, LineClosed, LineError, LineFailed, LineLost, RequestRefused
 from ..master import ExchangeResult, Master, MonotonicClock, Piece, ResultKind, Sending
-from ..model import Priority, Timing
+from ..model import Priority, Reply, Timing
 from ..requests import Read, Request
 from ..shared_state import SharedState
 from ..tally import Tally
@@ -17,7 +17,7 @@ from .alive_reads import AliveReads
 from .back_to_back import BackToBack
 from .in_step import UNANSWERED, InStep
 from .last_way import LastWay
-from .outcomes import Outcomes, with_fate
+from .outcomes import Next, Outcomes, with_fate
 from .patience import Devices
 from .probes import may_be_silent
 from .queue import Job, JobQueue
@@ -290,8 +290,7 @@ class Dispatcher:
         if result.kind not in UNANSWERED or silent or job not in self._queue.waiting():
             return
         self._queue.remove(job)
-        if self._outcomes.conclude(job, result, unsent=True):
-            self._repeat(job, result)
+        self._end(job, result, unsent=True)
 
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
         self._outcomes.hear_gateway(job, result)
@@ -301,8 +300,16 @@ class Dispatcher:
         self.proof.sent(job, begun)
         if self.steps.end_form(job, result) or self._outcomes.waited_for_us(job, result):
             self.put_back(job)
-        elif self._outcomes.conclude(job, result):
-            self._repeat(job, result)
+        else:
+            self._end(job, result)
+
+    def _end(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> None:
+        """Return the reply to the caller, or send the request again; an error it has already."""
+        match self._outcomes.conclude(job, result, unsent=unsent):
+            case Reply() as reply:
+                job.finish(reply)
+            case Next.REPEAT:
+                self._repeat(job, result)
 
     def _repeat(self, job: Job, result: ExchangeResult) -> None:
         # one drive that no longer answers must not delay the others by several timeouts

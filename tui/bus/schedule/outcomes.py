@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from enum import Enum
 
 from tui.safety import MISSES
 from tui.wire.overheard import overheard_request
@@ -34,6 +35,14 @@ SHORT_SILENCE = 5.0
 """Seconds after which several misses in a row are a trouble of the drive, not of the line."""
 POLL_REPEATS = MISSES - 1
 """Repeats of a poll whose reply was lost or damaged: a value is needed in each cycle."""
+
+
+class Next(Enum):
+    """Next step for a request whose exchange brought no reply."""
+
+    REPEAT = "repeat"
+    NOTHING = "nothing"
+    """It has failed."""
 
 
 class Outcomes:
@@ -75,16 +84,16 @@ class Outcomes:
         if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
             result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
 
-    def conclude(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> bool:
-        """Note the result of a request, and return it to the caller; True if it must be sent again.
+    def conclude(self, job: Job, result: ExchangeResult, *, unsent: bool = False) -> Reply | Next:
+        """Note the result of a request; returns its reply, or what follows without one.
 
-        `unsent`: the probe before it had no reply, so that it was not sent itself.
+        A request that failed has its error then. `unsent`: the probe before it had no reply, so
+        that it was not sent itself.
         """
         request, now = job.request, self._clock()
         if job.expectation is None:
             self.note_strays(result.strays, result.end)
-            job.finish(b"", result.sent)
-            return False
+            return job.reply(b"", result.sent)
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._count_good(request.device, result, now)
             exchanged = (job.pdu, result.pdu)
@@ -97,15 +106,18 @@ class Outcomes:
             result.kind = ResultKind.NOTHING
         match result.kind:
             case ResultKind.REPLY:
-                self._share(job, job.finish(result.pdu, self._time_of(job, result)))
+                reply = job.reply(result.pdu, self._time_of(job, result))
+                self._share(job, reply)
+                return reply
             case ResultKind.EXCEPTION:
                 self._tally.count_exception(request.device, result.exception)
                 job.fail(self._exception(job, result.exception))
+                repeated = False
             case _ if unsent and request.changes:
-                return self._unsent(job)
+                repeated = self._unsent(job)
             case _:
-                return self._failed(job, result, now)
-        return False
+                repeated = self._failed(job, result, now)
+        return Next.REPEAT if repeated else Next.NOTHING
 
     def _unsent(self, job: Job) -> bool:
         request = job.request

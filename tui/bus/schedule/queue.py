@@ -94,12 +94,14 @@ class Job:
         """Fail it with an internal error of the line."""
         self.fail(LineFailed(f"The line failed: {error!r}."))
 
-    def finish(self, pdu: bytes, time: float) -> Reply:
-        """Return a checked reply to the caller; `pdu` is without device and checksum."""
+    def reply(self, pdu: bytes, time: float) -> Reply:
+        """The reply in the form of the request; `pdu` is checked, without device and checksum."""
         own = self.own_part(pdu)
-        reply = Reply(self.request.words(own), time, own)
+        return Reply(self.request.words(own), time, own)
+
+    def finish(self, reply: Reply) -> None:
+        """Return a checked reply to the caller."""
         self.answer.set_result(reply)
-        return reply
 
 
 class JobQueue:

@@ -77,7 +77,7 @@ class RequestsAsked:
         job.begun = True
         if isinstance(message, Answer):
             self._inside.devices[job.request.device].heard = message.time
-            job.finish(message.pdu, message.time)
+            job.finish(job.reply(message.pdu, message.time))
         else:
             self._failed(job, message)
 

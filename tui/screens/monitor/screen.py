@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from decimal import Decimal, InvalidOperation
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -12,13 +12,16 @@ from textual.containers import Horizontal, Vertical
 from textual.events import Resize, ScreenResume
 from textual.timer import Timer
 
+from tui.session.command.stop_report import Phase, StopReport
 from tui.session.console import DriveConsole
 from tui.session.shown import Rating
 from tui.widgets.lines import Lines
 from tui.widgets.palette import STALE
 from tui.widgets.strip import FrameView
 
+from ..command.control import Control
 from ..frame import SELDOM
+from ..frame_source import stands_by
 from ..keys.action import MONITOR
 from ..keys.table import bindings, keys_line
 from .arrange import Arrangement, arrange
@@ -26,13 +29,17 @@ from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched
 from .commands import order_keys
 from .input_keys import InputKeys
 from .motor import other_values
-from .source import ViewSource
 from .view import SPANS, USUAL_SPAN, View
+
+if TYPE_CHECKING:
+    from ..app_port import Panel
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
 STILL_TOLD = 5.0
 """Seconds under a dialog after which the values below it are reported as frozen."""
+STOP_TOLD = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
+"""Seconds for which the end of a stop is shown."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
@@ -238,6 +245,66 @@ class MonitorScreen(InputKeys):
         )
         requested = Ask("Rated current in A", fault_of_rating, about=about, number=True)
         self.app.push_screen(requested, reported)
+
+
+class ViewSource:
+    """Makes Monitor's view of the moment; belongs to the panel's loop."""
+
+    def __init__(self, app: Panel, console: DriveConsole) -> None:
+        self._app = app
+        self._console = console
+        self._was = ""
+
+    def view(self, control: Control, span: float, word: int | None) -> View:
+        """All that the screen shows now; `span` is the window of the trend in seconds."""
+        app, console, session = self._app, self._console, self._console.session
+        now, monitor, fleet = app.clock.monotonic(), console.monitor, app.fleet
+        snapshot = monitor.latest
+        if snapshot is not None and not snapshot.error and snapshot.state.kind != "unknown":
+            self._was = snapshot.state.headline
+        return View(
+            profile=session.profile,
+            snapshot=snapshot,
+            line=session.line.state,
+            counters=session.line.counters,
+            trend=monitor.trend,
+            period=monitor.period,
+            now=now,
+            read_only=app.read_only,
+            low_bandwidth=app.low_bandwidth,
+            plain=app.plain_signs,
+            watch=fleet.line_watch.watch(session.device) if fleet else None,
+            heard=session.line.device_state(session.device).heard,
+            control=control,
+            stop=self._stop(now),
+            was=self._was,
+            span=span,
+            stands_by=snapshot is not None and stands_by(console, snapshot.state),
+            fault_at=self._fault_at(),
+            word=word,
+        )
+
+    def _fault_at(self) -> str:
+        """The time of this drive's trip, or since when its fault was seen."""
+        fleet, device = self._app.fleet, self._console.session.device
+        active = fleet.alarms.active if fleet else ()
+        return next((fault.when for fault in active if fault.device == device), "")
+
+    def _stop(self, now: float) -> StopReport | None:
+        """Return the result of a stop of this drive; a good result for a while only."""
+        fleet, session = self._app.fleet, self._console.session
+        report = fleet.stopper.reports.get(session.device) if fleet else None
+        if report is None or self._is_overtaken(report):
+            return None
+        return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
+
+    def _is_overtaken(self, report: StopReport) -> bool:
+        """Return True if something newer is true: a later command, or a motor that runs again."""
+        outcome, latest = self._console.session.work.outcome, self._console.latest
+        if outcome is not None and outcome.time > report.since:
+            return True
+        runs = latest is not None and not latest.error and latest.state.motion == "running"
+        return runs and report.phase is Phase.STOPPED
 
 
 def fault_of_rating(text: str) -> str:

@@ -1,0 +1,49 @@
+"""How many modules and carriers a value passes, from the transport to the line on Monitor."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from tests.hops import Trail
+from tui.session.connect.open_line import open_line as really_open
+from tui.simulator import Simulation
+
+from . import test_command_flows as flows
+from .test_flows import shown, until
+
+RAW, SHOWN = 2513, "251.3"
+"""The mains voltage of the drive: no other register or text is like it."""
+MOST_MODULES, MOST_CARRIERS = 9, 6
+FIRST, LAST = "bus/transport/tcp", "widgets/lines"
+HANDED_OVER = {("bus/schedule/dispatcher", "bus/line"): "Reply"}
+"""The answer of a job, which is a future: the loop hands it over, not a call."""
+
+
+@pytest.mark.sweep  # each call of the panel is watched, which takes a while
+async def test_value_passes_few_modules_and_carriers(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Mains(Simulation):
+        def start(self) -> None:
+            super().start()
+            drive: Any = self.drive(1)
+            mains = RAW / 10 / drive._body.rating.voltage
+            kind = type(drive._load)
+            drive._load.__class__ = type("Load", (kind,), {"mains": property(lambda _: mains)})
+
+    monkeypatch.setattr(flows, "Simulation", Mains)
+    # a program that holds its line itself: through a keeper, a message takes the place of the wire
+    monkeypatch.setattr(
+        flows, "open_line", lambda text, **how: really_open(text, **{**how, "keeper": False})
+    )
+    with Trail(RAW, SHOWN) as trail:
+        async with flows.bench("atv71") as bench:
+            await until(bench.pilot, lambda: SHOWN in shown(bench.app, "readouts, #motor"), 60.0)
+            await asyncio.sleep(0.5)
+    trail.edges.update(HANDED_OVER)
+    way = trail.way(FIRST, LAST)
+    carriers = trail.carriers(way)
+    assert way, f"the value does not get there: {trail.edges}"
+    assert len(way) <= MOST_MODULES, way
+    assert len(carriers) <= MOST_CARRIERS, carriers
