@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import itertools
 import sys
-import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from types import FrameType
@@ -33,7 +33,7 @@ OUTSIDE = ""
 
 @dataclass
 class Trail:
-    """Records where a value passes, while it is in use as a context."""
+    """Records where a value passes, in the threads that it watches."""
 
     raw: int
     shown: str
@@ -42,14 +42,14 @@ class Trail:
     """By the module that had the value and the one that got it: the type that carried it."""
     _given: dict[int, str] = field(default_factory=dict)
 
-    def __enter__(self) -> Trail:
-        threading.setprofile(self._event)
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Watch all calls of this thread."""
         sys.setprofile(self._event)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        sys.setprofile(None)
-        threading.setprofile(None)
+        try:
+            yield
+        finally:
+            sys.setprofile(None)
 
     def _event(self, frame: FrameType, event: str, result: Any) -> None:
         if event not in ("call", "return"):

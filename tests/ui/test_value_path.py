@@ -17,12 +17,13 @@ from .test_flows import shown, until
 RAW, SHOWN = 2513, "251.3"
 """The mains voltage of the drive: no other register or text is like it."""
 MOST_MODULES, MOST_CARRIERS = 9, 6
+SECONDS = 3.0
+"""Some cycles of the monitor, and looks of the screen."""
 FIRST, LAST = "bus/transport/tcp", "widgets/lines"
 HANDED_OVER = {("bus/schedule/dispatcher", "bus/line"): "Reply"}
 """The answer of a job, which is a future: the loop hands it over, not a call."""
 
 
-@pytest.mark.sweep  # each call of the panel is watched, which takes a while
 async def test_value_passes_few_modules_and_carriers(monkeypatch: pytest.MonkeyPatch) -> None:
     class Mains(Simulation):
         def start(self) -> None:
@@ -37,10 +38,18 @@ async def test_value_passes_few_modules_and_carriers(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(
         flows, "open_line", lambda text, **how: really_open(text, **{**how, "keeper": False})
     )
-    with Trail(RAW, SHOWN) as trail:
-        async with flows.bench("atv71") as bench:
-            await until(bench.pilot, lambda: SHOWN in shown(bench.app, "readouts, #motor"), 60.0)
-            await asyncio.sleep(0.5)
+    trail = Trail(RAW, SHOWN)
+
+    async def in_the_loop_of_the_line() -> None:
+        with trail.watching():
+            await asyncio.sleep(SECONDS)
+
+    async with flows.bench("atv71") as bench:
+        await until(bench.pilot, lambda: SHOWN in shown(bench.app, "readouts, #motor"))
+        assert bench.app.opened is not None
+        bench.app.opened.line.spawn(in_the_loop_of_the_line, "watching")
+        with trail.watching():
+            await asyncio.sleep(SECONDS)
     trail.edges.update(HANDED_OVER)
     way = trail.way(FIRST, LAST)
     carriers = trail.carriers(way)
