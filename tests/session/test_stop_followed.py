@@ -71,8 +71,9 @@ async def followed(drive: Ramp) -> StopReport:
     journal = Journal()
     stopper = Stopper(drive, journal)
     stopper.stop([DriveSession(drive, 1, PROFILE, clock=drive.clock)])
-    while stopper.reports[1].phase not in OVER:  # noqa: ASYNC110 - as the clock of the drive goes
-        await asyncio.sleep(0)
+    async with asyncio.timeout(20.0):
+        while stopper.reports[1].phase not in OVER:  # noqa: ASYNC110 - as the drive's clock goes
+            await asyncio.sleep(0)
     journal.close()
     return stopper.reports[1]
 
