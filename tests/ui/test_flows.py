@@ -339,7 +339,7 @@ async def test_on_a_slow_link_frames_come_a_few_at_a_time_and_are_all_there_held
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
         await pilot.press("7")
-        await until(pilot, lambda: "h shows all" in shown(app, "frames"))
+        await until(pilot, lambda: "h show all" in shown(app, "frames"))
         assert len(shown(app, "frames").splitlines()) == 1 + FEW
         await pilot.press("h")
         await until(pilot, lambda: len(shown(app, "frames").splitlines()) == 20)

@@ -247,7 +247,7 @@ async def stage(made: Bench) -> None:
     await made.pilot.press("minus", "4")
     await until(made.pilot, lambda: "ACC" in shown(made.app, "second"))
     await made.pilot.press("delete")
-    await until(made.pilot, lambda: "slots proposed" in shown(made.app, "detail"))
+    await until(made.pilot, lambda: "proposed. Press" in shown(made.app, "detail"))
 
 
 SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}

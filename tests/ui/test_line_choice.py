@@ -50,7 +50,7 @@ class Line:
         # whichever address it has come to: a look every 50 ms may miss the first
         await until(
             self.pilot,
-            lambda: re.search(r" Search \d+ of \d", shown(self.app, "search")) is not None,
+            lambda: re.search(r" Scan \d+ of \d", shown(self.app, "search")) is not None,
         )
 
     @property

@@ -479,7 +479,7 @@ async def test_files_tell_their_drive_and_what_differs(
         assert "1 differs" in reported["own.toml"]
         assert "Altivar 71" in reported["alien.toml"]
         assert "other family" in reported["alien.toml"]
-        assert "not a parameter set" in reported["none.toml"]
+        assert "invalid file" in reported["none.toml"]
         assert writes(made.app) == []
 
 

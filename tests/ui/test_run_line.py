@@ -279,4 +279,4 @@ async def test_the_line_of_keys_shows_only_those_of_the_line() -> None:
         await until(made.pilot, lambda: "leave" in shown(made.app, "keys"))
 
 
-KEYS_OF_THE_LINE = ["Space", "STOP", "1", "Enter", "run", "Esc", "no"]
+KEYS_OF_THE_LINE = ["Space", "STOP", "1", "Enter", "run", "Esc", "cancel"]

@@ -21,7 +21,7 @@ def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbou
     try:
         values = read_set(path, path.name)
     except DriveError:
-        return FileAbout(reported="not a parameter set", alarm=True)
+        return FileAbout(reported="invalid file", alarm=True)
     head = values.head
     named = head.identity.get("name") or head.family or head.profile
     drive = f"{head.device:>2} {named}" if head.device else named
