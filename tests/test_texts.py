@@ -100,7 +100,13 @@ CHECKS: dict[int, Check] = {
         "one_colour",
     ),
     19: Check(
-        "N", of(r"(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$)|Told$", 0), "told_by"
+        "N",
+        of(
+            r"(?i:(^|_)(told|asked|meant|whom|said|hush\w*|stir)(_|$))"
+            r"|(Told|Asked|Meant)($|[A-Z])",
+            0,
+        ),
+        "told_by",
     ),
     20: Check("N", of(r"^_?of_", 0), "of_drives"),
     21: Check(

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from tui.bus.gateway import server
 from tui.bus.gateway.pdu import (
-    IdentifyAsked,
-    ReadAsked,
+    IdentifyRequested,
+    ReadRequested,
     Unanswerable,
-    WriteAsked,
+    WriteRequested,
     exception_pdu,
     identified_pdu,
     parse_request,
@@ -29,16 +29,16 @@ from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 
 
 def test_requests_of_each_function() -> None:
-    assert parse_request(bytes.fromhex("03 0C81 0002")) == ReadAsked(3, 3201, 2)
-    assert parse_request(bytes.fromhex("04 0000 007D")) == ReadAsked(4, 0, 125)
-    assert parse_request(bytes.fromhex("06 2135 0007")) == WriteAsked(6, 8501, (7,))
+    assert parse_request(bytes.fromhex("03 0C81 0002")) == ReadRequested(3, 3201, 2)
+    assert parse_request(bytes.fromhex("04 0000 007D")) == ReadRequested(4, 0, 125)
+    assert parse_request(bytes.fromhex("06 2135 0007")) == WriteRequested(6, 8501, (7,))
     many = parse_request(bytes.fromhex("10 2135 0002 04 000F 01F4"))
-    assert many == WriteAsked(16, 8501, (15, 500))
-    assert isinstance(many, WriteAsked)
+    assert many == WriteRequested(16, 8501, (15, 500))
+    assert isinstance(many, WriteRequested)
     assert many.words == {8501: 15, 8502: 500}
     both = parse_request(bytes.fromhex("17 0C81 0001 2135 0001 02 0007"))
-    assert both == WriteAsked(23, 8501, (7,), 3201, 1)
-    assert parse_request(bytes.fromhex("2B 0E 01 00")) == IdentifyAsked(1, 0)
+    assert both == WriteRequested(23, 8501, (7,), 3201, 1)
+    assert parse_request(bytes.fromhex("2B 0E 01 00")) == IdentifyRequested(1, 0)
 
 
 @pytest.mark.parametrize(
@@ -75,19 +75,19 @@ def test_no_bytes_break_it(pdu: bytes) -> None:
 
 def test_answers_as_bytes() -> None:
     assert words_pdu(3, [0x0237, 0]) == bytes.fromhex("03 04 0237 0000")
-    assert written_pdu(WriteAsked(6, 8501, (7,))) == bytes.fromhex("06 2135 0007")
-    assert written_pdu(WriteAsked(16, 8501, (7, 8))) == bytes.fromhex("10 2135 0002")
+    assert written_pdu(WriteRequested(6, 8501, (7,))) == bytes.fromhex("06 2135 0007")
+    assert written_pdu(WriteRequested(16, 8501, (7, 8))) == bytes.fromhex("10 2135 0002")
     assert exception_pdu(16, 11) == bytes.fromhex("90 0B")
 
 
 def test_an_identification_that_is_too_long_goes_on_at_its_next_object() -> None:
     objects = {0: b"T" * 100, 1: b"A" * 100, 2: b"V" * 100}
-    first = identified_pdu(IdentifyAsked(1, 0), 0x81, objects)
+    first = identified_pdu(IdentifyRequested(1, 0), 0x81, objects)
     assert first[:7] == bytes.fromhex("2B 0E 01 81 FF 02 02")
-    rest = identified_pdu(IdentifyAsked(1, 2), 0x81, objects)
+    rest = identified_pdu(IdentifyRequested(1, 2), 0x81, objects)
     assert rest == bytes.fromhex("2B 0E 01 81 00 00 01 02 64") + b"V" * 100
     with pytest.raises(Unanswerable):
-        identified_pdu(IdentifyAsked(4, 9), 0x81, objects)
+        identified_pdu(IdentifyRequested(4, 9), 0x81, objects)
 
 
 # The server

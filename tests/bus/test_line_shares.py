@@ -19,7 +19,7 @@ from tui.bus.tally import Tally
 
 from .conftest import WIDE
 
-Asked = tuple[Priority, str, int, int | None]
+Submitted = tuple[Priority, str, int, int | None]
 """Priority, program, device and the word that is written, None for a read."""
 COMMAND, STOP_WORD, RUN_WORD = 8501, 7, 15
 EXCHANGE = 0.03
@@ -38,8 +38,8 @@ class TimedLine:
         """Devices that answer nothing."""
         self.round_trip = False
         """Whether programs ask again during the next exchange only."""
-        self._later: list[Asked] = []
-        self._again: list[Asked] = []
+        self._later: list[Submitted] = []
+        self._again: list[Submitted] = []
         self._waiting: list[Job] = []
         timing = Timing(probes=False)
         devices = Devices(timing, mistakable=False)

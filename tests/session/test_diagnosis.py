@@ -564,44 +564,44 @@ def test_a_format_that_the_family_has_not() -> None:
 
 # The ladder as a whole
 
-ASKED = DiagnosticEvidence(LINK, 2, PROFILE, port=PortSeen(PORT))
+EVIDENCE = DiagnosticEvidence(LINK, 2, PROFILE, port=PortSeen(PORT))
 EXAMPLES = {
     "other-master": replace(
-        ASKED, overheard="Another master polls drives on this line. Address 2."
+        EVIDENCE, overheard="Another master polls drives on this line. Address 2."
     ),
-    "wrong-protocol": replace(ASKED, works=Works("rtu-tcp:gateway:4001")),
-    "other-unit": replace(ASKED, works=Works("tcp:gateway:502,unit=255", 255)),
-    "behind": replace(ASKED, measure=Measure(requested=9, behind=3)),
-    "two-drives": replace(ASKED, measure=Measure(requested=9, answered=9, second=3)),
-    "swapped": replace(ASKED, measure=Measure(requested=9, answered=9, swapped=3)),
-    "lost": replace(ASKED, measure=Measure(requested=9, answered=8, lost=1)),
-    "duplicated": replace(ASKED, measure=Measure(requested=9, answered=9, duplicated=1)),
-    "idle-close": replace(ASKED, measure=Measure(requested=9, answered=9), idle_closed=True),
-    "renumbered": replace(ASKED, adapter=AdapterSeen("/dev/serial/by-id/a", "/dev/ttyUSB1")),
-    "changed": replace(ASKED, changed="It was a pump.", heard=Heard(requested=5, answered=5)),
-    "no-port": replace(ASKED, trouble=PortMissing(PORT)),
-    "no-permission": replace(ASKED, port=PortSeen(PORT, permitted=False)),
-    "busy": replace(ASKED, trouble=PortBusy(PORT)),
-    "port-refused": replace(ASKED, trouble=PortRefused(PORT, "it does not take 8E1.")),
-    "line-lost": replace(ASKED, trouble=LineLost("The port went away.")),
-    "withheld": replace(ASKED, withheld="A proof is going on."),
+    "wrong-protocol": replace(EVIDENCE, works=Works("rtu-tcp:gateway:4001")),
+    "other-unit": replace(EVIDENCE, works=Works("tcp:gateway:502,unit=255", 255)),
+    "behind": replace(EVIDENCE, measure=Measure(requested=9, behind=3)),
+    "two-drives": replace(EVIDENCE, measure=Measure(requested=9, answered=9, second=3)),
+    "swapped": replace(EVIDENCE, measure=Measure(requested=9, answered=9, swapped=3)),
+    "lost": replace(EVIDENCE, measure=Measure(requested=9, answered=8, lost=1)),
+    "duplicated": replace(EVIDENCE, measure=Measure(requested=9, answered=9, duplicated=1)),
+    "idle-close": replace(EVIDENCE, measure=Measure(requested=9, answered=9), idle_closed=True),
+    "renumbered": replace(EVIDENCE, adapter=AdapterSeen("/dev/serial/by-id/a", "/dev/ttyUSB1")),
+    "changed": replace(EVIDENCE, changed="It was a pump.", heard=Heard(requested=5, answered=5)),
+    "no-port": replace(EVIDENCE, trouble=PortMissing(PORT)),
+    "no-permission": replace(EVIDENCE, port=PortSeen(PORT, permitted=False)),
+    "busy": replace(EVIDENCE, trouble=PortBusy(PORT)),
+    "port-refused": replace(EVIDENCE, trouble=PortRefused(PORT, "it does not take 8E1.")),
+    "line-lost": replace(EVIDENCE, trouble=LineLost("The port went away.")),
+    "withheld": replace(EVIDENCE, withheld="A proof is going on."),
     "slow-adapter": replace(
-        ASKED,
+        EVIDENCE,
         port=PortSeen(PORT, latency=16),
         heard=Heard(requested=5, answered=5),
         turnaround=0.02,
     ),
-    "wrong-settings": replace(ASKED, heard=Heard(requested=2, garbage=9)),
-    "silence": replace(ASKED, heard=Heard(requested=2)),
-    "late": replace(ASKED, heard=Heard(requested=2, late=1)),
-    "echo": replace(ASKED, heard=Heard(requested=2, echoed=2)),
-    "checksum": replace(ASKED, heard=Heard(requested=5, answered=3, damaged=2)),
-    "other-address": replace(ASKED, heard=Heard(requested=2, others=(7,))),
-    "wrong-function": replace(ASKED, heard=Heard(requested=2, functions=(4,))),
-    "gateway": replace(ASKED, heard=Heard(requested=2, exceptions=(11, 11))),
-    "exception": replace(ASKED, heard=Heard(requested=2, exceptions=(2, 2))),
-    "answers": replace(ASKED, heard=Heard(requested=5, answered=5)),
-    "not-open": ASKED,
+    "wrong-settings": replace(EVIDENCE, heard=Heard(requested=2, garbage=9)),
+    "silence": replace(EVIDENCE, heard=Heard(requested=2)),
+    "late": replace(EVIDENCE, heard=Heard(requested=2, late=1)),
+    "echo": replace(EVIDENCE, heard=Heard(requested=2, echoed=2)),
+    "checksum": replace(EVIDENCE, heard=Heard(requested=5, answered=3, damaged=2)),
+    "other-address": replace(EVIDENCE, heard=Heard(requested=2, others=(7,))),
+    "wrong-function": replace(EVIDENCE, heard=Heard(requested=2, functions=(4,))),
+    "gateway": replace(EVIDENCE, heard=Heard(requested=2, exceptions=(11, 11))),
+    "exception": replace(EVIDENCE, heard=Heard(requested=2, exceptions=(2, 2))),
+    "answers": replace(EVIDENCE, heard=Heard(requested=5, answered=5)),
+    "not-open": EVIDENCE,
 }
 
 
@@ -616,7 +616,7 @@ def test_every_rung_has_an_example() -> None:
 
 @pytest.mark.parametrize(("lost", "certainty"), [(1, "possible"), (2, "likely"), (5, "certain")])
 def test_certainty_grows_with_what_was_seen(lost: int, certainty: str) -> None:
-    found = of(replace(ASKED, measure=Measure(requested=200, answered=200 - lost, lost=lost)))
+    found = of(replace(EVIDENCE, measure=Measure(requested=200, answered=200 - lost, lost=lost)))
     assert found.certainty == certainty
     assert bool(found.others) is (certainty != "certain")
 

@@ -22,7 +22,7 @@ from tui.session.diagnosis.measure import Measure, measure_of
 from tui.simulator import DriveSpec, Simulation, troubles_of
 from tui.wire.frames import frame
 
-ASKED = frame(2, bytes.fromhex("030C810001"))
+EVIDENCE = frame(2, bytes.fromhex("030C810001"))
 REPLY = frame(2, bytes.fromhex("03020637"))
 OTHER = frame(2, bytes.fromhex("03020636"))
 WIDE = frame(2, bytes.fromhex("030C810002"))
@@ -39,7 +39,7 @@ def read_of(address: int) -> bytes:
 
 
 def _asks(data: bytes) -> bool:
-    return data == ECHO or (len(data) == len(ASKED) and data[4:5] == b"\0" and data[5] < 3)
+    return data == ECHO or (len(data) == len(EVIDENCE) and data[4:5] == b"\0" and data[5] < 3)
 
 
 def counted(steps: Sequence[Step]) -> Measure:
@@ -56,15 +56,15 @@ def counted(steps: Sequence[Step]) -> Measure:
 @pytest.mark.parametrize(
     ("steps", "worst", "counts"),
     [
-        ([ASKED, REPLY, ASKED, REPLY], "", {"requested": 2, "answered": 2}),
-        ([ASKED, ASKED, REPLY], "lost", {"lost": 1, "answered": 1}),
-        ([ASKED, (REPLY[:4], "damaged"), ASKED, REPLY], "damaged", {"damaged": 1, "lost": 0}),
-        ([ASKED, (b"\x00", "noise"), REPLY], "damaged", {"damaged": 1, "answered": 1}),
-        ([ASKED, (REPLY, STRAY), ASKED, REPLY], "late", {"late": 1, "lost": 0}),
-        ([ASKED, REPLY, (REPLY, STRAY)], "duplicated", {"duplicated": 1}),
-        ([ASKED, frame(7, REPLY[1:-2])], "foreign", {"foreign": 1, "lost": 0}),
-        ([ASKED, REPLY, (OTHER, STRAY)], "", {"second": 1, "duplicated": 0}),
-        ([ASKED, WIDE, (REPLY, OLD)], "", {"behind": 1}),
+        ([EVIDENCE, REPLY, EVIDENCE, REPLY], "", {"requested": 2, "answered": 2}),
+        ([EVIDENCE, EVIDENCE, REPLY], "lost", {"lost": 1, "answered": 1}),
+        ([EVIDENCE, (REPLY[:4], "damaged"), EVIDENCE, REPLY], "damaged", {"damaged": 1, "lost": 0}),
+        ([EVIDENCE, (b"\x00", "noise"), REPLY], "damaged", {"damaged": 1, "answered": 1}),
+        ([EVIDENCE, (REPLY, STRAY), EVIDENCE, REPLY], "late", {"late": 1, "lost": 0}),
+        ([EVIDENCE, REPLY, (REPLY, STRAY)], "duplicated", {"duplicated": 1}),
+        ([EVIDENCE, frame(7, REPLY[1:-2])], "foreign", {"foreign": 1, "lost": 0}),
+        ([EVIDENCE, REPLY, (OTHER, STRAY)], "", {"second": 1, "duplicated": 0}),
+        ([EVIDENCE, WIDE, (REPLY, OLD)], "", {"behind": 1}),
     ],
 )
 def test_frames_are_counted_by_their_trouble(
@@ -76,8 +76,8 @@ def test_frames_are_counted_by_their_trouble(
 
 
 def test_two_drives_are_distinguished_from_a_value_that_changes() -> None:
-    assert not counted([ASKED, REPLY, ASKED, OTHER, ASKED, OTHER]).two_drives
-    assert counted([ASKED, REPLY, (OTHER, STRAY), ASKED, REPLY, (OTHER, STRAY)]).two_drives
+    assert not counted([EVIDENCE, REPLY, EVIDENCE, OTHER, EVIDENCE, OTHER]).two_drives
+    assert counted([EVIDENCE, REPLY, (OTHER, STRAY), EVIDENCE, REPLY, (OTHER, STRAY)]).two_drives
     turned = Measure(damaged=2, turns=2)
     assert turned.two_drives
     assert not Measure(turns=2).two_drives
@@ -103,19 +103,19 @@ def test_a_copy_during_the_next_request_is_no_second_drive() -> None:
     [
         # each request gets the reply to the one before, and its repeat its own
         (
-            [ASKED, REPLY, WIDE, (REPLY, OLD), WIDE, LONG, ECHO, (LONG, OLD),
-             ECHO, ECHO, ASKED, (ECHO, OLD), ASKED, REPLY],
+            [EVIDENCE, REPLY, WIDE, (REPLY, OLD), WIDE, LONG, ECHO, (LONG, OLD),
+             ECHO, ECHO, EVIDENCE, (ECHO, OLD), EVIDENCE, REPLY],
             {"behind": 3, "duplicated": 0},
         ),
         # a copy that comes during the next request, whose own reply follows
-        ([ASKED, REPLY, WIDE, (REPLY, OLD), LONG], {"behind": 0, "duplicated": 1}),
+        ([EVIDENCE, REPLY, WIDE, (REPLY, OLD), LONG], {"behind": 0, "duplicated": 1}),
         # the second drive's reply comes then, and the own one collides
         (
-            [ASKED, REPLY, WIDE, (OTHER, OLD), (LONG[:5], "noise")],
+            [EVIDENCE, REPLY, WIDE, (OTHER, OLD), (LONG[:5], "noise")],
             {"behind": 0, "second": 1},
         ),
         # a reply that comes during the next request after a time
-        ([ASKED, *[b"\0"] * 20, WIDE, (REPLY, OLD), LONG], {"behind": 0}),
+        ([EVIDENCE, *[b"\0"] * 20, WIDE, (REPLY, OLD), LONG], {"behind": 0}),
     ],
 )  # fmt: skip
 def test_an_older_reply_is_counted_by_what_else_came(
@@ -128,7 +128,7 @@ def test_an_older_reply_is_counted_by_what_else_came(
 
 @pytest.mark.parametrize(("after", "kind"), [(0.05, "behind"), (0.3, "late")])
 def test_one_behind_is_at_once_and_a_late_reply_is_not(after: float, kind: str) -> None:
-    frames = [Frame(0, "out", ASKED), Frame(1, "out", WIDE), Frame(1 + after, "in", REPLY, OLD)]
+    frames = [Frame(0, "out", EVIDENCE), Frame(1, "out", WIDE), Frame(1 + after, "in", REPLY, OLD)]
     found = measure_of(frames, 2)
     assert {text: found.count(text) for text in ("behind", "late")} == {
         "behind": int(kind == "behind"),
@@ -137,20 +137,20 @@ def test_one_behind_is_at_once_and_a_late_reply_is_not(after: float, kind: str) 
 
 
 def test_replies_of_other_polled_drives_are_not_foreign() -> None:
-    other = frame(7, ASKED[1:-2])
-    assert counted([ASKED, frame(7, REPLY[1:-2])]).foreign == 1
-    assert counted([other, frame(7, REPLY[1:-2]), ASKED, frame(7, REPLY[1:-2])]).foreign == 0
+    other = frame(7, EVIDENCE[1:-2])
+    assert counted([EVIDENCE, frame(7, REPLY[1:-2])]).foreign == 1
+    assert counted([other, frame(7, REPLY[1:-2]), EVIDENCE, frame(7, REPLY[1:-2])]).foreign == 0
 
 
 def test_a_gateway_that_misses_the_drive_is_counted() -> None:
     refused = frame(2, bytes([0x83, 11]))
-    frames = [Frame(0, "out", ASKED), Frame(0.1, "in", refused)]
+    frames = [Frame(0, "out", EVIDENCE), Frame(0.1, "in", refused)]
     assert measure_of(frames, 2, unreached={10, 11}).worst == "unreached"
     assert measure_of(frames, 2).answered == 1
 
 
 def test_a_missing_reply_of_a_slow_drive_is_late() -> None:
-    frames = [Frame(0, "out", ASKED), Frame(0.6, "in", REPLY), Frame(1, "out", ASKED)]
+    frames = [Frame(0, "out", EVIDENCE), Frame(0.6, "in", REPLY), Frame(1, "out", EVIDENCE)]
     assert (measure_of(frames, 2).late, measure_of(frames, 2).lost) == (1, 0)
 
 

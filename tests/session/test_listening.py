@@ -21,7 +21,7 @@ from tui.drive.read_plan import WireTiming
 from tui.session.connect.address_prober import known_profiles
 from tui.session.connect.known_lines import DriveMark, LineMark, LinesMemory, keep_memory
 from tui.session.listening.families import Families, remembered_families
-from tui.session.listening.listener import LineListener, ToldExchange
+from tui.session.listening.listener import DecodedExchange, LineListener
 from tui.session.listening.summary import ListeningSummary, summary_lines, summary_of
 from tui.session.listening.telling import exchange_text, requested_names
 from tui.wire.frames import frame, read_frame, read_write_frame, write_frame
@@ -40,7 +40,7 @@ class Heard:
         character = CHARACTER if times else 0.0
         self.listener = LineListener(self.families, 0.0, character=character, silence=SILENCE)
         self.now = 0.0
-        self.reported: list[ToldExchange] = []
+        self.reported: list[DecodedExchange] = []
 
     def say(self, *readings: bytes, every: float = 0.02) -> Heard:
         """Readings at an even pace."""
@@ -73,7 +73,7 @@ def named(*profile_ids: str) -> Families:
     return Families(PROFILES, {n: library.load(id) for n, id in enumerate(profile_ids, start=1)})
 
 
-def values(reported: ToldExchange) -> dict[str, str]:
+def values(reported: DecodedExchange) -> dict[str, str]:
     return {value.code: value.value.display for value in reported.values}
 
 

@@ -72,12 +72,12 @@ def made(app: Stops, **settings: Any) -> Any:
     return asyncio.run(make())
 
 
-ASKED = ["\x1b[?25l", "\x1b[?1004h", "\x1b[>25u", "\x1b]22;text\x07", "\x1b[1;1Htext", "\x1b[<u"]
+QUERIES = ["\x1b[?25l", "\x1b[?1004h", "\x1b[>25u", "\x1b]22;text\x07", "\x1b[1;1Htext", "\x1b[<u"]
 
 
 def test_without_mouse_less_is_requested_of_the_terminal() -> None:
     driver = made(Stops())
-    for data in ASKED:
+    for data in QUERIES:
         driver.write(data)
     assert driver.written == ["\x1b[?25l", NO_REPORTS, "\x1b[1;1Htext"]
     assert not driver.mouse_enabled
@@ -85,9 +85,9 @@ def test_without_mouse_less_is_requested_of_the_terminal() -> None:
 
 def test_with_mouse_all_is_requested_as_textual_does() -> None:
     driver = made(Stops(mouse=True))
-    for data in ASKED:
+    for data in QUERIES:
         driver.write(data)
-    assert driver.written == ASKED
+    assert driver.written == QUERIES
     assert driver.mouse_enabled
     assert not made(Stops(mouse=True), mouse=False).mouse_enabled
 

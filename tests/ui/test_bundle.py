@@ -16,7 +16,7 @@ from textual.widgets import Input
 from tests.bus.peer import PtyPeer, silent
 from tui.app import DrivePanelApp
 from tui.cli.shared.bundle_documents import drive_documents
-from tui.screens.bundle import NO_LINE_MEANT
+from tui.screens.bundle import NO_LINE_CHOSEN
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.bundle import CANCELLED, BundleScreen
 from tui.screens.dialogs.palette import Palette
@@ -114,7 +114,7 @@ async def test_no_line_no_bundle() -> None:
         app.connection.lines.clear_options()
         app.action_bundle()
         await pilot.pause()
-        assert app.events.events[-1].text == NO_LINE_MEANT
+        assert app.events.events[-1].text == NO_LINE_CHOSEN
 
 
 FINISHED = Bundle(

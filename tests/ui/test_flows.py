@@ -291,7 +291,7 @@ async def test_another_word_of_bits_draws_that_alone(size: tuple[int, int], plac
 async def test_nothing_is_drawn_below_the_help_and_it_is_reported_that_values_stand_still(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tui.screens.monitor.screen.STILL_TOLD", 0.5)
+    monkeypatch.setattr("tui.screens.monitor.screen.FROZEN_AFTER", 0.5)
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(120, 40)) as pilot:
         screen = await to_monitor(app, pilot, 2)

@@ -22,7 +22,7 @@ from .test_pictures import BOTH_SIZES
 from .test_pictures import no_ports as no_ports  # the fixture is for these pictures too
 
 Compare = Callable[..., bool]
-ASKED = ("02 03 0C81 0001", "02 06 2329 0032", "02 03 2135 0002", "05 03 0C81 0001")
+QUERIES = ("02 03 0C81 0001", "02 06 2329 0032", "02 03 2135 0002", "05 03 0C81 0001")
 ANSWERED = ("02 03 02 0637", "02 86 04", "02 03 04 000F 0190", "")
 OURS = DeviceCounters(
     1204, 1197, 4, 2, 1, 3, {2: 3, 6: 1}, 9632, 21_450, 31.2, (0, 212, 840, 120, 19, 4, 2, 0, 0, 0)
@@ -37,7 +37,7 @@ def log() -> tuple[Frame, ...]:
     frames = []
     for number in range(24):
         at = fakes.NOW - 30.0 + 0.4 * number
-        requested, answered = ASKED[number % 4], ANSWERED[number % 4]
+        requested, answered = QUERIES[number % 4], ANSWERED[number % 4]
         frames.append(Frame(at, "out", sealed(bytes.fromhex(requested))))
         if answered:
             note = "damaged" if number == 6 else ""

@@ -79,7 +79,7 @@ def editor_of(
     return console
 
 
-SAID: list[tuple[str, str]] = []
+TEXTS_SHOWN: list[tuple[str, str]] = []
 """What the prepared state has said: told to the events of its panel."""
 
 
@@ -88,9 +88,9 @@ def panel(console: DriveConsole) -> DrivePanelApp:
     app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     app.events = EventLog(lambda: WALL)
-    for kind, text in SAID:
+    for kind, text in TEXTS_SHOWN:
         app.events.add(kind, text, console.device)
-    SAID.clear()
+    TEXTS_SHOWN.clear()
     fakes.choose(app, console)
     return app
 
@@ -98,7 +98,7 @@ def panel(console: DriveConsole) -> DrivePanelApp:
 def say(editor: Editor, kind: OutcomeKind, text: str) -> None:
     """Said at the moment of every fake."""
     editor.session.work.outcome = WorkOutcome(kind, text, fakes.NOW)
-    SAID.append((kind, text))
+    TEXTS_SHOWN.append((kind, text))
 
 
 def plain(_: Editor) -> None:

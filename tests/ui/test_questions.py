@@ -72,7 +72,7 @@ def confirm(
     )
 
 
-class Asked:
+class OpenQuestion:
     """A question on the screen of a panel without a line, and what became of it."""
 
     def __init__(self, question: Question[Any]) -> None:
@@ -110,7 +110,7 @@ YES: dict[str, tuple[Callable[[], Question[Any]], str, object]] = {
 @pytest.mark.parametrize("name", YES)
 async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
     make, key, answer = YES[name]
-    requested = Asked(make())
+    requested = OpenQuestion(make())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         for passed in (0.0, 0.1, MOMENT - 0.01):
@@ -134,7 +134,7 @@ async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
 @pytest.mark.usefixtures("slow_hands")
 @pytest.mark.parametrize(("key", "answer"), [("s", "stop"), ("escape", "stay"), ("q", "stay")])
 async def test_a_stop_and_a_no_count_at_once(key: str, answer: str) -> None:
-    requested = Asked(Leave("it runs"))
+    requested = OpenQuestion(Leave("it runs"))
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         await pilot.press(key)
@@ -144,7 +144,7 @@ async def test_a_stop_and_a_no_count_at_once(key: str, answer: str) -> None:
 @pytest.mark.parametrize("key", ["escape", "q", "n"])
 @pytest.mark.parametrize("loses", [True, False])
 async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
-    requested = Asked(confirm(loses=loses))
+    requested = OpenQuestion(confirm(loses=loses))
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         await pilot.press(key)
@@ -153,7 +153,7 @@ async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
 
 @pytest.mark.usefixtures("slow_hands")
 async def test_typed_text_does_not_answer_a_new_question() -> None:
-    requested = Asked(confirm(by_itself=True))
+    requested = OpenQuestion(confirm(by_itself=True))
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         for key in "frequency,any\ry":
@@ -166,7 +166,7 @@ async def test_typed_text_does_not_answer_a_new_question() -> None:
         await pilot.press("y")
         await until(pilot, lambda: requested.answers == [True])
     for key in ("escape", "n"):
-        requested = Asked(confirm(by_itself=True))
+        requested = OpenQuestion(confirm(by_itself=True))
         async with requested.app.run_test(size=(80, 24)) as pilot:
             await requested.put(pilot)
             requested.clock.now += 0.0 if key == "escape" else 1.01
@@ -189,7 +189,7 @@ def test_questions_that_no_key_asks_for_come_by_themselves(place: str, calls: in
 
 
 async def test_enter_is_no_yes_where_something_is_lost_and_that_is_reported() -> None:
-    requested = Asked(confirm())
+    requested = OpenQuestion(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         hint = requested.question.query_one("#hint")
@@ -203,7 +203,9 @@ async def test_enter_is_no_yes_where_something_is_lost_and_that_is_reported() ->
 
 async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
     follows = "\n".join(f"line {number}" for number in range(40))
-    requested = Asked(Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True))
+    requested = OpenQuestion(
+        Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True)
+    )
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         hint = requested.question.query_one("#hint")
@@ -218,14 +220,14 @@ async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
 
 
 async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
-    requested = Asked(confirm())
+    requested = OpenQuestion(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         requested.question._voided = True
         await pilot.press("y")
         await until(pilot, lambda: requested.answers == [False])
     for question, no in ((confirm(), False), (Leave("it runs"), "stay"), (ask(), None)):
-        requested = Asked(question)
+        requested = OpenQuestion(question)
         async with requested.app.run_test(size=(80, 24)) as pilot:
             await requested.put(pilot)
             question.void()
@@ -238,7 +240,7 @@ async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
 
 async def test_a_question_that_a_stop_ends_at_once_leaves_nothing_to_do() -> None:
     question = confirm()
-    requested = Asked(question)
+    requested = OpenQuestion(question)
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         question.void()
@@ -251,7 +253,7 @@ def ask() -> Ask:
 
 
 async def test_a_question_below_another_screen_is_voided_when_it_comes_up() -> None:
-    requested = Asked(confirm())
+    requested = OpenQuestion(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         await requested.app.push_screen(HelpScreen("monitor"))
@@ -314,7 +316,7 @@ def test_unwatched_line_shows_state_from_its_checks() -> None:
 
 
 async def test_a_question_tells_what_the_motor_does_while_it_is_open() -> None:
-    requested = Asked(confirm())
+    requested = OpenQuestion(confirm())
     profile = library.load("atv71")
     console = fakes.console_of(fakes.snapshot_of(profile, fakes.RUNNING))
     fakes.choose(requested.app, console)
@@ -507,7 +509,7 @@ async def test_the_keys_of_leaving_stand_below_however_much_is_reported(
     reported = "\n".join(
         f"Device {n}: on loss of communication it acts 3 s after." for n in range(40)
     )
-    requested = Asked(Leave(reported, cast(MotorStates, runs)))
+    requested = OpenQuestion(Leave(reported, cast(MotorStates, runs)))
     async with requested.app.run_test(size=size) as pilot:
         await requested.put(pilot)
         await pilot.pause()

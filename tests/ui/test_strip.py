@@ -16,7 +16,7 @@ from tui.screens.keys.screens import TABBED
 from tui.session.command.commander import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
-from tui.widgets.strip import DriveNow, Said, StripView, strip_line, tabs_line
+from tui.widgets.strip import BarMessage, DriveNow, StripView, strip_line, tabs_line
 
 RUNS = DriveNow(
     device=2,
@@ -176,8 +176,8 @@ def test_a_mark_moves_no_tab() -> None:
 @pytest.mark.parametrize("kind", ["refused", "done"])
 def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
     text = "Not sent: 80.0 Hz is above the high speed HSP, 60.0 Hz. Raise HSP on Parameters first."
-    new = message_lines(Said("14:02:11", text, kind, 1.0), 80)
-    later = message_lines(Said("14:02:11", text, kind, 60.0), 80)
+    new = message_lines(BarMessage("14:02:11", text, kind, 1.0), 80)
+    later = message_lines(BarMessage("14:02:11", text, kind, 60.0), 80)
     assert " ".join(" ".join(line.plain for line in new).split()).endswith(text)
     assert len(later) == 1
     assert "…" in later[0].plain
@@ -189,7 +189,7 @@ def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
 def test_failed_reset_is_shown_whole(family: str, width: int) -> None:
     for why in (not_in_command(library.load(family), BY_TERMINALS[family]), STILL_IN_FAULT):
         text = f"Fault reset: {why}"
-        lines = message_lines(Said("14:02:11", text, "done", 1.0), width)
+        lines = message_lines(BarMessage("14:02:11", text, "done", 1.0), width)
         assert text in " ".join(" ".join(line.plain for line in lines).split())
         assert all(line.cell_len <= width for line in lines)
 

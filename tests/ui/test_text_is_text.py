@@ -207,7 +207,7 @@ WAYS: dict[str, tuple[str, Way]] = {
     "faults": ("atv71", faults),
     "line": ("atv71", connection),
 }
-ASKED = {
+QUESTION_CLASSES = {
     "rating",
     "teaching",
     "inputs",
@@ -231,7 +231,9 @@ async def test_markup_in_every_field_is_text(name: str) -> None:
 
 
 def test_every_field_that_asks_is_one_of_these() -> None:
-    assert len(list(calls_of("Ask"))) == len(ASKED), "a new question: type markup into it here too"
+    assert len(list(calls_of("Ask"))) == len(QUESTION_CLASSES), (
+        "a new question: type markup into it here too"
+    )
 
 
 async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written() -> None:

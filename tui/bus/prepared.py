@@ -39,6 +39,6 @@ def prepared_write(
     else:
         data = frame(device, pdu)
     kind, fields = request_form(request)
-    # number 0 is never used by RequestsAsked: nothing waits for this answer
+    # number 0 is never used by PendingRequests: nothing waits for this answer
     asking = Asking(0, kind, fields, Priority.STOP, False, 0.0, 0, 0.0, limits)
     return PreparedWrite(request, data, packed(asking))

@@ -26,11 +26,11 @@ def pid_namespace() -> str:
         return ""
 
 
-LONGEST_NAME, LONGEST_SAID = 40, 500
+LONGEST_NAME, LONGEST_READABLE = 40, 500
 """Characters of a name, and of a sentence, of another program that a person is shown."""
 
 
-def readable(text: str, longest: int = LONGEST_SAID) -> str:
+def readable(text: str, longest: int = LONGEST_READABLE) -> str:
     """A text of another program as it may be shown: not endless, and nothing for the terminal."""
     plain = "".join(item if item.isprintable() else "?" for item in text[:longest])
     return plain if len(text) <= longest else f"{plain[:-1]}…"

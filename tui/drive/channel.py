@@ -24,7 +24,7 @@ class Channel:
     """True if another word decides under other conditions."""
 
 
-NOT_TOLD = Channel("", None)
+UNKNOWN_CHANNEL = Channel("", None)
 """Result if no row of the profile applies."""
 
 
@@ -75,7 +75,7 @@ def _in_force(profile: Profile, rows: Sequence[ChannelRow], raws: Mapping[str, i
         value = (raws[row.parameter] & row.mask) >> row.shift
         text = _text(profile, row, raws[row.parameter], value)
         return Channel(text, value in row.line, profile[row.parameter], len(rows) > 1)
-    return NOT_TOLD
+    return UNKNOWN_CHANNEL
 
 
 def _unread(conditions: Sequence[When], raws: Mapping[str, int]) -> str | None:

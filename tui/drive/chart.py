@@ -11,7 +11,7 @@ from .profile.profile import Profile
 from .profile.schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
 
 UNKNOWN = State(id="unknown", name="Unknown", kind="unknown", mask=0, value=0)
-TOLD_FAULT = State(id="fault", name="Fault", kind="fault", mask=0, value=0)
+UNLISTED_FAULT = State(id="fault", name="Fault", kind="fault", mask=0, value=0)
 """State for a fault word if the chart has none."""
 ENABLED_KINDS: frozenset[StateKind] = frozenset({"running", "stopping"})
 """Kinds of state in which the drive may turn its motor."""
@@ -51,7 +51,7 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
     chart = profile.chart(raws)
     word = raws.get(chart.status) if chart else None
     if chart is None or word is None:
-        return ChartState(TOLD_FAULT if fault_number(profile, raws) is not None else UNKNOWN)
+        return ChartState(UNLISTED_FAULT if fault_number(profile, raws) is not None else UNKNOWN)
     return ChartState(
         state=state_now(profile, chart, raws),
         own=state_of(chart, word),
@@ -78,7 +78,7 @@ def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
     own = state_of(chart, word) if word is not None else UNKNOWN
     if own.kind == "fault" or fault_number(profile, raws) is None:
         return own
-    return next((state for state in chart.states if state.kind == "fault"), TOLD_FAULT)
+    return next((state for state in chart.states if state.kind == "fault"), UNLISTED_FAULT)
 
 
 def fault_number(profile: Profile, raws: Mapping[str, int]) -> int | None:

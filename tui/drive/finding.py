@@ -20,7 +20,7 @@ SLOW_BELOW = 1200
 """Baud rates below it are tried last, unless a family leaves the factory so: an address costs
 0.2 s and more there."""
 IDENTIFY = 43
-ASKED_CHARACTERS = 8
+PROBE_CHARACTERS = 8
 """Characters of the request that probes an address."""
 
 
@@ -82,7 +82,7 @@ def wait_for_reply(setting: LineSetting, turnaround: float) -> float:
 
 def silent_cost(setting: LineSetting, wait: float, probes: int = 1) -> float:
     """Return the seconds for an unused address: the requests, and the timeout of each."""
-    request = ASKED_CHARACTERS * character_seconds(setting.baud, setting.format)
+    request = PROBE_CHARACTERS * character_seconds(setting.baud, setting.format)
     return probes * (request + wait)
 
 

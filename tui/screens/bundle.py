@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from .app_port import Panel
 
-NO_LINE_MEANT = "Choose a line on Line first. A simulated line must be open for a bundle."
+NO_LINE_CHOSEN = "Choose a line on Line first. A simulated line must be open for a bundle."
 ABOUT_BUNDLE = (
     "Port, diagnosis, frames, settings, journal, log and screens of this line. User names, host"
     " names and passwords are omitted. Drives are only read."
@@ -46,7 +46,7 @@ def ask_bundle(app: Panel) -> None:
     except LinkSyntaxError:
         link = None
     if link is None:
-        app.tell(NO_LINE_MEANT)
+        app.tell(NO_LINE_CHOSEN)
         return
     trouble = target.trouble if target is not None else None
     subject = partial(_subject, app, text, link, opened, trouble, _screens(app))

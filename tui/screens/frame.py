@@ -23,7 +23,7 @@ from tui.widgets.drawing import key_line, wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
 from tui.widgets.small import is_too_small, small_lines
-from tui.widgets.strip import FrameView, Said, Tab, message_line, strip_line, tabs_line
+from tui.widgets.strip import BarMessage, FrameView, Tab, message_line, strip_line, tabs_line
 
 from .keys.action import (
     FRAMES,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .app_port import Panel
 
 TABS = tuple(Tab(tab.name, tab.digit, tab.title, tab.narrow, tab.mark_cells) for tab in TABBED)
-SAID_STYLES: dict[str, Style] = {
+MESSAGE_KIND_STYLES: dict[str, Style] = {
     "fault": FAULT,
     "failed": FAULT,
     "error": FAULT,
@@ -194,14 +194,14 @@ def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
     return [Text(f" {part:<{room}} ", FAULT_BLOCK, no_wrap=True) for part in parts]
 
 
-def message_lines(message: Said | None, width: int, *, lead: bool = True) -> list[Text]:
+def message_lines(message: BarMessage | None, width: int, *, lead: bool = True) -> list[Text]:
     """The message; one that is new has as many lines as it takes, up to `WHOLE_LINES`.
 
     `lead` says whether the keys that show more lead there now.
     """
     if message is None:
         return [Text("")]
-    style = SAID_STYLES.get(message.kind, FAINT)
+    style = MESSAGE_KIND_STYLES.get(message.kind, FAINT)
     room = width - 12
     if (
         message.kind in WHOLE_KINDS

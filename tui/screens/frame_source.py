@@ -11,7 +11,7 @@ from rich.style import Style
 
 from tui.safety import LOOK_IS_OLD
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
-from tui.widgets.strip import DriveNow, FrameView, Said, StripView
+from tui.widgets.strip import BarMessage, DriveNow, FrameView, StripView
 
 from .frame import at
 from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
@@ -101,15 +101,17 @@ class FrameSource:
             self._busy = (now, busy)
         return self._load
 
-    def _message(self, console: DriveConsole | None, now: float) -> Said | None:
+    def _message(self, console: DriveConsole | None, now: float) -> BarMessage | None:
         """Return the state with priority over messages: a lost line, a silent drive."""
         holds = self._line_trouble(now) or self._not_heard() or self._trouble_below(now)
         if holds:
-            return Said(self._app.clock.time_of_day(), holds, "alarm", 0.0)
+            return BarMessage(self._app.clock.time_of_day(), holds, "alarm", 0.0)
         event = self._app.events.newest
         outcome = console.session.work.outcome if console is not None else None
         if outcome is not None and outcome.kind == "working":
-            return Said(self._app.clock.time_of_day(), outcome.text, "working", now - outcome.time)
+            return BarMessage(
+                self._app.clock.time_of_day(), outcome.text, "working", now - outcome.time
+            )
         if event is None:
             return None
         opened = console.device if console is not None else None
@@ -120,7 +122,7 @@ class FrameSource:
         message, place, keys = self._app.key_hint
         if message is event and place == self._app.place:
             text = f"{text} {keys}".strip()  # on another screen they may mean something else
-        return Said(at(event.wall), text, event.kind, time.time() - event.wall, there)
+        return BarMessage(at(event.wall), text, event.kind, time.time() - event.wall, there)
 
     def _trouble_below(self, now: float) -> str:
         """The first trouble of the lines that are open and not shown."""

@@ -22,7 +22,7 @@ _PAUSE = 0.02
 _ANSWER_WITHIN = 0.2
 """Seconds after which the master continues without an answer."""
 _STEP = 0.001
-_ASKED = ("status_word", "output_frequency", "motor_current")
+_POLLED = ("status_word", "output_frequency", "motor_current")
 """Quantities that the master reads, one by one, as many PLC programs do."""
 _GIVEN = ("frequency_reference", "command_frequency")
 """Quantities of which it writes the first writable one: 0, which moves nothing."""
@@ -103,7 +103,7 @@ def plc_cycle(drives: Sequence[tuple[int, Profile]]) -> list[bytes]:
     for address, profile in drives:
         if profile.function(43):
             found.append(bytes([address, 43, 14, 1, 0]))
-        requested = [profile.quantity(text) for text in _ASKED]  # type: ignore[arg-type]
+        requested = [profile.quantity(text) for text in _POLLED]  # type: ignore[arg-type]
         found += [
             bytes([address, parameter.function, *parameter.address.to_bytes(2, "big"), 0, 1])
             for parameter in requested

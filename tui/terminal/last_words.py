@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 ENDED_WITHIN = 3.0
 """Seconds that the app has to end after its last work; then the process is ended."""
-SAID_WITHIN = 1.0
+TAKEN_BY_TERMINAL_WITHIN = 1.0
 """Seconds for which the end waits until the terminal has taken the last words."""
 FAILED = 70
 """The exit status after an internal error, as of any command."""
@@ -223,7 +223,7 @@ class LastWords(App[None]):
             last_resort.daemon = True
             last_resort.start()
         if self._saying is not None:
-            self._saying.join(SAID_WITHIN)
+            self._saying.join(TAKEN_BY_TERMINAL_WITHIN)
         self.release_input()
 
     def _say_all(self, screen: OwnScreen) -> None:

@@ -37,7 +37,7 @@ CURSOR_KEYS = frozenset(
 
 EDITS = frozenset({"backspace", "delete"})
 
-TOLD_AFTER = 0.1
+KEYS_REPORTED_AFTER = 0.1
 """Seconds after which the keys of a piece are reported without waiting for more."""
 
 
@@ -175,7 +175,7 @@ class TypeAhead:
         """Report once no more keys of the piece arrive."""
         if self._refused > before:
             now = self._refused
-            self._app.set_timer(TOLD_AFTER, lambda: self._look(now))
+            self._app.set_timer(KEYS_REPORTED_AFTER, lambda: self._look(now))
             return
         count, late = self._refused, self._late
         self._refused, self._late, self._looking = 0, False, False

@@ -263,7 +263,7 @@ def message_line(when: str, message: str, style: Style, hint: str, width: int) -
     return text
 
 
-class Said(NamedTuple):
+class BarMessage(NamedTuple):
     """The present message; `age` in seconds."""
 
     when: str
@@ -280,7 +280,7 @@ class FrameView(NamedTuple):
     strip: StripView
     place: str
     marks: dict[str, tuple[str, Style]]
-    message: Said | None
+    message: BarMessage | None
     not_stopped: tuple[str, ...] = ()
     """A text for each motor that a stop does not stop; drawn over everything, whole."""
 

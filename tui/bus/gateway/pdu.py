@@ -32,7 +32,7 @@ class Unanswerable(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class ReadAsked:
+class ReadRequested:
     """Function 3 or 4."""
 
     function: int
@@ -41,7 +41,7 @@ class ReadAsked:
 
 
 @dataclass(frozen=True, slots=True)
-class WriteAsked:
+class WriteRequested:
     """Function 6, 16 or 23; the latter reads `count` words from `read_address` on afterwards."""
 
     function: int
@@ -57,7 +57,7 @@ class WriteAsked:
 
 
 @dataclass(frozen=True, slots=True)
-class DiagnoseAsked:
+class DiagnoseRequested:
     """Function 8 with one word of data."""
 
     subfunction: int
@@ -65,55 +65,55 @@ class DiagnoseAsked:
 
 
 @dataclass(frozen=True, slots=True)
-class IdentifyAsked:
+class IdentifyRequested:
     """Function 43/14: objects of a stream from `first` on, or the one of read code 4."""
 
     read_code: int
     first: int
 
 
-GatewayAsked = ReadAsked | WriteAsked | DiagnoseAsked | IdentifyAsked
+GatewayRequested = ReadRequested | WriteRequested | DiagnoseRequested | IdentifyRequested
 
 
-def parse_request(pdu: bytes) -> GatewayAsked:
+def parse_request(pdu: bytes) -> GatewayRequested:
     """Parse the bytes of a request. Raises Unanswerable."""
     function, data = pdu[0], pdu[1:]
     match function:
         case 3 | 4:
             address, count = _unpacked(">HH", data)
             _check_span(address, count, MAX_READ)
-            return ReadAsked(function, address, count)
+            return ReadRequested(function, address, count)
         case 6:
             address, value = _unpacked(">HH", data)
-            return WriteAsked(function, address, (value,))
+            return WriteRequested(function, address, (value,))
         case 16:
             return _write_many(data)
         case 23:
             return _read_write(data)
         case 8:
-            return DiagnoseAsked(*_unpacked(">HH", data))
+            return DiagnoseRequested(*_unpacked(">HH", data))
         case 43:
             kind, read_code, first = _unpacked(">BBB", data)
             if kind != MEI_IDENTIFICATION:
                 raise Unanswerable(ILLEGAL_FUNCTION)
             if not 1 <= read_code <= 4:
                 raise Unanswerable(ILLEGAL_VALUE)
-            return IdentifyAsked(read_code, first)
+            return IdentifyRequested(read_code, first)
         case _:
             # no drive has coils or masked writes; an allowed function 5 would still go nowhere
             raise Unanswerable(ILLEGAL_FUNCTION, f"function {function}")
 
 
-def _write_many(data: bytes) -> WriteAsked:
+def _write_many(data: bytes) -> WriteRequested:
     address, count, size = _unpacked(">HHB", data[:5])
-    return WriteAsked(16, address, _values(address, count, size, data[5:], MAX_WRITE))
+    return WriteRequested(16, address, _values(address, count, size, data[5:], MAX_WRITE))
 
 
-def _read_write(data: bytes) -> WriteAsked:
+def _read_write(data: bytes) -> WriteRequested:
     read_address, read_count, address, count, size = _unpacked(">HHHHB", data[:9])
     _check_span(read_address, read_count, MAX_READ_23)
     values = _values(address, count, size, data[9:], MAX_WRITE_23)
-    return WriteAsked(23, address, values, read_address, read_count)
+    return WriteRequested(23, address, values, read_address, read_count)
 
 
 def _unpacked(form: str, data: bytes) -> tuple[int, ...]:
@@ -149,7 +149,7 @@ def words_pdu(function: int, words: Sequence[int]) -> bytes:
     return bytes([function, 2 * len(words)]) + struct.pack(f">{len(words)}H", *words)
 
 
-def written_pdu(requested: WriteAsked) -> bytes:
+def written_pdu(requested: WriteRequested) -> bytes:
     """The answer of function 6 or 16."""
     second = requested.values[0] if requested.function == 6 else len(requested.values)
     return struct.pack(">BHH", requested.function, requested.address, second)
@@ -161,7 +161,7 @@ def diagnosed_pdu(subfunction: int, data: int) -> bytes:
 
 
 def identified_pdu(
-    requested: IdentifyAsked, conformity: int, objects: Mapping[int, bytes]
+    requested: IdentifyRequested, conformity: int, objects: Mapping[int, bytes]
 ) -> bytes:
     """The answer of function 43/14, with the object that follows. Raises Unanswerable."""
     ends = {1: REGULAR, 2: EXTENDED}

@@ -34,7 +34,7 @@ from .owner_watch import is_stop
 
 log = logging.getLogger(__name__)
 
-MOST_ASKED = 256
+MOST_REQUESTED = 256
 """Requests of one client that may wait."""
 MOST_UNREAD = 1 << 23
 """Most unread bytes of a client; one that stalls is disconnected, and may attach again."""
@@ -117,7 +117,7 @@ class Client:
 
     def ask(self, inside: LineInside, message: Asking) -> None:
         """Pass a request of the program to the line. Raises NoMessage."""
-        if len(self.requested) >= MOST_ASKED:
+        if len(self.requested) >= MOST_REQUESTED:
             raise NoMessage("too many requests at once")
         try:
             request = request_from(message.kind, message.fields)

@@ -51,7 +51,7 @@ from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .polls import PollsSubmitted
 from .publishers import LinePublisher, give_up_own, tell_own
-from .requested import RequestsAsked
+from .requested import PendingRequests
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ class ShareClient:
         self._say = say
         self._loop = asyncio.get_running_loop()
         self.writer: asyncio.StreamWriter | None = None
-        self._requested = RequestsAsked(inside, self._tell)
+        self._requested = PendingRequests(inside, self._tell)
         self._polls = PollsSubmitted(
             inside, self._tell, self._requested.describe, lambda: not self.watching.frozen
         )

@@ -19,7 +19,7 @@ from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw
 OWNER_ENDED = "The program that owned the line ended"
 
 
-class RequestsAsked:
+class PendingRequests:
     """One attachment's requests; lives in the line's loop."""
 
     def __init__(self, inside: LineInside, tell: Callable[[AnyMessage], None]) -> None:

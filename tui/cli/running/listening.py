@@ -8,7 +8,7 @@ from tui.bus.listening_line import ListeningLine
 from tui.session.capture_file import CaptureFile
 from tui.session.listening.families import Families
 from tui.session.listening.hearing import Hearing
-from tui.session.listening.listener import ToldExchange
+from tui.session.listening.listener import DecodedExchange
 from tui.wire.heard.splitting import HeardFrame
 
 from ..shared.errors import USAGE, Failure
@@ -58,7 +58,7 @@ class HearingRun:
         self._hearing.end(now)
         self._sum_up(now)
 
-    def _tell(self, exchange: ToldExchange) -> None:
+    def _tell(self, exchange: DecodedExchange) -> None:
         self._output.exchange(exchange, exchange.exchange.time + self._wall)
 
     def _sum_up(self, now: float) -> None:

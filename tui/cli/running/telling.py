@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..documents.drive_documents import PrintedRunEvent
 
-TOLD_EVERY = 1.0
+REPORT_INTERVAL = 1.0
 """Seconds between two lines about the motor."""
 
 
@@ -51,7 +51,7 @@ class RunTelling:
         elif self._trouble:
             complain("The drive answers again.")
             self._trouble = 0.0
-        if latest.time - self._reported < TOLD_EVERY * 0.9:
+        if latest.time - self._reported < REPORT_INTERVAL * 0.9:
             return
         self._reported = latest.time
         self._print("state", self._state_line(latest), latest)

@@ -10,7 +10,7 @@ from .say import say
 if TYPE_CHECKING:
     from tui.drive.read_plan import ReadRequest
     from tui.session.listening.families import AssumedProfile, Families
-    from tui.session.listening.listener import ToldExchange
+    from tui.session.listening.listener import DecodedExchange
     from tui.session.listening.summary import DriveSummary, ListeningSummary
     from tui.session.listening.tally import ReadTally, WriteTally
     from tui.session.listening.words import HeardValue, WordSpan
@@ -34,7 +34,7 @@ FURTHER = 24
 class HeardOutput(Protocol):
     """Takes exchanges and summaries; `wall` is a time in seconds since 1970."""
 
-    def exchange(self, reported: ToldExchange, wall: float) -> None:
+    def exchange(self, reported: DecodedExchange, wall: float) -> None:
         """Put one exchange out, at once."""
 
     def summary(self, summary: ListeningSummary, wall: float) -> None:
@@ -48,7 +48,7 @@ class HeardLines:
         self._families = families
         self._taken: dict[int, str] = {}
 
-    def exchange(self, reported: ToldExchange, wall: float) -> None:
+    def exchange(self, reported: DecodedExchange, wall: float) -> None:
         """Print one exchange, preceded by the assumed profile of its drive if it is new."""
         from tui.session.listening.summary import family_text
         from tui.session.listening.telling import exchange_text
@@ -76,7 +76,7 @@ class HeardJson:
         self._line_text = line_text
         self._families = families
 
-    def exchange(self, reported: ToldExchange, wall: float) -> None:
+    def exchange(self, reported: DecodedExchange, wall: float) -> None:
         """Print one exchange as an object."""
         print_json(exchange_document(self._line_text, reported, self._families, wall), compact=True)
 
@@ -102,7 +102,7 @@ class _SpanFields(TypedDict):
 
 
 def exchange_document(
-    line_text: str, reported: ToldExchange, families: Families, wall: float
+    line_text: str, reported: DecodedExchange, families: Families, wall: float
 ) -> HeardExchangeDocument:
     """The document of one exchange."""
     from tui.session.listening.summary import exception_meaning

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from ..documents.document import TimeoutField
 
-TOLD_WITHIN = 3.0
+TIMEOUT_READ_WITHIN = 3.0
 """Seconds in which a drive reports its timeout at the end of a command, on a quick line."""
 
 log = logging.getLogger(__name__)
@@ -54,7 +54,7 @@ class PolledDrive:
             once = meets_silence(session.profile)
             priority = Priority.POLL if once else Priority.OPERATOR_READ
             reading = read_timeout(Reader(session), priority)
-            within = patience(session.line, TOLD_WITHIN)
+            within = patience(session.line, TIMEOUT_READ_WITHIN)
             session.timeout = await asyncio.wait_for(reading, within)
 
     async def tell(self) -> None:

@@ -16,7 +16,7 @@ from .schema import ProfileData
 from .shared_rows import ProfileTables, read_tables
 from .toml_lines import TomlPath
 
-TOLD = 10
+FAULTS_LISTED = 10
 """Most faults to report when a profile is loaded; a check reports all."""
 
 
@@ -36,9 +36,11 @@ def checked_data(path: Path, packaged: Path) -> ProfileData:
     """Load a profile file; raises ProfileError with its first faults."""
     data, faults = examined(path, packaged)
     if faults or data is None:
-        lines = [str(fault) for fault in faults[:TOLD]]
-        if len(faults) > TOLD:
-            lines.append(f"... and {len(faults) - TOLD} more faults; profiles --check lists all.")
+        lines = [str(fault) for fault in faults[:FAULTS_LISTED]]
+        if len(faults) > FAULTS_LISTED:
+            lines.append(
+                f"... and {len(faults) - FAULTS_LISTED} more faults; profiles --check lists all."
+            )
         raise ProfileError("\n".join(lines))
     return data
 

@@ -13,7 +13,7 @@ import msgspec.inspect as shapes
 from .schema import ProfileData
 from .toml_lines import TomlPath
 
-TOLD_SINGLY = 12
+LISTED_SINGLY = 12
 """Most allowed values to list; of a longer list, only the nearest are named."""
 TEXT_FORMS = {
     r"^[0-9]+(\.[0-9]+)?$": 'a decimal number in quotes, such as "0.1"',
@@ -141,7 +141,7 @@ def _instead(wrong: object, choice: Any) -> str:
     texts = [str(item) for item in choice]
     near = difflib.get_close_matches(str(wrong), texts, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(near)}?" if near else "."
-    if len(texts) <= TOLD_SINGLY:
+    if len(texts) <= LISTED_SINGLY:
         return f"{hint} Allowed: {', '.join(texts)}"
     return f"{hint} Allowed are {len(texts)}, told by `drivepanel profiles --schema`"
 
@@ -149,13 +149,13 @@ def _instead(wrong: object, choice: Any) -> str:
 def _kind(shape: shapes.Type) -> str:
     match shape:
         case shapes.StructType():
-            return f"a table with {', '.join(f.encode_name for f in shape.fields[:TOLD_SINGLY])}"
+            return f"a table with {', '.join(f.encode_name for f in shape.fields[:LISTED_SINGLY])}"
         case shapes.DictType():
             return "a table of names by raw value"
         case shapes.ListType():
             return f"a list of which each is {_kind(shape.item_type)}"
         case shapes.LiteralType(values=values):
-            return f"one of {', '.join(map(str, values[:TOLD_SINGLY]))}"
+            return f"one of {', '.join(map(str, values[:LISTED_SINGLY]))}"
         case shapes.IntType(ge=low, le=high):
             return f"a number{_between(low, high).replace('; allowed is', ' from')}"
         case shapes.BoolType():

@@ -47,7 +47,7 @@ class ProfileFileHead(NamedTuple):
         return hertz if math.isfinite(hertz) else None
 
 
-class AskedOf(NamedTuple):
+class RequestPrefixes(NamedTuple):
     """Identification of a family's drives on a line."""
 
     prefixes: tuple[str, ...] = ()
@@ -71,7 +71,7 @@ def quick_head(path: Path) -> ProfileFileHead:
     return ProfileFileHead(section(text, "profile") or {})
 
 
-def request_prefixes(path: Path, own: bool, packaged: Path) -> AskedOf:
+def request_prefixes(path: Path, own: bool, packaged: Path) -> RequestPrefixes:
     """Return the identification of a file's family; empty for a broken file."""
     return _requested(path, own, packaged, _stamp(path))
 
@@ -129,16 +129,16 @@ def shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
 
 
 @lru_cache(maxsize=256)
-def _requested(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> AskedOf:
+def _requested(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> RequestPrefixes:
     try:
         tables = _read_tables(path, own, packaged)
     except (OSError, UnicodeDecodeError, ProfileError):
-        return AskedOf()
+        return RequestPrefixes()
     named, functions = tables.get("identification"), tables.get("functions")
     prefixes = named.get("reference_prefixes") if isinstance(named, dict) else None
     rows = functions if isinstance(functions, list) else []
     codes = [row.get("code") for row in rows if isinstance(row, dict)]
-    return AskedOf(
+    return RequestPrefixes(
         tuple(p for p in prefixes if isinstance(p, str)) if isinstance(prefixes, list) else (),
         frozenset(code for code in codes if isinstance(code, int)),
         str(named.get("version_digits", "")) if isinstance(named, dict) else "",

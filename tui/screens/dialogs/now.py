@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tui.screens.app_port import Panel
     from tui.session.drive import DriveSession
 
-DRIVES_TOLD = 4
+DRIVES_NAMED = 4
 """Drives that are reported; more are counted."""
 
 
@@ -37,7 +37,7 @@ class MotorStates:
         looks = fleet.line_watch.looks if fleet else {}
         now = self._app.clock.monotonic()
         text = Text()
-        for session in self._sessions[:DRIVES_TOLD]:
+        for session in self._sessions[:DRIVES_NAMED]:
             console = fleet.console(session.device) if fleet else None
             which = f"Now {session.device:<3} " if len(self._sessions) > 1 else "Now  "
             text.append(which if not text else f"\n{which}", FAINT)
@@ -45,6 +45,6 @@ class MotorStates:
             latest = console.latest if console else None
             period = console.monitor.period if console else 0.0
             text.append_text(motor_state_text(session.profile, latest, period, look, now))
-        if (more := len(self._sessions) - DRIVES_TOLD) > 0:
+        if (more := len(self._sessions) - DRIVES_NAMED) > 0:
             text.append(f"\nand {more} more", FAINT)
         return text

@@ -25,7 +25,7 @@ from .question import KeyQuestion, hint
 
 FILES_LISTED = 200
 """Files that are listed at most, the newest."""
-NAME_WIDTH, DRIVE_WIDTH, TOLD_WIDTH = 24, 15, 14
+NAME_WIDTH, DRIVE_WIDTH, ABOUT_WIDTH = 24, 15, 14
 """Columns of a file; date and time are between name and drive."""
 SUFFIX = ".toml"
 
@@ -127,5 +127,5 @@ def file_line(path: Path, about: FileAbout) -> Text:
     text.append(f"{when:<16} ", FAINT)
     style: Style = ALARM if about.alarm else PLAIN
     text.append(f"{cut(about.drive, DRIVE_WIDTH)} ", FAINT)
-    text.append(cut(about.reported, TOLD_WIDTH), style)
+    text.append(cut(about.reported, ABOUT_WIDTH), style)
     return text

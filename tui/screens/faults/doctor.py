@@ -41,7 +41,7 @@ CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
 OPENS = "Enter opens "
 TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
 """Certainty of the first cause in a word; `practice` is general practice."""
-TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
+TRIP_QUANTITIES: Mapping[Quantity, str] = {
     "output_frequency": "",
     "motor_current": "",
     "mains_voltage": "mains ",
@@ -140,7 +140,7 @@ def _tripped(view: DoctorView) -> str:
     texts = before[-1].texts if before else ()  # at the trip itself the motor is free already
     values = dict(zip(record.codes, texts, strict=False))
     parts = []
-    for quantity, name in TOLD_OF_A_TRIP.items():
+    for quantity, name in TRIP_QUANTITIES.items():
         parameter = view.profile.quantity(quantity)
         value = values.get(parameter.code, "") if parameter else ""
         if parameter and value not in ("", NOT_AVAILABLE):

@@ -15,7 +15,7 @@ from tui.wire.frames import Pdu, pdu_of
 
 READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE = 3, 4, 6, 16, 23
 EXCEPTION_BIT = 0x80
-CODES_TOLD = 3
+CODES_OF_FRAME = 3
 """Parameters of a request that are named; the others are counted."""
 
 ProfileOf = Callable[[int], Profile | None]
@@ -23,7 +23,7 @@ RawsOf = Callable[[int], Mapping[str, int]]
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class DecodedRequest:
     """Subject of a request: the words of a read, or none."""
 
     device: int
@@ -36,7 +36,7 @@ def decoded(
     frames: Sequence[Frame], profile_of: ProfileOf, raws_of: RawsOf, *, tcp: bool
 ) -> list[str]:
     """A sentence for each frame; empty where it is none. A reply is explained by its request."""
-    requested: Asked | None = None
+    requested: DecodedRequest | None = None
     found = []
     for frame in frames:
         pdu = pdu_of(frame.data, tcp=tcp)
@@ -56,11 +56,11 @@ def decoded(
     return found
 
 
-def _requested(pdu: Pdu) -> Asked | None:
+def _requested(pdu: Pdu) -> DecodedRequest | None:
     if pdu.function not in (READ, READ_INPUT, READ_WRITE):
         return None
     address, count = struct.unpack_from(">HH", pdu.body)
-    return Asked(pdu.device, pdu.function, address, count)
+    return DecodedRequest(pdu.device, pdu.function, address, count)
 
 
 def _request(pdu: Pdu, words: _Words) -> str:
@@ -84,7 +84,7 @@ def _request(pdu: Pdu, words: _Words) -> str:
     return head
 
 
-def _reply(pdu: Pdu, requested: Asked | None, words: _Words) -> str:
+def _reply(pdu: Pdu, requested: DecodedRequest | None, words: _Words) -> str:
     if pdu.function & EXCEPTION_BIT:
         name = FUNCTION_NAMES.get(pdu.function & ~EXCEPTION_BIT, "")
         return f"{pdu.device} refuses to {name or 'do it'}: exception {pdu.body[0]}"
@@ -126,8 +126,8 @@ class _Words:
             return f"{address} ({address:#06x}), {count} word{'' if count == 1 else 's'}".replace(
                 "0x", "16#"
             )
-        more = len(found) - CODES_TOLD
-        codes = " ".join(code or "?" for code in found[:CODES_TOLD])
+        more = len(found) - CODES_OF_FRAME
+        codes = " ".join(code or "?" for code in found[:CODES_OF_FRAME])
         return f"{codes} + {more} more" if more > 0 else codes
 
     def values(self, address: int, raws: Sequence[int], sign: str = "") -> str:

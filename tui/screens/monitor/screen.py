@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
-STILL_TOLD = 5.0
+FROZEN_AFTER = 5.0
 """Seconds under a dialog after which the values below it are reported as frozen."""
-STOP_TOLD = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
+STOP_SHOWN_FOR = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
 """Seconds for which the end of a stop is shown."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
@@ -126,7 +126,7 @@ class MonitorScreen(InputKeys):
         if self._timer is not None:
             self._timer.pause()
             since = self.app.clock.time_of_day()
-            self._still = self.set_timer(STILL_TOLD, lambda: self._tell_still(since))
+            self._still = self.set_timer(FROZEN_AFTER, lambda: self._tell_still(since))
 
     def _tell_still(self, since: str) -> None:
         """Nobody shall take what shines through under a dialog for the present."""
@@ -296,7 +296,7 @@ class ViewSource:
         report = fleet.stopper.reports.get(session.device) if fleet else None
         if report is None or self._is_overtaken(report):
             return None
-        return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
+        return report if now - report.since < STOP_SHOWN_FOR.get(report.phase, now) else None
 
     def _is_overtaken(self, report: StopReport) -> bool:
         """Return True if something newer is true: a later command, or a motor that runs again."""

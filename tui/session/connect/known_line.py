@@ -16,7 +16,7 @@ from tui.drive.plain import plain
 
 from .identify import DriveIdentity
 from .known_lines import (
-    LONGEST_SAID,
+    LONGEST_IDENTITY_TEXT,
     DriveMark,
     LineMark,
     LineName,
@@ -157,7 +157,7 @@ def _mark_of(identity: DriveIdentity | None, profile: str) -> DriveMark:
     if identity is None:
         return DriveMark(profile=profile)
     stated = (identity.vendor, identity.reference, identity.version, identity.name)
-    vendor, reference, version, name = (text[:LONGEST_SAID] for text in stated)
+    vendor, reference, version, name = (text[:LONGEST_IDENTITY_TEXT] for text in stated)
     return DriveMark(vendor, reference, version, name, profile or identity.profile or "")
 
 

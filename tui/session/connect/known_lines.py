@@ -25,7 +25,7 @@ LINES_KEPT = 60
 NAMES_KEPT = 100
 LONGEST_MEMORY = 2_000_000
 """Maximum size of the file in bytes."""
-LONGEST_SAID = 200
+LONGEST_IDENTITY_TEXT = 200
 """Maximum length of a stored identity text in characters."""
 NO_PORT = PortName("")
 _TERMINALS = "/dev/pts/"

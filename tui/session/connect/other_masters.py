@@ -18,7 +18,7 @@ LISTEN = 1.5
 """Seconds for which a line is monitored before the first request: longer than a master's cycle."""
 TALK = 4
 """Least loose bytes that count as traffic: the length of the shortest frame."""
-TOLD_OF_EACH = 3
+TEXTS_OF_EACH = 3
 """Number of different requests to one address that are listed."""
 NOT_AWAITED = ("late or repeated", "noise")
 """Notes on frames that arrived while no reply was due."""
@@ -61,8 +61,8 @@ class Overheard:
         texts = list(
             dict.fromkeys(request.text for request in self.requests if request.device == device)
         )
-        more = len(texts) - TOLD_OF_EACH
-        return ", ".join(texts[:TOLD_OF_EACH]) + (f" and {more} more" if more > 0 else "")
+        more = len(texts) - TEXTS_OF_EACH
+        return ", ".join(texts[:TEXTS_OF_EACH]) + (f" and {more} more" if more > 0 else "")
 
 
 def overheard(frames: Iterable[Frame], since: float) -> Overheard:

@@ -34,11 +34,11 @@ ECHO, RESET, DAMAGED, FRAMES = 0x00, 0x0A, 0x0C, 0x0E
 ECHOED = 0xA55A
 """Word of an echo test: it has as many ones as zeros."""
 THIS_PORT = "function 8"
-TOLD_BY_THEN = 0.5
+COUNTS_ARRIVE_WITHIN = 0.5
 """Seconds after which the keeper has sent its latest counts to this program."""
 
 
-PairAsked = Callable[[], Awaitable[tuple[int, int] | None]]
+PairRequested = Callable[[], Awaitable[tuple[int, int] | None]]
 """Reads a pair of counters; returns None if the drive refuses them."""
 
 
@@ -193,12 +193,12 @@ class CounterWatch:
         frames, damaged = found[port.frames].raw, found[port.checksum_errors].raw
         return None if frames is None or damaged is None else (frames, damaged)
 
-    async def _take(self, name: str, ask: PairAsked) -> None:
+    async def _take(self, name: str, ask: PairRequested) -> None:
         """Read a pair of counters with the bounds of the frames sent and answered by then."""
         before = self._ours
         found = await ask()
         if self.counted_by:
-            await self.session.clock.sleep(TOLD_BY_THEN)
+            await self.session.clock.sleep(COUNTS_ARRIVE_WITHIN)
         after = self._ours
         if found is None:
             return

@@ -29,9 +29,9 @@ from ..connect.limits import limits_of
 from .evidence import SAME_ADAPTER, AdapterSeen, DiagnosticEvidence
 from .heard import Heard, heard_by_errors, heard_of
 
-ASKED = 3
+PROBE_TRIES = 3
 """Number of reads of a drive that answers, up to the first unanswered one."""
-ASKED_IN_VAIN = 2
+TRIES_IN_VAIN = 2
 """Number of reads of a drive that does not answer."""
 SERIAL = "serial:"
 FRAMES_COME_WITHIN = 0.5
@@ -106,10 +106,10 @@ async def _outcomes(
     exchange."""
     questions = await asyncio.to_thread(_questions, line, device, profile)
     outcomes: list[LineError | None] = []
-    for question in questions[:ASKED_IN_VAIN]:
+    for question in questions[:TRIES_IN_VAIN]:
         outcomes.append(await _outcome(question))
         if outcomes[-1] is None:
-            while len(outcomes) < ASKED and outcomes[-1] is None:
+            while len(outcomes) < PROBE_TRIES and outcomes[-1] is None:
                 outcomes.append(await _outcome(question))
             break
     return outcomes

@@ -16,7 +16,7 @@ from .heard import Heard
 from .measure import Measure
 
 NO_ERRORS = PortErrors(0, 0, 0, 0)
-NOT_ASKED = Heard()
+NO_REQUEST_SEEN = Heard()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class DiagnosticEvidence:
     adapter: AdapterSeen = SAME_ADAPTER
     changed: str = ""
     """Differences from the stored line for which writes are held."""
-    heard: Heard = NOT_ASKED
+    heard: Heard = NO_REQUEST_SEEN
     withheld: str = ""
     """Why this program sent nothing to the drive."""
     errors: PortErrors = NO_ERRORS

@@ -24,11 +24,11 @@ from tui.bus.gateway.pdu import (
     NO_PATH,
     NO_RESPONSE,
     WRITE_FUNCTIONS,
-    DiagnoseAsked,
-    IdentifyAsked,
-    ReadAsked,
+    DiagnoseRequested,
+    IdentifyRequested,
+    ReadRequested,
     Unanswerable,
-    WriteAsked,
+    WriteRequested,
     diagnosed_pdu,
     exception_pdu,
     identified_pdu,
@@ -89,7 +89,7 @@ class Gateway:
             if function in WRITE_FUNCTIONS:
                 log.info("device %s, client %s: %s", device, request.client.peer, refused)
             return _refused(function, refused.code)
-        if isinstance(requested, WriteAsked):
+        if isinstance(requested, WriteRequested):
             write = line.pending.came(request.client, device, requested.words)
             return self._write(line, request, requested, write)
         answer = partial(self._answer, line, device, requested)
@@ -130,18 +130,21 @@ class Gateway:
             return exception_pdu(function, DEVICE_FAILURE)
 
     async def _answer(
-        self, line: GatewayLine, device: int, requested: ReadAsked | DiagnoseAsked | IdentifyAsked
+        self,
+        line: GatewayLine,
+        device: int,
+        requested: ReadRequested | DiagnoseRequested | IdentifyRequested,
     ) -> bytes:
         match requested:
-            case ReadAsked():
+            case ReadRequested():
                 return await self._read(line, device, requested)
-            case DiagnoseAsked():
+            case DiagnoseRequested():
                 return await self._diagnose(line, device, requested)
-            case IdentifyAsked():
+            case IdentifyRequested():
                 found = await self._identify(line, device)
                 return identified_pdu(requested, found.conformity, found.objects)
 
-    async def _read(self, line: GatewayLine, device: int, requested: ReadAsked) -> bytes:
+    async def _read(self, line: GatewayLine, device: int, requested: ReadRequested) -> bytes:
         session = line.drives.known(device)
         if session is not None and session.profile.function(requested.function) is None:
             raise Unanswerable(ILLEGAL_FUNCTION)
@@ -162,7 +165,7 @@ class Gateway:
         return words_pdu(requested.function, reply.words)
 
     async def _write(
-        self, line: GatewayLine, request: TcpRequest, requested: WriteAsked, write: PendingWrite
+        self, line: GatewayLine, request: TcpRequest, requested: WriteRequested, write: PendingWrite
     ) -> bytes:
         try:
             answer = partial(self._written, line, request, requested, write)
@@ -171,7 +174,7 @@ class Gateway:
             line.pending.ended(write)
 
     async def _written(
-        self, line: GatewayLine, request: TcpRequest, requested: WriteAsked, write: PendingWrite
+        self, line: GatewayLine, request: TcpRequest, requested: WriteRequested, write: PendingWrite
     ) -> bytes:
         device = write.device
         # a stop does not wait until a drive that was silent is identified again
@@ -191,7 +194,9 @@ class Gateway:
         finally:
             line.drives.unknown_again(device)
 
-    async def _diagnose(self, line: GatewayLine, device: int, requested: DiagnoseAsked) -> bytes:
+    async def _diagnose(
+        self, line: GatewayLine, device: int, requested: DiagnoseRequested
+    ) -> bytes:
         session = await line.drives.found(device)
         function = session.profile.function(8) if session is not None else None
         if function is None or requested.subfunction not in (function.subfunctions or ()):

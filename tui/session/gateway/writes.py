@@ -14,7 +14,7 @@ from tui.bus.gateway.pdu import (
     ILLEGAL_FUNCTION,
     ILLEGAL_VALUE,
     Unanswerable,
-    WriteAsked,
+    WriteRequested,
     words_pdu,
     written_pdu,
 )
@@ -57,7 +57,7 @@ class GatewayWrite:
         self,
         line: GatewayLine,
         session: DriveSession,
-        requested: WriteAsked,
+        requested: WriteRequested,
         request: TcpRequest,
         rules: GatewayRules,
         write: PendingWrite,

@@ -16,7 +16,7 @@ from tui.wire.heard.splitting import HeardFrame
 from ..connect.address_prober import known_profiles
 from .families import Families, remembered_families
 from .hearing import Hearing
-from .listener import ToldExchange
+from .listener import DecodedExchange
 from .place import PlaceToListen, line_to_listen
 from .summary import ListeningSummary
 
@@ -113,5 +113,5 @@ class HeardLine:
         self._trace.add(frame.ended, "out" if request else "in", frame.data, note)
 
 
-def _forget(_: ToldExchange) -> None:
+def _forget(_: DecodedExchange) -> None:
     """Exchanges are reported with their frames, and counted."""

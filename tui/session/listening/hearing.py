@@ -10,10 +10,10 @@ from tui.drive.read_plan import WireTiming
 
 from ..clock import REAL_CLOCK, Clock
 from .families import Families
-from .listener import FrameHeard, LineListener, ToldExchange
+from .listener import DecodedExchange, FrameHeard, LineListener
 from .summary import ListeningSummary, summary_of
 
-OnExchange = Callable[[ToldExchange], None]
+OnExchange = Callable[[DecodedExchange], None]
 
 
 class Hearing:

@@ -24,7 +24,7 @@ FrameHeard = Callable[[HeardFrame, bool | None], None]
 
 
 @dataclass(frozen=True, slots=True)
-class ToldExchange:
+class DecodedExchange:
     """Exchange interpreted by its drive's family."""
 
     exchange: HeardExchange
@@ -62,24 +62,24 @@ class LineListener:
         self._pairing = Pairing()
         self._splitter = FrameSplitter(character, self._pairing.is_due)
 
-    def take(self, data: bytes, time: float) -> list[ToldExchange]:
+    def take(self, data: bytes, time: float) -> list[DecodedExchange]:
         """Process bytes read at a time; return the exchanges completed so far."""
         return self._report(self._splitter.take(data, time))
 
-    def idle(self, now: float) -> list[ToldExchange]:
+    def idle(self, now: float) -> list[DecodedExchange]:
         """Process a pause without bytes; return the exchanges that it completes or leaves
         unanswered."""
         found = self._report(self._splitter.pause())
         return found + [self._tell(exchange) for exchange in self._pairing.wait(now)]
 
-    def end(self, now: float) -> list[ToldExchange]:
+    def end(self, now: float) -> list[DecodedExchange]:
         """End monitoring; a request that has waited long for its reply counts as unanswered."""
         found = self._report(self._splitter.pause())
         return found + [
             self._tell(exchange) for exchange in self._pairing.wait(now, LONG_FOR_AN_ANSWER)
         ]
 
-    def _report(self, frames: Iterable[HeardFrame]) -> list[ToldExchange]:
+    def _report(self, frames: Iterable[HeardFrame]) -> list[DecodedExchange]:
         found = []
         for frame in frames:
             self.tally.take_frame(frame, self.silence if self.character else 0.0)
@@ -88,7 +88,7 @@ class LineListener:
             found += [self._tell(exchange) for exchange in exchanges]
         return found
 
-    def _tell(self, exchange: HeardExchange) -> ToldExchange:
+    def _tell(self, exchange: HeardExchange) -> DecodedExchange:
         self.families.note(exchange)
         family = self.families.family(exchange.device)
         profile = family.profile if family is not None else None
@@ -96,4 +96,4 @@ class LineListener:
         drive = self.tally.drive(exchange.device, exchange.time)
         values = values_of(exchange, profile, drive.raws)
         drive.take(exchange, values, profile)
-        return ToldExchange(exchange, family, tuple(values))
+        return DecodedExchange(exchange, family, tuple(values))

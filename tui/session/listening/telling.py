@@ -5,11 +5,11 @@ from __future__ import annotations
 from tui.drive.plain import plain
 
 from .families import Families
-from .listener import ToldExchange
+from .listener import DecodedExchange
 from .summary import exception_meaning
 from .words import FUNCTION_NAMES, WHO, HeardValue, names_of_words, spans_of
 
-CODES_TOLD_AT_MOST = 4
+CODES_NAMED_AT_MOST = 4
 """Number of parameters of a request that are named if it returned no values."""
 FUNCTION_WIDTH = 6
 
@@ -19,21 +19,21 @@ def function_name(function: int) -> str:
     return FUNCTION_NAMES.get(function, f"function {function}")
 
 
-def requested_names(reported: ToldExchange) -> list[str]:
+def requested_names(reported: DecodedExchange) -> list[str]:
     """Return the parameters that a request names, each once; addresses for unknown ones."""
     spans = spans_of(reported.exchange.request)
     found = (name for span in spans for name in names_of_words(span, reported.profile))
     return list(dict.fromkeys(found))
 
 
-def exchange_text(reported: ToldExchange, families: Families) -> str:
+def exchange_text(reported: DecodedExchange, families: Families) -> str:
     """Return device, function, and the values or the result; control characters are replaced."""
     exchange = reported.exchange
     head = f"{exchange.device or 'all':>3} {function_name(exchange.function):<{FUNCTION_WIDTH}}"
     return plain(f"{head} {_what(reported, families)}".rstrip())
 
 
-def _what(reported: ToldExchange, families: Families) -> str:
+def _what(reported: DecodedExchange, families: Families) -> str:
     exchange = reported.exchange
     match exchange.answer:
         case "ok" | "broadcast":
@@ -47,7 +47,7 @@ def _what(reported: ToldExchange, families: Families) -> str:
     return f"{_drive_request_text(reported)}: {_trouble(reported)}".removeprefix(": ")
 
 
-def _trouble(reported: ToldExchange) -> str:
+def _trouble(reported: DecodedExchange) -> str:
     exchange = reported.exchange
     if exchange.exception is not None:
         meaning = exception_meaning(exchange.exception, reported.profile)
@@ -59,10 +59,10 @@ def _value_text(value: HeardValue) -> str:
     return f"{value.code} {'← ' if value.written else ''}{value.value.display}"
 
 
-def _drive_request_text(reported: ToldExchange) -> str:
+def _drive_request_text(reported: DecodedExchange) -> str:
     names = requested_names(reported)
-    more = len(names) - CODES_TOLD_AT_MOST
-    return " ".join(names[:CODES_TOLD_AT_MOST]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - CODES_NAMED_AT_MOST
+    return " ".join(names[:CODES_NAMED_AT_MOST]) + (f" and {more} more" if more > 0 else "")
 
 
 def _identity_text(device: int, families: Families) -> str:

@@ -46,7 +46,7 @@ RATE_OVER = 6
 Listener = Callable[[Snapshot], None]
 
 
-class NotAsked(DriveError):
+class PollHeldBack(DriveError):
     """A drive is not polled on purpose; the text gives the reason."""
 
 
@@ -193,7 +193,7 @@ class Monitor:
                     due.add(rates.seldom)
                 try:
                     if why := self.held_back():
-                        raise NotAsked(why)
+                        raise PollHeldBack(why)
                     seldom = (*rates.seldom, *self.session.followed)
                     turn = self._steady.turn(due, seldom)
                     readings.update(await self._cycle(rates, readings, turn))

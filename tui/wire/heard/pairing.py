@@ -50,7 +50,7 @@ class HeardExchange:
 
 
 @dataclass(slots=True)
-class _Asked:
+class _OpenRequest:
     frame: HeardFrame
     noise: bytes = b""
 
@@ -59,7 +59,7 @@ class Pairing:
     """Takes frames in their order, gives exchanges as soon as the result of each is known."""
 
     def __init__(self) -> None:
-        self._requested: _Asked | None = None
+        self._requested: _OpenRequest | None = None
         self._last: HeardExchange | None = None
         self._replied = float("-inf")
         """When the last reply ended."""
@@ -88,7 +88,7 @@ class Pairing:
         found = self._given_up(frame)
         if frame.device == BROADCAST_DEVICE:
             return [*found, self._kept(_exchange(frame, "broadcast"))], True
-        self._requested = _Asked(frame)
+        self._requested = _OpenRequest(frame)
         return found, True
 
     def wait(self, now: float, longest: float = GIVEN_UP_AFTER) -> list[HeardExchange]:
@@ -97,7 +97,7 @@ class Pairing:
             return []
         return self._given_up()
 
-    def _answered(self, requested: _Asked, frame: HeardFrame) -> HeardExchange:
+    def _answered(self, requested: _OpenRequest, frame: HeardFrame) -> HeardExchange:
         self._requested = None
         self._replied, self._reply = frame.ended, frame.data
         refused = bool(frame.function & REFUSAL)
