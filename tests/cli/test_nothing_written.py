@@ -86,7 +86,7 @@ REFUSED = {
     ),
     "take control, reference": Refused(
         "powerdrive", (*RUN, "-p", "powerdrive", "--take-control", "--reference", "20"),
-        "no manual at hand",
+        "No available manual",
     ),
     "take control, none to take": Refused("atv71", (*RUN, "--take-control"), "no control to take"),
     "run above a limit": Refused(

@@ -91,7 +91,7 @@ def test_disagreeing_look_ends_lesson_with_1(line: str) -> None:
     output = teach(line, "1.21", "61.5", status=1)
     assert "no longer taught (1 count is 1 rpm before)" in output
     assert teach(line) == "Nothing is taught.\n"
-    assert "no manual at hand" in refused(5, "reference", line, *DRIVE, "600rpm", "--arm")
+    assert "No available manual" in refused(5, "reference", line, *DRIVE, "600rpm", "--arm")
 
 
 def test_forgetting(line: str) -> None:

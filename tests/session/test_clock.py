@@ -30,8 +30,12 @@ OWN_TIME = {
     "events.py",
     "command/stop.py",
     "command/under_way.py",
+    "api/running_motor.py",
+    "running/motor_run.py",
+    "running/watching.py",
 }
-"""Modules that look at the real clock: the journal's own thread, threads that wait for a stop."""
+"""Modules that use the real clock: the journal's own thread, threads that wait for a stop, and
+programs that wait for the motor that they run."""
 SESSION = Path(tui.session.__file__).parent
 
 

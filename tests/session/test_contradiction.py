@@ -139,7 +139,7 @@ def test_a_contradicted_drive_is_never_armed(family: str) -> None:
     with pytest.raises(OrderRefused, match="says it is ATV312HU09M3, Altivar 312"):
         session.arming.arm()
     # neither where its state is read first
-    with pytest.raises(OrderRefused, match="not the drive's own"):
+    with pytest.raises(OrderRefused, match="the profile of another drive"):
         Commander(session, Journal()).arm()
     assert not session.arming.armed
 

@@ -123,7 +123,7 @@ async def test_function_4_keeps_to_its_own_limit() -> None:
     line.describe(1, limits_of(FIELDS))
     await line.read(1, 0, 4, function=4)
     await line.read(1, 0, 8)
-    with pytest.raises(RequestRefused, match="takes 4"):
+    with pytest.raises(RequestRefused, match="accepts 4"):
         await line.read(1, 0, 5, function=4)
 
 

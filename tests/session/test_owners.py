@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tui.bus.api import ModbusLine, Priority, Reply
+from tui.bus.api import ModbusLine, Reply
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink
@@ -119,10 +119,10 @@ async def test_a_monitor_that_dies_by_an_error_of_its_own_says_so_and_begins_ane
         monitor = here.console.monitor
         read, broken = monitor.reader.read, True
 
-        async def failing(codes: Any, *, priority: Priority = Priority.POLL) -> Any:
+        async def failing(codes: Any, **how: Any) -> Any:
             if broken:
                 raise KeyError("a mistake of our own")
-            return await read(codes, priority=priority)
+            return await read(codes, **how)
 
         monkeypatch.setattr(type(monitor.reader), "read", lambda _self, c, **k: failing(c, **k))
         await until(lambda: monitor.restarts >= 2)

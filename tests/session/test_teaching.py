@@ -281,7 +281,7 @@ async def test_a_reference_whose_word_could_mean_a_negative_one_is_refused() -> 
 )
 async def test_missing_reference_names_next_step(taught: bool, says: str) -> None:
     teacher = await preset() if taught else drive()[1]
-    with pytest.raises(ValueRefused, match="no manual at hand") as reported:
+    with pytest.raises(ValueRefused, match="No available manual") as reported:
         await parsed(teacher, "20")
     assert says in str(reported.value)
 
