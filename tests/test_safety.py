@@ -6,6 +6,7 @@ import ast
 import asyncio
 import itertools
 from contextlib import suppress
+from dataclasses import asdict
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -31,11 +32,12 @@ from tui.bus.schedule.unsent import fail_lost
 from tui.bus.share import heartbeat
 from tui.bus.share.attached import Client
 from tui.bus.share.heartbeat import HeartbeatSender, programs_back
-from tui.bus.share.messages import VERSION
+from tui.bus.share.messages import VERSION, Asking
 from tui.bus.share.owner_watch import OwnerWatch
 from tui.bus.share.place import Owner
 from tui.bus.share.polls import PollsServed
 from tui.bus.stop_counts import StopCounts
+from tui.drive.orders import chart_codes
 from tui.drive.profile import library
 from tui.screens.frame_source import _seen
 from tui.session.command import motor_stop
@@ -43,6 +45,8 @@ from tui.session.command.access import CommandAccess
 from tui.session.command.last_known import is_likely_to_run
 from tui.session.command.stop import Stopper
 from tui.session.drive import DriveSession
+from tui.session.gateway.drives import GatewayDrives
+from tui.session.gateway.resting import RestingDrives
 from tui.session.gateway.writes import GatewayWrite
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.snapshot import Snapshot
@@ -464,6 +468,48 @@ async def test_word_counts_as_just_read_for_two_seconds(
         session.image.fresh(2.0),
     ):
         assert ("ETA" in found) is known
+
+
+@pytest.mark.parametrize(("after", "at_rest"), [(1.8, True), (2.2, False)])
+async def test_state_counts_as_just_seen_for_two_seconds(after: float, at_rest: bool) -> None:
+    session, clock = session_showing(READY)
+    clock.advance(after)
+
+    async def read(*_: object, **__: object) -> None:
+        pass
+
+    reader = SimpleNamespace(profile=session.profile, session=session, read=read)
+    assert await RestingDrives._is_at_rest(cast(Any, None), cast(Any, reader)) is at_rest
+
+
+async def test_word_that_chooses_the_chart_may_be_two_seconds_old() -> None:
+    ages = {}
+
+    async def read_raw(_: object, code: str, __: object, age: float) -> int:
+        ages[code] = age
+        return 0
+
+    session = SimpleNamespace(profile=library.load("atv71"))
+    (chart, *_) = chart_codes(session.profile)
+    drives = SimpleNamespace(_read_raw=read_raw)
+    await GatewayDrives.read_deciding(
+        cast(Any, drives), cast(Any, session), [chart, "ETA"], hurry=True
+    )
+    assert 1.5 < ages[chart] < 2.5
+    assert ages["ETA"] == 0.0
+
+
+@pytest.mark.parametrize(("late", "sent"), [(1.8, True), (2.2, False)])
+def test_command_of_an_attached_program_is_sent_within_two_seconds(late: float, sent: bool) -> None:
+    submitted: list[Job] = []
+    inside = SimpleNamespace(clock=lambda: 100.0, submit=submitted.append)
+    request = WriteOne(1, 8501, 15)
+    message = Asking(
+        1, type(request).__name__, asdict(request), Priority.OPERATOR_WRITE,
+        replaceable=False, max_age=0.0, stamp=0, requested=100.0 - late,
+    )  # fmt: skip
+    client().ask(cast(Any, inside), message)
+    assert bool(submitted) is sent
 
 
 # What the screens show of a drive without a monitor
