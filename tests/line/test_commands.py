@@ -642,7 +642,7 @@ def test_status_of_a_running_drive() -> None:
         assert reported["fault"] is None
         assert reported["values"]["output_frequency"]["value"] == pytest.approx(30, abs=1.5)
         assert reported["watch"]["timeout_s"] == 10
-        assert "freewheel" in reported["watch"]["does"]
+        assert "coasts" in reported["watch"]["does"]
 
 
 def test_status_tells_a_fault_and_why_orders_have_no_effect() -> None:

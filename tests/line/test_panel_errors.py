@@ -52,13 +52,13 @@ DIALOGS = {
 }
 """By class, the module below `tui.screens`."""
 PLACES = {
-    "timer": ("", "tui.screens.lookout:StatusRefresher.look_around"),
+    "timer": ("", "tui.screens.status_refresher:StatusRefresher.look_around"),
     "action": ("m", "tui.screens.places:Places.action_messages"),
     "key handler": ("z", "tui.screens.base:PanelScreen.on_key"),
     "worker": ("qs", "tui.screens.leaving:Leaving._stop_and_leave"),
     "thread of the keys": ("x", "tui.terminal.reader:KeyReader.read"),
     "callback of the loop": ("", "tui.terminal.lean_app:LeanApp.picture_taken"),
-    "event": ("x", "tui.screens.hands:Hands.on_event"),
+    "event": ("x", "tui.screens.key_dispatcher:KeyDispatcher.on_event"),
     "renderer": ("", "tui.widgets.lines:Lines.render_lines"),
     "picture": ("", "tui.terminal.lean_app:LeanApp._display"),
 }
@@ -107,7 +107,7 @@ def failing(
     """A panel whose motor runs; errors, each with its place, come once `now` is in the folder."""
     wanted = [Plant(place, str(folder / "now"), error) for error, place in plants]
     if dialog:
-        look = "tui.screens.lookout:StatusRefresher.look_around"
+        look = "tui.screens.status_refresher:StatusRefresher.look_around"
         wanted.append(Plant(look, str(folder / "open"), dialog=dialog))
     # who renders a traceback first never comes to the stop
     wanted.append(Plant("rich.traceback:Traceback.__init__", str(folder / "now"), "hang"))
