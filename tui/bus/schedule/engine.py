@@ -228,7 +228,11 @@ class Engine:
             self._news.notify_all()
         if self._shared is not None:
             self._shared.tell_state()
-        self.facts.events.emit(StateChanged(state))
+        try:
+            self.facts.events.emit(StateChanged(state))
+        except Exception:
+            # an error there must not end the loop of the line: a stop may wait for it
+            log.exception("a change of the line was not passed on")
 
     def _work(self, loop: asyncio.AbstractEventLoop) -> None:
         """The thread: run the loop until closed, then leave nothing behind."""
