@@ -10,6 +10,8 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from importlib import metadata
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from .programs import PATIENCE
-from .sources import ROOT, modules, nodes_of
+from .sources import ROOT, modules, nodes_of, tree_of
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CI = ROOT / ".ci" / "run"
@@ -44,6 +46,63 @@ def test_imports_point_downward_only() -> None:
     done = run(sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()")
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout), done.stdout
+
+
+def imported(tree: ast.Module, package: str, names: frozenset[str]) -> Iterator[str]:
+    """Yield the modules of `names` that a module imports: at its top, in functions, for types."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: 1 - node.level or None] if node.level else []
+            module = ".".join((*above, *([node.module] if node.module else [])))
+            for alias in node.names:
+                inner = f"{module}.{alias.name}"
+                yield inner if inner in names else module
+
+
+def circle(sources: Mapping[str, ast.Module], packages: frozenset[str] = frozenset()) -> list[str]:
+    """Return modules that import each other in a circle, in its order; empty if there are none."""
+    names = frozenset(sources)
+    graph = {
+        name: {*imported(tree, name if name in packages else name.rpartition(".")[0], names)}
+        & names - {name}
+        for name, tree in sources.items()
+    }
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """An import inside a function, or for types only, is one as well."""
+    sources = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in modules()}
+    trees = {name.removesuffix(".__init__"): tree_of(path) for path, name in sources.items()}
+    packages = frozenset(
+        name.removesuffix(".__init__") for name in sources.values() if name.endswith(".__init__")
+    )
+    assert circle(trees, packages) == [], "move what both need into a module below them"
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from .b import x",
+        "from . import b",
+        "import p.b",
+        "from ..p.b import x",
+        "def f():\n    from .b import x",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from p.b import x",
+    ],
+)
+def test_import_circle_is_found(source: str) -> None:
+    sources = {"p": "", "p.a": source, "p.b": "def g():\n    from .a import y"}
+    trees = {name: ast.parse(text) for name, text in sources.items()}
+    assert set(circle(trees, frozenset({"p"}))) == {"p.a", "p.b"}
+    trees["p.b"] = ast.parse("x = 1")
+    assert circle(trees, frozenset({"p"})) == []
 
 
 def test_every_contract_of_the_design_is_in_the_configuration() -> None:

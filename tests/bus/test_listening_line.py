@@ -17,7 +17,7 @@ from tui.bus.link import SerialLink
 from tui.bus.listening_line import ListeningLine
 from tui.bus.program import Program
 from tui.bus.share.place import SharePlace
-from tui.bus.transport.port_seen import see_port
+from tui.bus.transport.ports import see_port
 from tui.bus.transport.serial_listening import open_listening
 
 ME = Program("1", "listen", os.getpid())

@@ -19,7 +19,7 @@ from tui.bus.rtu.master import RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.trace import Trace
 from tui.bus.transport.port_errors import PortErrors, port_errors
-from tui.bus.transport.port_seen import latency_of, see_port
+from tui.bus.transport.ports import latency_of, see_port
 
 from .conftest import BRISK
 from .peer import reply

@@ -8,8 +8,7 @@ import pytest
 
 from tests.adapters import Adapters, adapters
 from tui.bus.transport.port_names import lasting_name
-from tui.bus.transport.port_seen import PortSeen
-from tui.bus.transport.ports import port_error
+from tui.bus.transport.ports import PortSeen, port_error
 
 __all__ = ["adapters"]
 
@@ -100,6 +99,6 @@ def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> 
 def test_a_port_that_this_user_may_not_use_names_its_group(
     seen: PortSeen, output: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tui.bus.transport.port_seen.see_port", lambda _: seen)
+    monkeypatch.setattr("tui.bus.transport.ports.see_port", lambda _: seen)
     error = port_error(PORT_PATH, 19200, "8E1", PermissionError(errno.EACCES, "denied"))
     assert output in str(error)

@@ -47,7 +47,7 @@ from tui.bus.fake_device import FakeDevice
 from tui.bus.line import Line, Timing
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
-from tui.bus.transport.port_seen import PortSeen
+from tui.bus.transport.ports import PortSeen
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.session.connect.known_line import KnownLine

@@ -16,7 +16,7 @@ from tui.bus.fake import FakeLine
 from tui.bus.line_events import ControlDenied, ControlRequested, DevicesStopped
 from tui.bus.program import Program
 from tui.bus.share.messages import AnyMessage, Armed, Claim, DriveRequested, RequestGranted
-from tui.bus.share.publishers import LinePublisher
+from tui.bus.shared_state import LinePublisher
 from tui.drive.profile import library
 from tui.session.arming import CommandedElsewhere
 from tui.session.drive import DriveSession

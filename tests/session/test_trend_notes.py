@@ -11,8 +11,7 @@ from tui.bus.line_events import NoteReceived
 from tui.bus.notes import LineNote
 from tui.bus.program import Program
 from tui.bus.share.messages import LENGTH, AnyMessage, packed, unpacked
-from tui.bus.share.publishers import LinePublisher
-from tui.bus.shared_state import SharedState
+from tui.bus.shared_state import LinePublisher, SharedState
 from tui.drive.profile import library
 from tui.session.event_notes import EVENTS_OF_LINE, EventNotes, LeftEvent
 from tui.session.events import Event, EventLog

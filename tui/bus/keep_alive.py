@@ -11,16 +11,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from .bounds import MOST_DEVICES, MonotonicTime, RegisterAddress
 from .requests import Identify, Request, read_request
-
-if TYPE_CHECKING:
-    from .share.messages import AnyMessage
 
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.08, 1e6
 """Seconds of a timeout that is kept; a line could not keep a shorter one."""
@@ -52,7 +49,7 @@ class KeepAlive(msgspec.Struct, frozen=True, tag=True):
 class KeepAlives:
     """Those of one line: this program's, and in its holder those of all; for any thread."""
 
-    def __init__(self, me: str, tell: Callable[[AnyMessage], None]) -> None:
+    def __init__(self, me: str, tell: Callable[[KeepAlive], None]) -> None:
         self._me = me
         self._tell = tell
         self.kept: Mapping[tuple[str, int], KeepAlive] = MappingProxyType({})

@@ -5,15 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
 from .bounds import DeviceId
-
-if TYPE_CHECKING:
-    from .share.messages import AnyMessage
 
 NOTES_KEPT = 600.0
 """Seconds for which a note is kept."""
@@ -45,7 +42,7 @@ class Notes:
     """
 
     def __init__(
-        self, tell: Callable[[AnyMessage], None], clock: Callable[[], float] = time.monotonic
+        self, tell: Callable[[LineNote], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         """The callback passes a message to the other programs, if there are any."""
         self._tell = tell

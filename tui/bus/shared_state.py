@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
@@ -24,6 +26,7 @@ from .line_events import (
 )
 from .notes import Notes
 from .program import KEEPER, Program
+from .share.beside import send_plain_stop
 from .share.messages import (
     AnyMessage,
     Claim,
@@ -34,11 +37,28 @@ from .share.messages import (
     RequestGranted,
     StopGiven,
 )
-from .share.publishers import LinePublisher
 from .stop_counts import StopCounts
 
 DEPARTED_KEPT = 16
 """Number of departed programs that are remembered."""
+
+
+@dataclass(eq=False, slots=True)
+class LinePublisher:
+    """Connection to the other programs on a line; used in any thread."""
+
+    send: Callable[[AnyMessage], None]
+    """Has a message handed on to them."""
+    holder: str = ""
+    """The socket of another program that holds the line; empty if this one does."""
+
+    def stop_directly(self, devices: tuple[int, ...]) -> None:
+        """Have another holder of the line stop devices, without the loop of this program.
+
+        Raises OSError; waits for a moment at most.
+        """
+        if self.holder:
+            send_plain_stop(Path(self.holder), devices)
 
 
 class SharedState:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from ..link import label
 from ..model import LineState, LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
-from ..shared_state import commanded_by
+from ..shared_state import LinePublisher, SharedState, commanded_by
 from .carried import Polled, error_from
 from .heartbeat import Heartbeat
 from .messages import (
@@ -30,6 +30,8 @@ from .messages import (
     Alive,
     Answer,
     AnyMessage,
+    Armed,
+    Claim,
     DriveRequested,
     Facts,
     Failed,
@@ -38,6 +40,7 @@ from .messages import (
     News,
     NoMessage,
     Notified,
+    PollPause,
     PollWish,
     RequestDenied,
     RequestGranted,
@@ -50,7 +53,6 @@ from .messages import (
 from .owner_watch import WATCH_INTERVAL, OwnerWatch, is_stop
 from .place import Owner, short_path
 from .polls import PollsSubmitted
-from .publishers import LinePublisher, give_up_own, tell_own
 from .requested import PendingRequests
 
 log = logging.getLogger(__name__)
@@ -209,8 +211,8 @@ class ShareClient:
         """Report this program's drives to the owner, or give them up if it counts as exited."""
         facts = self._inside.facts
         if self._gone:
-            give_up_own(facts, STOOD_STILL)
-        tell_own(facts, self._tell)
+            _give_up_own(facts, STOOD_STILL)
+        _report_own(facts, self._tell)
         if self._gone:
             self._inside.dispatcher.void_older(self._inside.clock(), STOOD_STILL)
 
@@ -332,3 +334,32 @@ class ShareClient:
             self.writer.write(packed(message))
             if is_stop(message):
                 self.watching.note_stop()
+
+
+def _report_own(facts: SharedState, send: Callable[[AnyMessage], None]) -> None:
+    """Send the holder of a line what this program has armed, commands, keeps alive or pauses.
+
+    For drives that it had armed before, the care for them.
+    """
+    me = facts.me.id
+    for device, lease in facts.leases.of(me).items():
+        send(Armed(device, lease.stamp, lease.until, lease.care))
+    for alive in facts.keep_alives.of(me):
+        send(alive)
+    for device, holder in facts.commanders.items():
+        if holder == me:
+            send(Claim(device, True))
+    for device, (program, why) in facts.paused.items():
+        if program == me:
+            send(PollPause(device, why))
+
+
+def _give_up_own(facts: SharedState, why: str) -> None:
+    """Give up all drives: this program counted as exited."""
+    me = facts.me.id
+    for device in facts.leases.of(me):
+        facts.leases.disarm(device)
+    for device, holder in facts.commanders.items():
+        if holder == me:
+            facts.release(device)
+            facts.events.emit(ControlDenied(device, why))

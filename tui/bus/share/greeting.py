@@ -13,7 +13,7 @@ import socket
 from collections.abc import Awaitable, Callable, Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from ..bounds import MOST_PROGRAMS
 from ..line_events import StopDue
@@ -55,15 +55,26 @@ from .place import (
     short_path,
 )
 
-if TYPE_CHECKING:
-    from .sharing import Sharing
-
 log = logging.getLogger(__name__)
 
 HELLO_WITHIN = 2.0
 """Seconds that a program has for its greeting."""
 KEEPING_ENDS = 0.5
 """Seconds to wait for a write to the disk before the next owner writes its own."""
+
+
+class PortHolder(Protocol):
+    """The part of a line's owner that opens and closes the port as programs come and leave."""
+
+    def moved(self, *, arrived: bool) -> None:
+        """Note that a program has attached or left."""
+
+    async def port_left(self) -> None:
+        """Return once the port is closed, or in use by others."""
+
+    async def makes_way(self) -> bool:
+        """End if no program is served, and return True."""
+
 
 TakeIn = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -75,7 +86,7 @@ class Greeting:
         self,
         inside: LineInside,
         group: int | None,
-        holder: Sharing,
+        holder: PortHolder,
         stopped: Callable[[StopGiven], None],
     ) -> None:
         """`stopped` is called with a stop that replaces a greeting."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from ..limits import CAUTIOUS
 from ..line_events import DevicesStopped, NoteReceived, NoticeReceived, StopDue
@@ -15,10 +14,11 @@ from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
 from ..schedule.queue import Job
+from ..shared_state import LinePublisher
 from .attached import Client
 from .carried import Subscribe, Unsubscribe
 from .commanding import Commanding
-from .greeting import Greeting, Listening
+from .greeting import Greeting, Listening, PortHolder
 from .heartbeat import HeartbeatSender, programs_back
 from .messages import (
     Alive,
@@ -37,10 +37,6 @@ from .messages import (
 )
 from .place import OwnerLock, SharePlace, has_ended
 from .polls import PollsServed
-from .publishers import LinePublisher
-
-if TYPE_CHECKING:
-    from .sharing import Sharing
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +45,7 @@ class ShareServer:
     """Serves the programs that attach; lives in the line's loop, and is its facts' voice."""
 
     def __init__(
-        self, place: SharePlace, lock: OwnerLock, inside: LineInside, holder: Sharing
+        self, place: SharePlace, lock: OwnerLock, inside: LineInside, holder: PortHolder
     ) -> None:
         self._inside = inside
         self._holder = holder

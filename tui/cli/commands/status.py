@@ -231,7 +231,9 @@ async def _read_drive(opened: OpenLine, wish: LineWish, drive: Target, reported:
         status = await status_of_drive(session, opened)
     except Exception as error:
         failure = failure_of(error)
-        text = failure.message + silence_hint(error, opened, drive)
+        by_profile = drive.profile_id is not None
+        hint = silence_hint(error, opened, drive.line_text, by_profile=by_profile)
+        text = failure.message + hint
         reported.documents.append(failed(drive, text, failure.status, wish.name))
         reported.worst = max(reported.worst, failure.status)
         return

@@ -286,7 +286,10 @@ class _Finding:
                 raise
             failure = failure_of(error)
             self.worst = max(self.worst, failure.status)
-            text = failure.message + silence_hint(error, opened, wish.drives[0])
+            first = wish.drives[0]
+            by_profile = first.profile_id is not None
+            hint = silence_hint(error, opened, first.line_text, by_profile=by_profile)
+            text = failure.message + hint
             for drive in drives:
                 reported = failed(drive, text, failure.status, wish.name if self._several else "")
                 if self._as_json:

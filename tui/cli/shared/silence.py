@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.session.connect.open_line import OpenLine
 
-    from .options import Target
-
 
 STATE_COMES_WITHIN = 0.4
 """Seconds in which the keeper of a line has sent the state of a drive."""
@@ -54,12 +52,11 @@ def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool)
     )
 
 
-def silence_hint(error: Exception, opened: OpenLine, target: Target) -> str:
+def silence_hint(error: Exception, opened: OpenLine, text: str, *, by_profile: bool) -> str:
     """The same behind an error, with a space; empty for any other error than silence."""
     from tui.bus.errors import NoAnswer
 
     if not isinstance(error, NoAnswer):
         return ""
-    by_profile = target.profile_id is not None
-    hint = about_silence(opened, target.line_text, error.device, by_profile=by_profile)
+    hint = about_silence(opened, text, error.device, by_profile=by_profile)
     return f" {hint}" if hint else ""

@@ -20,10 +20,10 @@ from tui.widgets.palette import FAINT
 
 from ..command.command_keys import OrderKeys
 from ..command.control import hindrance
-from .registration import COMMAND_ACTIONS
+from ..keys.table import ACTIONS
 from .run_line import STEPS, Purpose, RunLine, limits, proposed, run_lines
 
-OTHER_STOP_KEYS = frozenset(item.keys for item in COMMAND_ACTIONS if item.id.startswith("stop_as("))
+OTHER_STOP_KEYS = frozenset(item.keys for item in ACTIONS if item.id.startswith("stop_as("))
 """Keys that stop in a way of their own, at once."""
 
 ENTER_TOO_EARLY = "Enter ignored: it came before the line could be read. Press it again."

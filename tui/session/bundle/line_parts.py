@@ -6,7 +6,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from datetime import datetime
 from functools import partial
 from importlib import metadata
@@ -16,8 +16,7 @@ from typing import Any
 import tui
 from tui.bus.link import Link, SerialLink, label
 from tui.bus.transport.port_names import lasting_name
-from tui.bus.transport.port_seen import see_port
-from tui.bus.transport.ports import list_ports
+from tui.bus.transport.ports import list_ports, see_port
 from tui.drive.profile import library
 from tui.drive.small_file import open_regular, read_small_text
 
@@ -113,7 +112,7 @@ def _port(link: SerialLink) -> dict[str, Any]:
     name = lasting_name(link.path)
     driver = os.path.realpath(SYSTEM_DRIVER.format(os.path.basename(os.path.realpath(link.path))))
     return {
-        **asdict(replace(see_port(link.path), user="")),
+        **see_port(link.path)._replace(user="")._asdict(),
         "lasting": name.path if name.lasting else None,
         "adapter": name.adapter or None,
         "driver": os.path.basename(driver) if os.path.isdir(driver) else None,

@@ -17,7 +17,7 @@ from tui.bus.errors import ExchangeError, LineError, LineLost, NoAnswer, Request
 from tui.bus.expectation import IDENTIFY
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
-from tui.bus.transport.port_seen import see_port
+from tui.bus.transport.ports import see_port
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -78,7 +78,7 @@ async def sight_of_drive(
     seen = replace(seen, profile=profile, changed=changed, neighbors=tuple(neighbors))
     if _attached(line) and seen.port is not None:
         # the program that owns the line has the port, as it should
-        seen = replace(seen, port=replace(seen.port, holder="", others=""))
+        seen = replace(seen, port=seen.port._replace(holder="", others=""))
     if line.state.status is not LineStatus.CONNECTED:
         return replace(seen, trouble=LineLost(line.state.reason or "The line is not open yet."))
     if profile is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tui.bus.errors import OWNER_SILENT, LineError, LineLost
 from tui.bus.link import Link, SerialLink
 from tui.bus.transport.port_errors import PortErrors
-from tui.bus.transport.port_seen import PortSeen
+from tui.bus.transport.ports import PortSeen
 from tui.drive.profile.profile import Profile
 
 from ..connect.identify import DriveIdentity
