@@ -66,7 +66,7 @@ def test_a_line_of_text_for_each_exchange_and_a_summary() -> None:
     text = run(0, "listen", TWO, "--for", "1")
     lines = text.splitlines()
     assert lines[0].startswith("Listening at /dev/pts/")
-    assert "Device 1: Altivar 71 (as it says itself)" in lines
+    assert "Device 1: Altivar 71 (reported by the drive)" in lines
     assert any(line[12:] == "   1 read   RFR 0.0 Hz" for line in lines)
     assert any(line[12:] == "   2 write  LFr ← 0.0 Hz" for line in lines)
     assert text.count("commanded by the master") == 2
@@ -144,8 +144,8 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        (("tcp:127.0.0.1",), "listening needs a serial port"),
-        (("rtu-tcp:127.0.0.1:5020",), "listening needs a serial port"),
+        (("tcp:127.0.0.1",), "is not a serial port"),
+        (("rtu-tcp:127.0.0.1:5020",), "is not a serial port"),
         ((TWO, "--raw"), "--pcap"),
         ((TWO, "-p", "300=atv71"), "ADDRESS=ID"),
         ((TWO, "-p", "nosuch"), "no profile"),
@@ -170,7 +170,7 @@ def test_ctrl_c_ends_with_a_whole_file_and_the_summary(tmp_path: Path) -> None:
             listening.process.send_signal(signal.SIGINT)
             out, err = listening.process.communicate(timeout=60)
     assert listening.process.returncode == 130
-    assert "Device 2: Altivar 71 (as -p says)" in out
+    assert "Device 2: Altivar 71 (set by -p)" in out
     assert "refused" in out
     found = packets(path)
     assert len(found) > 30

@@ -88,7 +88,7 @@ def test_mbpoll_as_the_master(peer: Peer, tmp_path: Path) -> None:
     assert "  2 read   ETA 16#0637" in out
     assert re.search(r"  2 write  ACC ← 61 raw", out)
     assert "  2 read   1: exception 2" in out
-    assert "Device 7: family not known" in out or "Device 7: Altivar 71 (as -p says)" in out
+    assert "Device 7: family unknown" in out or "Device 7: Altivar 71 (set by -p)" in out
     assert "no answer to " in out
     assert "packets written" in err
     done = subprocess.run(

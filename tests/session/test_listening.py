@@ -193,7 +193,7 @@ def test_a_read_longer_than_a_family_answers_is_of_another() -> None:
 def test_nothing_is_likely_where_nothing_fits() -> None:
     heard = Heard().say(read_frame(2, 60000, 1), reply_words(2, 7))
     assert heard.reported[-1].family is None
-    assert "Device 2: family not known; -p names it" in heard.lines
+    assert "Device 2: family unknown; name it with -p" in heard.lines
 
 
 def cycle(heard: Heard, times: int, *readings: bytes, every: float = 0.02) -> Heard:
@@ -224,12 +224,15 @@ def test_how_often_a_drive_is_requested() -> None:
     (drive,) = heard.summary.drives
     assert drive.pace == pytest.approx(10.0)
     assert drive.tally.longest_pause == pytest.approx(0.1)
-    assert "asked 10.0 times a second, longest pause 0.10 s" in heard.lines
+    assert "polled 10.0 times a second, longest pause 0.10 s" in heard.lines
 
 
 @pytest.mark.parametrize(
     ("pause", "reported"),
-    [(2.0, "TTO 3 s (as heard): fed, 0.9"), (4.0, "TTO 3 s (as heard): NOT POLLED")],
+    [
+        (2.0, "TTO 3 s (as read on the line): polled in time, 0.9"),
+        (4.0, "TTO 3 s (as read on the line): NOT POLLED"),
+    ],
 )
 def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
     heard = Heard(named("atv71", "atv71")).say(COMMAND, COMMAND)
@@ -244,13 +247,13 @@ def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
 
 def test_a_pause_that_goes_on_counts_too() -> None:
     heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
-    assert "factory setting; its own was not heard): fed" in heard.lines
+    assert "factory setting; no master has read it): polled in time" in heard.lines
     assert "NOT POLLED" in heard.rest(11.0).lines
 
 
 def test_a_time_out_that_begins_with_a_command_is_none_before() -> None:
     heard = Heard(named("atv71", "atv71")).say(READ, WORDS)
-    assert "begins with a first command, and none was heard" in heard.lines
+    assert "starts with the first command, and none was sent yet" in heard.lines
 
 
 def test_a_request_that_is_not_answered_feeds_nobody() -> None:
@@ -268,19 +271,19 @@ def test_open_request_is_reported_with_its_wait(waited: float, answers: list[str
 
 def test_two_drives_at_one_address_are_reported() -> None:
     heard = cycle(Heard(named("atv71", "atv71")), 3, READ, WORDS, WORDS)
-    assert "ANSWERED TWICE 3 times: do two devices have the address 2?" in heard.lines
+    assert "TWO ANSWERS to 3 requests: do two devices have the address 2?" in heard.lines
 
 
 def test_exceptions_and_silence_are_reported() -> None:
     heard = Heard(named("atv71", "atv71")).say(READ, WORDS, READ, REFUSED, READ, REFUSED)
     heard.say(read_frame(9, 3201, 1)).rest()
     assert "refused 2 times: exception 2, " in heard.lines
-    assert "Device 9: family not known; -p names it\n  no answer to 1 request" in heard.lines
+    assert "Device 9: family unknown; name it with -p\n  no answer to 1 request" in heard.lines
 
 
 def test_a_second_master_is_suspected_where_requests_cross() -> None:
     heard = cycle(Heard(), 3, READ + read_frame(3, 3201, 1), reply_words(3, 7))
-    assert "A SECOND MASTER? 3 requests began while another waited" in heard.lines
+    assert "A SECOND MASTER? 3 requests began while another request still waited" in heard.lines
     patient = cycle(Heard(), 3, READ, read_frame(3, 3201, 1), reply_words(3, 7), every=0.1)
     assert "SECOND MASTER" not in patient.lines
 
@@ -288,22 +291,22 @@ def test_a_second_master_is_suspected_where_requests_cross() -> None:
 def test_broken_frames_and_silences_are_reported() -> None:
     heard = Heard()
     heard.say(READ, WORDS[:4], WORDS[4:], every=0.02)
-    assert "Broken frames: 1 frame with a pause inside of up to 17.1 ms" in heard.lines
+    assert "Broken frames: 1 frame with an internal pause of up to 17.1 ms" in heard.lines
     hasty = Heard().say(READ)
     hasty.say(WORDS, every=len(WORDS) * CHARACTER + SILENCE / 4)
-    assert "Broken silences: 1 frame began too soon after another" in hasty.lines
+    assert "Broken gaps: 1 frame began too soon after another" in hasty.lines
     kept = Heard().say(READ, WORDS)
-    assert "Silences between frames are kept." in kept.lines
-    assert "Silences between frames" not in Heard().say(b"\x33\x44").lines
+    assert "The gaps between frames are long enough." in kept.lines
+    assert "The gaps between frames" not in Heard().say(b"\x33\x44").lines
 
 
 def test_silences_are_not_judged_where_readings_tell_none() -> None:
     heard = Heard(times=False).say(READ, WORDS[:4], WORDS[4:])
-    assert "Silences are not judged" in heard.lines
-    assert "Silences between frames" not in heard.lines
+    assert "Gaps between frames are not checked" in heard.lines
+    assert "The gaps between frames" not in heard.lines
     assert heard.summary.tally.cut == 0
     together = Heard().say(READ + WORDS, READ + WORDS)
-    assert "several frames at once: silences between them are not known" in together.lines
+    assert "several frames at once: the gaps between them are unknown" in together.lines
 
 
 def test_a_shorter_plan_for_the_master() -> None:
@@ -321,7 +324,7 @@ def test_a_shorter_plan_for_the_master() -> None:
         (3201, 4)
     ]
     assert drive.shorter.plan.seconds < drive.shorter.now_seconds
-    assert "its cycle reads ETA, RFR, LCR in 3 requests" in heard.lines
+    assert "the master reads ETA, RFR, LCR in 3 requests" in heard.lines
 
 
 def test_no_plan_is_reported_where_the_master_reads_well() -> None:
@@ -343,9 +346,11 @@ def test_reads_that_are_seldom_are_no_part_of_the_cycle() -> None:
 def test_nothing_and_noise_are_reported() -> None:
     assert "Nothing was received" in Heard().rest().lines
     noise = Heard().say(b"\xff\x00\xff").rest()
-    assert "3 bytes and no frame: are baud and format those of the line?" in noise.lines
+    assert (
+        "3 bytes received, but no whole frame. Check the baud rate and the format." in noise.lines
+    )
     both = Heard().say(READ, WORDS, b"\xff\x00\xff").rest()
-    assert "No frame: 3 bytes in 1 place" in both.lines
+    assert "Outside frames: 3 bytes in 1 place" in both.lines
 
 
 def test_a_scale_follows_what_was_heard_of_the_same_drive() -> None:

@@ -28,22 +28,30 @@ NEVER = replace(AS_SET, bracket=Bracket(6.0), seen="", fault="")
 @pytest.mark.parametrize(
     ("result", "short", "parts"),
     [
-        (AS_SET, "proved 2.0 s", ["Trips 2.0 s after", "freewheel", ", SLF1."]),
-        (LATE, "proved 5.2 s, NOT AS SET", ["Trips 5.2 s after", "NOT AS SET: 2 s are set."]),
+        (AS_SET, "tested: 2.0 s", ["Trips 2.0 s after", "freewheel", ", SLF1."]),
+        (
+            LATE,
+            "tested: 5.2 s, NOT AS SET",
+            ["Trips 5.2 s after", "NOT AS SET: the timeout is set to 2 s."],
+        ),
         (
             replace(AS_SET, fault="OHF, overheated"),
-            "proved 2.0 s, NOT AS SET",
+            "tested: 2.0 s, NOT AS SET",
             [", OHF. NOT AS SET:", f"be {SLF}."],
         ),
         (
             replace(AS_SET, reaction=None, fault="", expected_fault=""),
-            "proved 2.0 s",
+            "tested: 2.0 s",
             ["Trips 2.0 s after the last request."],
         ),
         (
             NEVER,
-            "PROVED: NO REACTION",
-            ["DID NOT REACT to 6.0 s", "set are 2 s, freewheel.", "is not stopped when"],
+            "tested: NO REACTION",
+            [
+                "DID NOT REACT to 6.0 s",
+                "is set to 2 s, freewheel.",
+                "does not stop a running motor",
+            ],
         ),
     ],
 )
@@ -73,5 +81,5 @@ def test_entry_of_the_journal(result: ProofResult, verdict: str) -> None:
     assert (entry.device, entry.profile, entry.code) == (7, "atv312", "ttO")
     assert entry.address == PROFILE["ttO"].address
     assert (entry.new, entry.answer) == (result.text, verdict)
-    assert (entry.why, entry.kind) == ("proof of communication loss", "proof")
+    assert (entry.why, entry.kind) == ("test of the communication timeout", "proof")
     assert (entry.old_raw, entry.new_raw, entry.read_back) == (None, 0, None)

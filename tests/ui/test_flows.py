@@ -331,7 +331,7 @@ async def test_how_often_the_drive_is_requested_is_reported() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
         screen.action_change_rate(1)
-        await until(pilot, lambda: "asked 5.0 times a second" in shown(app, "said"))
+        await until(pilot, lambda: "polled 5.0 times a second" in shown(app, "said"))
 
 
 async def test_on_a_slow_link_frames_come_a_few_at_a_time_and_are_all_there_held() -> None:

@@ -21,9 +21,9 @@ async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
         await made.pilot.press("P")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
-        await until(made.pilot, lambda: "Test: silent for" in shown(made.app, "said"))
-        await until(made.pilot, lambda: "· proved " in shown(made.app, "now"))
-        assert any(event.text.startswith("Proof: Trips ") for event in made.app.events.events)
+        await until(made.pilot, lambda: "Test: pause of" in shown(made.app, "said"))
+        await until(made.pilot, lambda: "· tested: " in shown(made.app, "now"))
+        assert any(event.text.startswith("Test: Trips ") for event in made.app.events.events)
         await until(made.pilot, lambda: "FAULT SLF" in shown(made.app, "strip"))
 
 

@@ -111,7 +111,7 @@ async def _proved(
     session = console.session
     prover = Prover(session, console.journal, session.work.permit(), turning)
     if not quiet:
-        prover.tell = lambda text: complain(f"Proof: {text}")
+        prover.report = lambda text: complain(f"Test: {text}")
     try:
         result = await prover.prove()
     except NothingToProve as error:

@@ -107,7 +107,7 @@ def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: boo
             result = await prover.prove()
             console.journal.add(proof_entry(session, result))
             console.proved = result.short
-            text = f"Proof: {result.text} {result.changed}".rstrip()
+            text = f"Test: {result.text} {result.changed}".rstrip()
             if turning:
                 # before the stop, which ends this work
                 fleet.events.add("done" if result.as_set else "failed", text, session.device)

@@ -12,7 +12,7 @@ MOST_ROWS = 6
 """Rows of one sentence at most."""
 OF_A_DRIVE, HANGING = 3, 5
 """Columns before a sentence about a drive, and before the rest of it."""
-WARNINGS = ("NOT POLLED", "ANSWERED TWICE", "A SECOND MASTER", "no answer", "damaged", "Broken")
+WARNINGS = ("NOT POLLED", "TWO ANSWERS", "A SECOND MASTER", "no answer", "damaged", "Broken")
 """Words of a sentence to be emphasized."""
 
 
@@ -32,15 +32,15 @@ def heard_lines(
 
 def _here(text: str) -> str:
     """In the words of the panel, which has a field instead of an option."""
-    text = text.replace("-p names it", "enter it as Profile on Line")
-    return text.replace("as -p says", "as typed")
+    text = text.replace("name it with -p", "enter it as Profile on Line")
+    return text.replace("set by -p", "entered on Line")
 
 
 def _sentence(text: str, width: int) -> list[Text]:
     """A sentence on as many rows as it takes; those about a drive follow its name."""
     about_drive = text.startswith(" ")
     first = OF_A_DRIVE if about_drive else 1
-    name = not about_drive and text.startswith(("Device", "All devices"))
+    name = not about_drive and text.startswith(("Device", "Broadcast"))
     style = STRONG if name else FAINT if about_drive else PLAIN
     if any(warning in text for warning in WARNINGS):
         style = ALARM

@@ -106,7 +106,7 @@ class HeardLine:
             self.trouble = str(error)
         except Exception as error:
             log.exception("listening to %s failed", self.text)
-            self.trouble = f"Listening has failed: {error}"
+            self.trouble = f"Listening failed: {error}"
 
     def _keep(self, frame: HeardFrame, request: bool | None) -> None:
         note = "noise" if request is None else ""

@@ -40,8 +40,8 @@ def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
     link = parse_link(text)
     if not isinstance(link, SerialLink):
         raise NothingToHear(
-            f"{text}: listening needs a serial port. Over a network other masters cannot be"
-            " monitored; the Frames screen shows the traffic on a line of this program."
+            f"{text} is not a serial port. Other masters cannot be monitored over a network. To see"
+            " the traffic of a line that is open in Drive Panel, use the Frames screen."
         )
     with ListeningLine(link, share_place(text), this_program(program)) as line:
         yield PlaceToListen(line)

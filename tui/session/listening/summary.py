@@ -17,9 +17,9 @@ from .tally import DriveTally, LineTally, WriteTally
 CODES_SHOWN = 6
 """Number of parameters of a list that are named; the others are counted."""
 HOW_SURE = {
-    "named": "as -p says",
-    "identified": "as it says itself",
-    "remembered": "as remembered",
+    "named": "set by -p",
+    "identified": "reported by the drive",
+    "remembered": "stored earlier",
     "likely": "likely",
 }
 
@@ -93,11 +93,11 @@ def summary_lines(summary: ListeningSummary) -> list[str]:
         f" {pace:.1f} a second{load}."
     )
     if not tally.bytes:
-        lines.append("Nothing was received. Is a master polling, and are A and B connected?")
+        lines.append("Nothing was received. Check that a master polls, and that A and B are wired.")
     elif not tally.frames:
         lines.append(
-            f"{_many(tally.noise_bytes, 'byte')} and no frame: are baud and format those of the"
-            " line?"
+            f"{_many(tally.noise_bytes, 'byte')} received, but no whole frame. Check the baud rate"
+            " and the format."
         )
     for drive in summary.drives:
         lines += _drive_lines(drive)
@@ -107,7 +107,7 @@ def summary_lines(summary: ListeningSummary) -> list[str]:
 def _drive_lines(drive: DriveSummary) -> Iterator[str]:
     tally, profile = drive.tally, drive.family.profile if drive.family is not None else None
     if not tally.device:
-        yield "All devices at once (broadcast)"
+        yield "Broadcast to all devices"
     else:
         yield f"Device {tally.device}: {family_text(drive.family)}"
     if drive.silent and tally.device:
@@ -126,16 +126,16 @@ def _drive_lines(drive: DriveSummary) -> Iterator[str]:
 def family_text(family: AssumedProfile | None) -> str:
     """Return a family, with its certainty."""
     if family is None:
-        return "family not known; -p names it"
+        return "family unknown; name it with -p"
     or_ = f", or {', '.join(family.others)}" if family.others else ""
     return f"{family.profile.name} ({HOW_SURE[family.how]}{or_})"
 
 
 def _drive_request_text(drive: DriveSummary) -> str:
     tally = drive.tally
-    text = "asked once"
+    text = "polled once"
     if drive.pace is not None:
-        text = f"asked {_pace_text(drive.pace)}, longest pause {tally.longest_pause:.2f} s"
+        text = f"polled {_pace_text(drive.pace)}, longest pause {tally.longest_pause:.2f} s"
     if tally.turnaround is not None:
         text += f"; answers in {tally.turnaround * 1000:.1f} ms"
         text += f" ({tally.turnaround_least * 1000:.1f} to {tally.turnaround_most * 1000:.1f})"
@@ -169,15 +169,15 @@ def _writes_text(writes: dict[str, WriteTally]) -> str:
 def feeding_text(feeding: Feeding) -> str:
     """Return a text on a drive's timeout: whether polling prevents it, and with what margin."""
     heard = feeding.known == "heard"
-    known = "as heard" if heard else "factory setting; its own was not heard"
+    known = "as read on the line" if heard else "factory setting; no master has read it"
     if feeding.seconds is None or feeding.margin is None:
-        follows = ": it does not react to a lost master" if heard else ""
+        follows = ": it does not react to a communication loss" if heard else ""
         return f"timeout {feeding.code} off ({known}){follows}"
     head = f"timeout {feeding.code} {feeding.seconds:g} s ({known})"
     if not feeding.begun:
-        return f"{head}: begins with a first command, and none was heard"
+        return f"{head}: starts with the first command, and none was sent yet"
     if feeding.fed:
-        return f"{head}: fed, {feeding.margin:.2f} s to spare"
+        return f"{head}: polled in time, {feeding.margin:.2f} s to spare"
     return f"{head}: NOT POLLED for {feeding.longest_pause:.2f} s"
 
 
@@ -194,8 +194,8 @@ def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str
         )
     if tally.answers["again"]:
         yield (
-            f"ANSWERED TWICE {_times(tally.answers['again'])}: do two devices have the address"
-            f" {tally.device}?"
+            f"TWO ANSWERS to {_many(tally.answers['again'], 'request')}: do two devices have the"
+            f" address {tally.device}?"
         )
 
 
@@ -204,7 +204,7 @@ def exception_meaning(code: int, profile: Profile | None) -> str:
     for exception in profile.data.exceptions if profile is not None else ():
         if exception.code == code:
             return exception.meaning
-    return STANDARD_EXCEPTIONS.get(code, "its meaning is not known")
+    return STANDARD_EXCEPTIONS.get(code, "meaning unknown")
 
 
 def shorter_text(shorter: ShorterPlan) -> str:
@@ -213,10 +213,10 @@ def shorter_text(shorter: ShorterPlan) -> str:
     reads = "; ".join(_request_text(request) for request in requests[:CODES_SHOWN])
     more = len(requests) - CODES_SHOWN
     return (
-        f"its cycle reads {_listed(shorter.codes[:CODES_SHOWN], len(shorter.codes))} in"
-        f" {_many(len(shorter.now), 'request')}, {shorter.now_seconds * 1000:.1f} ms;"
-        f" {len(requests)} would do in {shorter.plan.seconds * 1000:.1f} ms: {reads}"
-        f"{f' and {more} more' if more > 0 else ''}"
+        f"the master reads {_listed(shorter.codes[:CODES_SHOWN], len(shorter.codes))} in"
+        f" {_many(len(shorter.now), 'request')}, {shorter.now_seconds * 1000:.1f} ms."
+        f" {_many(len(requests), 'request')} would take {shorter.plan.seconds * 1000:.1f} ms:"
+        f" {reads}{f' and {more} more' if more > 0 else ''}"
     )
 
 
@@ -228,30 +228,30 @@ def _line_troubles(summary: ListeningSummary) -> Iterator[str]:
     tally = summary.tally
     if tally.noises and tally.frames:
         yield (
-            f"No frame: {_many(tally.noise_bytes, 'byte')} in {_many(tally.noises, 'place')}"
+            f"Outside frames: {_many(tally.noise_bytes, 'byte')} in {_many(tally.noises, 'place')}"
             " (noise, collisions, cut frames)."
         )
     if tally.crossed:
         yield (
-            f"A SECOND MASTER? {_many(tally.crossed, 'request')} began while another waited for"
-            " its answer."
+            f"A SECOND MASTER? {_many(tally.crossed, 'request')} began while another request still"
+            " waited for its answer."
         )
     if not tally.frames:
         return
     if not summary.reports_silences:
-        yield "Silences are not judged: this port has no baud rate of its own."
+        yield "Gaps between frames are not checked: this port has no baud rate of its own."
         return
     if tally.cut:
         yield (
-            f"Broken frames: {_many(tally.cut, 'frame')} with a pause inside of up to"
-            f" {tally.longest_cut * 1000:.1f} ms; strict drives do not take them."
+            f"Broken frames: {_many(tally.cut, 'frame')} with an internal pause of up to"
+            f" {tally.longest_cut * 1000:.1f} ms. Strict drives ignore such frames."
         )
     if tally.hasty:
-        yield f"Broken silences: {_many(tally.hasty, 'frame')} began too soon after another."
+        yield f"Broken gaps: {_many(tally.hasty, 'frame')} began too soon after another."
     if tally.together * 3 > tally.frames:
-        yield "The adapter hands over several frames at once: silences between them are not known."
+        yield "The adapter delivers several frames at once: the gaps between them are unknown."
     elif not tally.cut and not tally.hasty:
-        yield "Silences between frames are kept."
+        yield "The gaps between frames are long enough."
 
 
 def _listed(shown: Sequence[str], count: int) -> str:

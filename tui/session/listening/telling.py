@@ -43,7 +43,7 @@ def _what(reported: DecodedExchange, families: Families) -> str:
         case "again":
             return "a second answer to the same request: two devices at one address?"
         case "unasked":
-            return "an answer to no request that was heard"
+            return "an answer without a request"
     return f"{_drive_request_text(reported)}: {_trouble(reported)}".removeprefix(": ")
 
 

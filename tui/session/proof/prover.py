@@ -21,13 +21,13 @@ from ..journal import Journal
 from ..monitor.timeout import timeout_seconds, timeouts_of_ports
 from ..read.reader import Reader
 from ..reading import Reading
-from ..settings.write import Writer
+from ..settings.write import Writer, raw_text
 from ..work import Permit
 from .result import UNNAMED_FAULT, ProofResult
 from .silences import Bracket, silences
 
-LEFT_ALONE_FOR_PROOF = "Its communication timeout is being tested: polling is paused."
-LOOK_FOR_STOP = 0.05
+PAUSED_FOR_TEST = "Its communication timeout is being tested: polling is paused."
+STOP_CHECK_INTERVAL = 0.05
 """Seconds between two checks, during a pause, for a stop command."""
 RECONNECTED_BY_THEN = 10.0
 """Seconds for which a line may be lost after a pause before the test ends."""
@@ -46,7 +46,7 @@ def hidden_at_rest(reaction: Reaction | None) -> str:
     if reaction is None or reaction.trips:
         return ""
     return (
-        f"{reaction.name}: no fault follows, so that nothing shows at rest. Prove it with the motor"
+        f"{reaction.name}: no fault follows, so nothing shows at standstill. Test it with the motor"
         " turning."
     )
 
@@ -55,12 +55,12 @@ def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) ->
     """Return why there is nothing to test, from the timeout reported for each port."""
     ports = (rules.timeout, *rules.other_timeouts)
     silent = " and ".join(code for code in ports if code not in reported)
-    missing = f"{silent} cannot be read: perhaps this drive has no such word"
+    missing = f"{silent} cannot be read; perhaps this drive does not have it."
     if not reported:
-        return f"{missing}. Its reaction to communication loss is not known; nothing was proved."
+        return f"Not tested: {missing} The reaction to a communication loss is unknown."
     off = " and ".join(f"{code} is {reading.text}" for code, reading in reported.items())
-    goes_on = "the drive does not react to communication loss, and a running motor continues."
-    return f"{off}: {goes_on}" + (f" {missing}." if silent else "")
+    text = f"{off}. The drive does not react to a communication loss: a running motor continues."
+    return f"{text} {missing}" if silent else text
 
 
 @dataclass(slots=True)
@@ -71,7 +71,7 @@ class Prover:
     journal: Journal
     permit: Permit
     turning: bool = False
-    tell: Callable[[str], None] = lambda _: None
+    report: Callable[[str], None] = lambda _: None
     _reader: Reader = field(init=False)
 
     def __post_init__(self) -> None:
@@ -89,11 +89,11 @@ class Prover:
             raise NothingToProve(f"{session.profile.name} has no communication timeout.")
         watch = (rules.timeout, *rules.other_timeouts, rules.reaction)
         before = {code: session.image.get(code) for code in watch if code}
-        # before it is left alone: a port that it does not have meets silence, and what is asked
-        # then waits for the late reply that may yet come
+        # before polling is paused: a drive may not answer for a port that it lacks, and the next
+        # request must then wait until a late reply can no longer arrive
         readings = await self._settings(rules)
         await self._reader.read(self._state_codes())
-        facts.pause_polling(session.device, LEFT_ALONE_FOR_PROOF)
+        facts.pause_polling(session.device, PAUSED_FOR_TEST)
         try:
             timeout = self._timeout(rules, readings)
             readings |= await self._read(self._codes(rules))
@@ -153,17 +153,19 @@ class Prover:
         """Raise OrderRefused if nothing could be tested, or if the motor would do more than
         requested."""
         if state.kind == "fault":
-            raise OrderRefused("The drive is in a fault already: reset it first.")
+            raise OrderRefused("Not tested: the drive is already in fault. Reset it first.")
         if state.kind == "unknown":
-            raise OrderRefused("The state of the drive is not known; nothing is proved.")
+            raise OrderRefused("Not tested: the state of the drive is unknown.")
         turns = state.motion in ENABLED_KINDS
         if turns and not self.turning:
             raise OrderRefused(
-                "The motor is not at rest. Stop it first; --turning proves it on the run: the motor"
-                " may coast, and a hoist falls."
+                "Not tested: the motor is not at standstill. Stop it first. Or test it turning"
+                " (--turning): it may then coast, and a hoist load may fall."
             )
         if self.turning and not turns:
-            raise OrderRefused("The motor is at rest: run it first, or prove it without turning.")
+            raise OrderRefused(
+                "Not tested: the motor is at standstill. Run it first, or test it at standstill."
+            )
         if not self.turning and (why := hidden_at_rest(reaction)):
             raise OrderRefused(why)
 
@@ -180,7 +182,7 @@ class Prover:
         await writer.write_parameter(
             self.session.profile[chart.command],
             word,
-            why="begins the watch over the line, moves nothing",
+            why="starts communication monitoring, moves nothing",
             read_back=False,
             priority=Priority.STOP,
         )
@@ -192,14 +194,14 @@ class Prover:
         for code in now:
             if now[code].raw != began[code].raw:
                 raise OrderRefused(
-                    f"{code} is {now[code].text} {now[code].unit}".rstrip()
-                    + " now, and was another when the proof began: nothing is proved."
+                    f"The test does not count: {code} changed during it, and is now"
+                    f" {f'{now[code].text} {now[code].unit}'.rstrip()}. Test again."
                 )
 
     def _changed(self, before: dict[str, Reading | None], readings: dict[str, Reading]) -> str:
         changed = [
             f"{code} is {readings[code].text} {readings[code].unit}".rstrip()
-            + f", and was {held.text or held.raw} when it was read before."
+            + f"; it was {raw_text(self.session, held.parameter, held.raw)} when last read."
             for code, held in before.items()
             if held is not None
             and held.raw is not None
@@ -216,7 +218,7 @@ class Prover:
         readings = await self._read(self._state_codes())
         speed, ended = self._hertz(readings), clock.monotonic()
         for seconds in silences(timeout):
-            self.tell(f"silent for {seconds:.1f} s; set are {timeout:g} s.")
+            self.report(f"pause of {seconds:.1f} s; the timeout is {timeout:g} s.")
             await self._silence(ended + seconds)
             requested = clock.monotonic()
             readings = await self._read_after_silence()
@@ -247,22 +249,22 @@ class Prover:
                 if clock.monotonic() >= limit:
                     raise
             if not reported:
-                self.tell("the connection was closed in the silence. Waiting for it.")
+                self.report("the connection closed during the pause. Waiting until it is open.")
                 reported = True
-            await self._silence(clock.monotonic() + LOOK_FOR_STOP)
+            await self._silence(clock.monotonic() + STOP_CHECK_INTERVAL)
 
     def _check_rest(self, state: DriveState) -> None:
-        """Raise OrderRefused if a motor that was at standstill turns now: nobody agreed to that."""
+        """Raise OrderRefused if a motor that was at standstill turns: no person agreed to that."""
         if not self.turning and state.motion in ENABLED_KINDS:
             raise OrderRefused(
-                "The motor began to turn: the test has ended, and the drive is polled again."
+                "The motor started to turn. The test has ended, and the drive is polled again."
             )
 
     async def _silence(self, until: float) -> None:
         clock = self.session.clock
         while (left := until - clock.monotonic()) > 0:
             self.permit.check()
-            await clock.sleep(min(left, LOOK_FOR_STOP))
+            await clock.sleep(min(left, STOP_CHECK_INTERVAL))
         self.permit.check()
 
     def _hertz(self, readings: dict[str, Reading]) -> float | None:

@@ -15,5 +15,5 @@ def proof_entry(session: DriveSession, result: ProofResult) -> Entry:
     return Entry(
         now_text(), session.line_text, session.device, session.profile.id, code, address,
         None, "", 0, result.text, "as set" if result.as_set else "NOT AS SET", None,
-        "proof of communication loss", kind="proof",
+        "test of the communication timeout", kind="proof",
     )  # fmt: skip

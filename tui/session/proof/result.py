@@ -44,8 +44,8 @@ class ProofResult:
         """Short text of the result."""
         middle = self.bracket.measured
         if middle is None:
-            return "PROVED: NO REACTION"
-        return f"proved {middle:.1f} s" if self.as_set else f"proved {middle:.1f} s, NOT AS SET"
+            return "tested: NO REACTION"
+        return f"tested: {middle:.1f} s" if self.as_set else f"tested: {middle:.1f} s, NOT AS SET"
 
     @property
     def text(self) -> str:
@@ -53,9 +53,9 @@ class ProofResult:
         middle = self.bracket.measured
         if middle is None:
             return (
-                f"DID NOT REACT to {self.bracket.not_before:.1f} s of silence; set are"
-                f" {self.configured:g} s{self._reaction()}. A motor that runs is not stopped when"
-                " the line dies."
+                f"DID NOT REACT to {self.bracket.not_before:.1f} s without a request. It is set to"
+                f" {self.configured:g} s{self._reaction()}. A communication loss does not stop a"
+                " running motor."
             )
         does = f", set to: {self.reaction.name.lower()}" if self.reaction else ""
         what = f"{self.seen} {middle:.1f} s after the last request{does}"
@@ -68,5 +68,5 @@ class ProofResult:
 
     def _why_not(self) -> str:
         if not self.bracket.holds(self.configured):
-            return f"{self.configured:g} s are set."
+            return f"the timeout is set to {self.configured:g} s."
         return f"the fault should be {self.expected_fault or 'none'}."
