@@ -111,7 +111,7 @@ def described(end: End) -> End:
     return end
 
 
-async def test_a_read_brings_the_words_and_when_they_came(end: Open) -> None:
+async def test_read_returns_words_and_their_time(end: Open) -> None:
     made = end()
     reply = await made.line.read(THERE, 100, 3)
     assert reply.words == (100, 101, 102)
@@ -130,7 +130,7 @@ async def test_write_is_read_back(end: Open) -> None:
     assert [pdu[0] for pdu in made.sent()] == [3, 6, 16, 16, 23]
 
 
-async def test_an_exception_is_reported_with_its_code_and_meaning(end: Open) -> None:
+async def test_exception_has_its_code_and_meaning(end: Open) -> None:
     made = end()
     with pytest.raises(DeviceException, match="the device has no such address") as read:
         await made.line.read(THERE, 108, 4)
@@ -146,7 +146,7 @@ async def test_an_exception_is_reported_with_its_code_and_meaning(end: Open) -> 
 BRISK = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=0.3, retries=0)
 
 
-async def test_silence_is_reported_and_a_write_is_sent_once(end: Open) -> None:
+async def test_unanswered_write_is_reported_and_sent_once(end: Open) -> None:
     made = end(timing=BRISK)
     with pytest.raises(NoAnswer) as raised:
         await made.line.write(SILENT, 100, [5])
@@ -157,7 +157,7 @@ async def test_silence_is_reported_and_a_write_is_sent_once(end: Open) -> None:
     assert state.silent_since is not None
 
 
-async def test_a_read_only_line_sends_nothing_that_changes_a_device(end: Open) -> None:
+async def test_read_only_line_sends_no_request_that_changes_a_device(end: Open) -> None:
     made = end(read_only=True)
     assert made.line.read_only
     for write in (
@@ -172,7 +172,7 @@ async def test_a_read_only_line_sends_nothing_that_changes_a_device(end: Open) -
     assert (await made.line.read(THERE, 100)).words == (100,)
 
 
-async def test_a_device_is_sent_what_describe_allows(end: Open) -> None:
+async def test_describe_limits_the_requests_to_a_device(end: Open) -> None:
     made = end()
     made.line.describe(THERE, CAUTIOUS)
     with pytest.raises(RequestRefused, match="function 6"):
@@ -200,7 +200,7 @@ async def test_forbidden_request_is_not_sent_at_last_moment(end: Open) -> None:
     assert (await made.line.read(THERE, 100)).words == (5,)
 
 
-async def test_identification_diagnosis_and_broadcast(end: Open) -> None:
+async def test_identify_diagnose_and_broadcast_send_their_functions(end: Open) -> None:
     made = end()
     found = await made.line.identify(THERE)
     assert (found.conformity, found.objects) == (1, IDENTITY)
@@ -212,7 +212,7 @@ async def test_identification_diagnosis_and_broadcast(end: Open) -> None:
     assert [pdu[0] for pdu in made.sent()] == [43, 8, 6, 3]
 
 
-async def test_a_device_without_function_43_is_identified_by_17(end: Open) -> None:
+async def test_device_without_function_43_is_identified_by_17(end: Open) -> None:
     made = end()
     made.line.describe(THERE, CAUTIOUS)
     found = await made.line.identify(THERE, function=17)
@@ -251,7 +251,7 @@ async def test_probe_of_silent_device_waits_for_no_back_off() -> None:
             line.close()
 
 
-async def test_a_closed_line_says_so_and_ends_what_works_on_it(end: Open) -> None:
+async def test_closing_the_line_ends_pending_requests(end: Open) -> None:
     made = end()
     states: list[LineStatus] = []
     begun = asyncio.Event()
@@ -297,7 +297,7 @@ def line() -> FakeLine:
     return made
 
 
-async def test_reads_fail_so_often_and_only_where_they_hold_the_address(line: FakeLine) -> None:
+async def test_fake_read_fails_as_often_as_set_and_at_its_address_only(line: FakeLine) -> None:
     line.fail_read(THERE, 103, NoAnswer(THERE, 3, 103), times=2)
     line.fail_read(THERE, 105, 6)
     await line.read(THERE, 100, 3)
@@ -314,9 +314,7 @@ async def test_reads_fail_so_often_and_only_where_they_hold_the_address(line: Fa
 
 
 @pytest.mark.parametrize("taken", [False, True])
-async def test_a_write_whose_answer_is_lost_may_have_been_taken(
-    line: FakeLine, taken: bool
-) -> None:
+async def test_write_without_a_reply_has_an_unknown_outcome(line: FakeLine, taken: bool) -> None:
     line.fail_write(THERE, None, NoAnswer(THERE, 6, 100), times=1, taken=taken)
     with pytest.raises(NoAnswer):
         await line.write(THERE, 100, [5])
@@ -339,7 +337,7 @@ async def test_unsent_request_is_not_in_log(line: FakeLine) -> None:
     assert line.requests == [Read(THERE, 100, 1)]
 
 
-async def test_a_device_falls_silent_and_speaks_again(line: FakeLine) -> None:
+async def test_fake_device_counts_failures_until_it_answers_again(line: FakeLine) -> None:
     line.silence(THERE)
     for failures in (1, 2):
         with pytest.raises(NoAnswer):
@@ -351,7 +349,7 @@ async def test_a_device_falls_silent_and_speaks_again(line: FakeLine) -> None:
     assert (line.device_state(THERE).failures, line.requests) == (0, [Identify(THERE)] * 3)
 
 
-async def test_a_slow_answer_lets_others_go_on_and_the_words_are_those_of_the_request(
+async def test_slow_reply_does_not_block_and_returns_words_of_the_request(
     line: FakeLine,
 ) -> None:
     line.delay(THERE, 0.05)

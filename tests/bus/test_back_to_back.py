@@ -67,7 +67,7 @@ class Bench:
         return sum(program == "serve" for program, _ in self.sent)
 
 
-def test_client_that_asks_back_to_back_keeps_polls_to_their_share() -> None:
+def test_back_to_back_client_leaves_polls_only_their_share() -> None:
     for pause in (0.002, 0.012):
         bench = Bench(polls=True)
         bench.client(500, pause)
@@ -77,14 +77,14 @@ def test_client_that_asks_back_to_back_keeps_polls_to_their_share() -> None:
         assert bench.now / 500 < 1.3 * EXCHANGE + pause
 
 
-def test_polls_go_out_while_client_pauses() -> None:
+def test_polls_are_sent_while_client_pauses() -> None:
     bench = Bench(polls=True)
     bench.client(50, 0.1)
     assert len(bench.sent) - bench.served > 2 * bench.served
 
 
 @pytest.mark.parametrize("longest", [0.1, 0.4, 1.5])
-def test_read_after_random_pause_takes_less_than_1_3_times_its_time_beside_polls(
+def test_read_after_random_pause_takes_at_most_1_3_times_its_time(
     longest: float,
 ) -> None:
     bench, chance, times = Bench(polls=True), Random(1), []
@@ -98,7 +98,7 @@ def test_read_after_random_pause_takes_less_than_1_3_times_its_time_beside_polls
     assert polls * EXCHANGE > 2 * POLLS_SHARE * bench.now
 
 
-def test_polls_fill_the_line_again_after_client_has_left() -> None:
+def test_polls_use_the_whole_line_after_client_has_left() -> None:
     bench = Bench(polls=True)
     bench.client(10, 0.2)
     bench.wait(0.5)
@@ -107,7 +107,7 @@ def test_polls_fill_the_line_again_after_client_has_left() -> None:
     assert (len(bench.sent) - before) * EXCHANGE > 0.95 * (bench.now - begun)
 
 
-def test_a_few_reads_of_a_person_leave_the_line_to_polls() -> None:
+def test_few_reads_by_a_person_do_not_limit_polls() -> None:
     bench = Bench(polls=True)
     bench.client(2, 0.2)
     before, begun = len(bench.sent), bench.now
@@ -115,7 +115,7 @@ def test_a_few_reads_of_a_person_leave_the_line_to_polls() -> None:
     assert (len(bench.sent) - before) * EXCHANGE > 0.9 * (bench.now - begun)
 
 
-def test_poll_waits_for_a_moment_only_when_client_has_left() -> None:
+def test_poll_waits_only_briefly_after_client_has_left() -> None:
     bench = Bench()
     bench.come("panel", Priority.POLL)
     bench.work()
@@ -127,7 +127,7 @@ def test_poll_waits_for_a_moment_only_when_client_has_left() -> None:
     assert 0.0 < bench.sent[-1][1] - left < 0.01
 
 
-def test_commands_and_reads_of_others_are_not_held_back() -> None:
+def test_commands_and_reads_of_other_clients_do_not_wait() -> None:
     for priority in (Priority.FEED, Priority.OPERATOR_WRITE, Priority.OPERATOR_READ):
         bench = Bench()
         bench.client(5, 0.002)
@@ -135,7 +135,7 @@ def test_commands_and_reads_of_others_are_not_held_back() -> None:
         assert bench.work() is None
 
 
-def test_nothing_is_sent_between_what_is_read_for_a_stop_and_its_word() -> None:
+def test_no_request_is_sent_between_a_stop_and_the_read_before_it() -> None:
     bench = Bench()
     bench.come("serve", Priority.STOP)
     for priority in (Priority.OPERATOR_WRITE, Priority.OPERATOR_READ, Priority.POLL):

@@ -26,19 +26,19 @@ class StarvedLoop:
         return self.now
 
 
-def test_programs_have_their_time_on_a_computer_that_keeps_up() -> None:
+def test_owner_waits_the_normal_time_for_programs_to_return() -> None:
     assert StarvedLoop(0.0).waited() == pytest.approx(BACK_WITHIN, abs=BACK_LOOK)
 
 
-def test_time_in_which_nobody_was_served_does_not_count() -> None:
+def test_wait_for_programs_excludes_time_when_the_loop_hung() -> None:
     quota = 0.9 * BACK_LOOK
     assert StarvedLoop(quota).waited() == pytest.approx(1.9 * BACK_WITHIN, abs=2 * BACK_LOOK)
 
 
-def test_program_that_has_called_is_heard_first_up_to_the_bound() -> None:
+def test_wait_is_extended_for_a_program_that_has_connected() -> None:
     assert StarvedLoop(0.0).waited(greets=True) == pytest.approx(BACK_AT_LATEST, abs=BACK_LOOK)
 
 
-def test_wait_is_bounded_however_slow_the_computer_is() -> None:
+def test_wait_for_programs_is_bounded_on_a_slow_computer() -> None:
     stall = 1.0
     assert StarvedLoop(stall).waited() <= BACK_AT_LATEST + BACK_LOOK + stall

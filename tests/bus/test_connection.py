@@ -26,7 +26,7 @@ from .plain import outcome, plain_serial
 QUICK = Timing(first_timeout=20.0, min_timeout=20.0, reconnect_first=0.1, reconnect_longest=0.3)
 
 
-async def test_plain_client_gives_up_a_port_that_is_not_there_yet(tmp_path: Path) -> None:
+async def test_plain_client_gives_up_on_a_missing_port(tmp_path: Path) -> None:
     port = tmp_path / "port"
     client = AsyncModbusSerialClient(str(port), reconnect_delay=0.1)
     assert not await client.connect()
@@ -55,7 +55,7 @@ async def test_request_made_while_connecting_is_sent(open_line: OpenLine) -> Non
         assert (await line.read(1, 5)).words == (5,)
 
 
-async def test_plain_client_waits_out_its_time_after_an_unplug() -> None:
+async def test_plain_client_waits_for_its_timeout_after_an_unplug() -> None:
     with PtyPeer(silent) as peer:
         async with plain_serial(peer.path, timeout=1.0) as client:
             reading = asyncio.create_task(
@@ -68,7 +68,7 @@ async def test_plain_client_waits_out_its_time_after_an_unplug() -> None:
             assert time.monotonic() - begun > 0.5
 
 
-async def test_unplug_fails_everything_at_once_and_replug_mends_it(
+async def test_unplug_fails_all_requests_and_replug_reconnects(
     tmp_path: Path, open_line: OpenLine
 ) -> None:
     port = tmp_path / "port"
@@ -97,7 +97,7 @@ async def test_unplug_fails_everything_at_once_and_replug_mends_it(
 
 
 @pytest.mark.parametrize("kind", [TcpLink, RtuTcpLink])
-async def test_server_that_hangs_up_is_called_again(
+async def test_line_reconnects_to_a_server_that_hangs_up(
     kind: type[TcpLink] | type[RtuTcpLink], open_line: OpenLine
 ) -> None:
     from .peer import request_length, tcp_reply, tcp_request_length
@@ -116,7 +116,7 @@ async def test_server_that_hangs_up_is_called_again(
         assert (await line.read(1, 5, 2)).words == (5, 6)
 
 
-def test_open_with_wait_raises_what_is_wrong(tmp_path: Path) -> None:
+def test_open_with_wait_raises_the_error(tmp_path: Path) -> None:
     line = Line(SerialLink(str(tmp_path / "none")))
     with pytest.raises(PortMissing, match="does not exist"):
         line.open(wait=5.0)
@@ -155,7 +155,7 @@ def test_busy_port_names_its_holder() -> None:
         serial.Serial(peer.path, exclusive=True).close()
 
 
-async def test_pseudo_terminal_is_opened_without_parity_and_says_so(open_line: OpenLine) -> None:
+async def test_pseudo_terminal_without_parity_is_reported(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = open_line(SerialLink(peer.path, 19200, "8E1"))
         assert line.state.reason == "A pseudo-terminal has no parity: opened with N."
@@ -173,7 +173,7 @@ def open_line_of(peer: PtyPeer) -> Line:
     return line
 
 
-async def test_close_fails_what_waits_and_is_final(open_line: OpenLine) -> None:
+async def test_close_fails_pending_requests_and_is_final(open_line: OpenLine) -> None:
     with PtyPeer(silent) as peer:
         line = open_line(peer.path)
         requests = [asyncio.create_task(line.read(1, n)) for n in range(3)]
@@ -191,7 +191,7 @@ async def test_close_fails_what_waits_and_is_final(open_line: OpenLine) -> None:
         assert line.state.status is LineStatus.CLOSED
 
 
-def test_close_before_open() -> None:
+def test_close_before_open_is_allowed() -> None:
     Line(SerialLink("/dev/null")).close()
 
 

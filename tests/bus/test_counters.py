@@ -64,7 +64,7 @@ async def test_modbus_tcp_is_counted_too(open_line: OpenLine) -> None:
         assert (found.requests, found.replies, found.bytes_out, found.bytes_in) == (1, 1, 12, 11)
 
 
-async def test_a_program_that_is_attached_has_the_owners_counts(share: Share) -> None:
+async def test_attached_program_has_the_counts_of_the_owner(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
@@ -88,7 +88,7 @@ async def test_a_program_that_is_attached_has_the_owners_counts(share: Share) ->
         (9.0, len(TURNAROUND_EDGES)),
     ],
 )
-def test_a_turnaround_falls_into_one_bar(seconds: float, bar: int) -> None:
+def test_turnaround_is_counted_in_one_bar(seconds: float, bar: int) -> None:
     tally = DeviceTally()
     tally.count_reply(seconds)
     assert [at for at, count in enumerate(tally.frozen(0.0).turnarounds) if count] == [bar]

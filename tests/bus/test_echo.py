@@ -16,20 +16,20 @@ from .plain import outcome, plain_serial
 SHORT = Timing(first_timeout=0.3, min_timeout=0.3, late_reply=0.5, retries=0)
 
 
-async def test_plain_client_writes_to_nobody_through_an_echo() -> None:
+async def test_plain_client_takes_an_echo_for_the_reply_to_a_write() -> None:
     with PtyPeer(silent, echo=True) as peer:
         async with plain_serial(peer.path) as client:
             assert await outcome(client.write_register(5, 7, device_id=1)) == [7]
 
 
-async def test_plain_client_set_for_echo_fails_without() -> None:
+async def test_plain_client_set_for_echo_fails_without_one() -> None:
     with PtyPeer(honest) as peer:
         async with plain_serial(peer.path, echo=True) as client:
             assert await outcome(client.write_register(5, 7, device_id=1)) is None
 
 
 @pytest.mark.parametrize("after", ["nothing", "a read", "a broadcast"])
-async def test_echo_alone_is_no_answer(after: str, open_line: OpenLine) -> None:
+async def test_echo_alone_is_not_a_reply(after: str, open_line: OpenLine) -> None:
     with PtyPeer(silent, echo=True) as peer:
         line = open_line(peer.path, SHORT)
         if after == "a read":
@@ -72,7 +72,7 @@ async def test_line_works_with_and_without_echo(
         assert line.counters.replies == answered
 
 
-async def test_echo_is_no_reply_to_a_read(open_line: OpenLine) -> None:
+async def test_echo_is_not_a_reply_to_a_read(open_line: OpenLine) -> None:
     with PtyPeer(silent, echo=True) as peer:
         line = open_line(peer.path, BRISK)
         with pytest.raises(NoAnswer):

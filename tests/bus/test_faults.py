@@ -60,7 +60,7 @@ async def test_late_reply_never_reaches_another_request(open_line: OpenLine) -> 
         assert line.counters.stale == 1
 
 
-async def test_request_of_another_shape_need_not_wait_for_a_late_reply(
+async def test_request_with_another_reply_length_does_not_wait_for_a_late_reply(
     open_line: OpenLine,
 ) -> None:
     timing = Timing(first_timeout=0.1, min_timeout=0.1, late_reply=60.0, retries=0)
@@ -98,7 +98,7 @@ async def test_cancelled_await_does_not_cancel_the_exchange(open_line: OpenLine)
         assert line.counters.replies == 2
 
 
-async def test_cancelled_request_that_still_waits_is_not_sent(open_line: OpenLine) -> None:
+async def test_cancelled_request_in_the_queue_is_not_sent(open_line: OpenLine) -> None:
     with PtyPeer(first_late) as peer:
         line = open_line(peer.path)
         flying = asyncio.create_task(line.read(1, 10))
@@ -129,7 +129,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-async def test_plain_client_takes_a_wrong_reply(case: str) -> None:
+async def test_plain_client_accepts_a_wrong_reply(case: str) -> None:
     function, pdu = WRONG[case]
     with PtyPeer(instead(pdu)) as peer:
         async with plain_serial(peer.path) as client:
@@ -145,7 +145,7 @@ async def test_plain_client_takes_a_wrong_reply(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", WRONG)
-async def test_wrong_reply_is_thrown_away(case: str, open_line: OpenLine) -> None:
+async def test_wrong_reply_is_discarded(case: str, open_line: OpenLine) -> None:
     function, pdu = WRONG[case]
     with PtyPeer(instead(pdu)) as peer:
         line = open_line(peer.path, BRISK)
@@ -161,7 +161,7 @@ async def test_wrong_reply_is_thrown_away(case: str, open_line: OpenLine) -> Non
         assert line.counters.wrong == 1
 
 
-async def test_wrong_reply_before_the_right_one_is_passed_over(open_line: OpenLine) -> None:
+async def test_wrong_reply_before_the_right_one_is_skipped(open_line: OpenLine) -> None:
     wrong = frame(1, bytes([3, 4, 0, 9, 0, 9]))
     with PtyPeer(lambda request, _: [wrong, 0.05, reply(request)]) as peer:
         line = open_line(peer.path)
@@ -176,7 +176,7 @@ DIRT: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("case", DIRT)
-async def test_plain_client_loses_a_reply_behind_dirt(case: str) -> None:
+async def test_plain_client_loses_a_reply_after_noise(case: str) -> None:
     with PtyPeer(lambda request, _: [DIRT[case](request)]) as peer:
         async with plain_serial(peer.path) as client:
             got = await outcome(client.read_holding_registers(5, count=1, device_id=1))
@@ -184,7 +184,7 @@ async def test_plain_client_loses_a_reply_behind_dirt(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", DIRT)
-async def test_reply_is_found_behind_dirt(case: str, open_line: OpenLine) -> None:
+async def test_reply_is_found_after_noise(case: str, open_line: OpenLine) -> None:
     with PtyPeer(lambda request, _: [DIRT[case](request)]) as peer:
         line = open_line(peer.path)
         assert (await line.read(1, 5)).words == (5,)
@@ -198,7 +198,7 @@ async def test_noise_long_before_the_reply_does_not_end_the_wait(open_line: Open
         assert (await line.read(1, 5)).words == (5,)
 
 
-async def test_a_copy_of_the_reply_before_is_not_taken_for_a_lost_one(
+async def test_copy_of_the_previous_reply_does_not_replace_a_lost_one(
     open_line: OpenLine,
 ) -> None:
     """The first time that the line repeats a reply, and just then the right one is lost."""
@@ -219,14 +219,14 @@ async def test_a_copy_of_the_reply_before_is_not_taken_for_a_lost_one(
         assert [request[3] for request in peer.requests][-2:] == [40, 40]
 
 
-async def test_duplicated_replies_shift_nothing(open_line: OpenLine) -> None:
+async def test_duplicated_replies_do_not_shift_later_replies(open_line: OpenLine) -> None:
     with PtyPeer(lambda request, _: [reply(request) * 2]) as peer:
         line = open_line(peer.path)
         got = [(await line.read(1, address)).words[0] for address in range(20)]
     assert got == list(range(20))
 
 
-async def test_unasked_frames_between_requests_shift_nothing(open_line: OpenLine) -> None:
+async def test_unsolicited_frames_do_not_shift_later_replies(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = open_line(peer.path)
         assert (await line.read(1, 5)).words == (5,)
@@ -256,7 +256,7 @@ BROKEN: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-async def test_plain_client_waits_out_its_time_for_a_damaged_reply(case: str) -> None:
+async def test_plain_client_waits_for_its_timeout_on_a_damaged_reply(case: str) -> None:
     with PtyPeer(lambda request, _: [BROKEN[case](request)]) as peer:
         async with plain_serial(peer.path, timeout=0.4) as client:
             begun = time.monotonic()
@@ -266,9 +266,7 @@ async def test_plain_client_waits_out_its_time_for_a_damaged_reply(case: str) ->
 
 
 @pytest.mark.parametrize("case", BROKEN)
-async def test_damaged_reply_is_known_as_soon_as_the_line_is_silent(
-    case: str, open_line: OpenLine
-) -> None:
+async def test_damaged_reply_is_known_at_the_end_of_the_gap(case: str, open_line: OpenLine) -> None:
     timing = Timing(first_timeout=30.0, min_timeout=30.0, retries=0)
     with PtyPeer(lambda request, _: [BROKEN[case](request)]) as peer:
         line = open_line(peer.path, timing)
@@ -279,7 +277,7 @@ async def test_damaged_reply_is_known_as_soon_as_the_line_is_silent(
         assert line.counters.timeouts == 0
 
 
-async def test_the_silence_that_ends_a_reply_counts_from_its_last_piece(
+async def test_gap_that_ends_a_reply_counts_from_its_last_bytes(
     open_line: OpenLine,
 ) -> None:
     def in_pieces(request: bytes, _: int) -> Sequence[Step]:
@@ -293,7 +291,7 @@ async def test_the_silence_that_ends_a_reply_counts_from_its_last_piece(
         assert line.counters.requests == 1
 
 
-async def test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_wire(
+async def test_reply_with_a_pause_is_awaited_for_its_time_on_the_wire(
     open_line: OpenLine,
 ) -> None:
     """A busy computer hands a reply over in parts; the drive was asked again while it talked."""
@@ -311,7 +309,7 @@ async def test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_
 
 
 @pytest.mark.parametrize("priority", [Priority.BACKGROUND, Priority.PATIENT])
-async def test_an_empty_address_that_was_searched_is_no_failure(
+async def test_scanned_empty_address_is_not_counted_as_a_failure(
     priority: Priority, open_line: OpenLine
 ) -> None:
     def only_three(request: bytes, _: int) -> Sequence[Step]:
@@ -342,7 +340,7 @@ async def test_read_is_repeated_after_a_damaged_reply(open_line: OpenLine) -> No
         assert len(peer.requests) == 2
 
 
-async def test_operator_read_is_repeated_after_silence(open_line: OpenLine) -> None:
+async def test_operator_read_is_repeated_if_unanswered(open_line: OpenLine) -> None:
     def second_lost(request: bytes, count: int) -> Sequence[Step]:
         return [] if count == 1 else [reply(request)]
 
@@ -391,7 +389,7 @@ async def test_repeated_poll_lets_polls_of_other_drives_pass(open_line: OpenLine
         assert [request[0] for request in peer.requests] == [2, 2, 1, 3, 2, 2]
 
 
-async def test_late_reply_to_the_first_try_is_no_newer_than_that(open_line: OpenLine) -> None:
+async def test_late_reply_has_the_time_of_its_own_try(open_line: OpenLine) -> None:
     def late(request: bytes, count: int) -> Sequence[Step]:
         return [LATE, reply(request)] if count == 1 else [] if count == 2 else [reply(request)]
 
@@ -426,7 +424,7 @@ async def test_write_is_sent_once(broken: str, values: list[int], open_line: Ope
             assert "Read the register before retrying" in str(caught.value)
 
 
-async def test_plain_client_keeps_no_silence() -> None:
+async def test_plain_client_keeps_no_gap_between_frames() -> None:
     with PtyPeer(honest) as peer:
         async with plain_serial(peer.path, baud=2400) as client:
             for _ in range(10):
@@ -434,7 +432,7 @@ async def test_plain_client_keeps_no_silence() -> None:
         assert min(_pauses(peer)) < 0.016
 
 
-async def test_silence_is_kept(open_line: OpenLine) -> None:
+async def test_gap_between_frames_is_kept(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         link = SerialLink(peer.path, 2400)
         line = open_line(link)
@@ -450,7 +448,7 @@ def _pauses(peer: PtyPeer) -> list[float]:
 
 
 @pytest.mark.parametrize(("wire_time", "taken"), [(True, 5), (None, 77)])
-async def test_a_reply_that_began_before_its_request_was_over_is_anothers(
+async def test_reply_that_began_before_the_end_of_its_request_is_rejected(
     open_line: OpenLine, wire_time: bool | None, taken: int
 ) -> None:
     """Where bytes take their time; a pseudo-terminal without a line's times may be that quick."""
@@ -497,7 +495,7 @@ async def test_exception_is_raised_with_its_meaning(open_line: OpenLine) -> None
         assert line.device_state(1).answers
 
 
-async def test_every_function_is_answered(open_line: OpenLine) -> None:
+async def test_reply_to_every_function_is_accepted(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = open_line(peer.path)
         assert (await line.read(1, 5, 3)).words == (5, 6, 7)
@@ -519,7 +517,7 @@ async def test_diagnostic_echo_is_checked(open_line: OpenLine) -> None:
 
 
 @pytest.mark.parametrize("pdu", [bytes([0xAB, 1]), bytes([0xAB, 14, 1])])
-async def test_both_refusals_of_identification(pdu: bytes, open_line: OpenLine) -> None:
+async def test_both_forms_of_refused_identification_raise(pdu: bytes, open_line: OpenLine) -> None:
     with PtyPeer(instead(pdu)) as peer:
         line = open_line(peer.path)
         with pytest.raises(DeviceException) as caught:
@@ -527,7 +525,7 @@ async def test_both_refusals_of_identification(pdu: bytes, open_line: OpenLine) 
         assert caught.value.code == 1
 
 
-async def test_identification_follows_on(open_line: OpenLine) -> None:
+async def test_identification_continues_at_the_next_object(open_line: OpenLine) -> None:
     parts = [
         bytes([43, 14, 1, 2, 0xFF, 1, 1, 0, 3]) + b"one",
         bytes([43, 14, 1, 2, 0, 0, 2, 1, 3]) + b"two" + bytes([6, 2]) + b"xy",
@@ -548,7 +546,7 @@ TWICE_IN_TWO = [
 
 
 @pytest.mark.parametrize("parts", [TWICE_IN_ONE, TWICE_IN_TWO])
-async def test_object_with_two_contents_is_named_and_refused(
+async def test_object_with_two_different_values_is_refused(
     parts: list[bytes], open_line: OpenLine
 ) -> None:
     with PtyPeer(lambda _, count: [frame(1, parts[count])]) as peer:
@@ -557,7 +555,7 @@ async def test_object_with_two_contents_is_named_and_refused(
             await line.identify(1)
 
 
-async def test_object_that_comes_twice_alike_is_one(open_line: OpenLine) -> None:
+async def test_object_repeated_with_the_same_value_is_accepted(open_line: OpenLine) -> None:
     with PtyPeer(lambda _, count: [frame(1, TWICE_IN_ONE[0].replace(b"two", b"one"))]) as peer:
         assert (await open_line(peer.path).identify(1)).objects == {1: b"one"}
 

@@ -28,7 +28,7 @@ from tui.bus.gateway.server import HEADER, Awake, TcpGateway, TcpRequest
 from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 
 
-def test_requests_of_each_function() -> None:
+def test_requests_of_each_function_are_parsed() -> None:
     assert parse_request(bytes.fromhex("03 0C81 0002")) == ReadRequested(3, 3201, 2)
     assert parse_request(bytes.fromhex("04 0000 007D")) == ReadRequested(4, 0, 125)
     assert parse_request(bytes.fromhex("06 2135 0007")) == WriteRequested(6, 8501, (7,))
@@ -68,19 +68,19 @@ def test_malformed_request_is_refused(pdu: str, code: int) -> None:
 
 
 @given(st.binary(min_size=1, max_size=253))
-def test_no_bytes_break_it(pdu: bytes) -> None:
+def test_parsing_random_bytes_raises_unanswerable_only(pdu: bytes) -> None:
     with suppress(Unanswerable):
         parse_request(pdu)
 
 
-def test_answers_as_bytes() -> None:
+def test_replies_are_encoded_as_bytes() -> None:
     assert words_pdu(3, [0x0237, 0]) == bytes.fromhex("03 04 0237 0000")
     assert written_pdu(WriteRequested(6, 8501, (7,))) == bytes.fromhex("06 2135 0007")
     assert written_pdu(WriteRequested(16, 8501, (7, 8))) == bytes.fromhex("10 2135 0002")
     assert exception_pdu(16, 11) == bytes.fromhex("90 0B")
 
 
-def test_an_identification_that_is_too_long_goes_on_at_its_next_object() -> None:
+def test_long_identification_continues_at_the_next_object() -> None:
     objects = {0: b"T" * 100, 1: b"A" * 100, 2: b"V" * 100}
     first = identified_pdu(IdentifyRequested(1, 0), 0x81, objects)
     assert first[:7] == bytes.fromhex("2B 0E 01 81 FF 02 02")
@@ -103,7 +103,7 @@ async def _answer(reader: asyncio.StreamReader) -> tuple[int, int, bytes]:
     return transaction, unit, await reader.readexactly(length - 1)
 
 
-async def test_requests_that_pile_up_get_the_answers_of_their_own_transactions() -> None:
+async def test_queued_requests_get_replies_with_their_own_transaction_ids() -> None:
     """The first answer is awaited for long; the second request comes in meanwhile."""
     free = asyncio.Event()
 
@@ -125,7 +125,7 @@ async def test_requests_that_pile_up_get_the_answers_of_their_own_transactions()
     await gateway.close()
 
 
-async def test_a_write_waits_for_no_read_before_it() -> None:
+async def test_write_does_not_wait_for_earlier_reads() -> None:
     """It may be a stop, and the drive before it may be silent."""
     free = asyncio.Event()
 
@@ -147,7 +147,7 @@ async def test_a_write_waits_for_no_read_before_it() -> None:
     await gateway.close()
 
 
-async def test_a_write_that_does_not_wait_for_its_turn_goes_past_those_before_it() -> None:
+async def test_urgent_write_overtakes_earlier_writes() -> None:
     """A stop does, whatever the drive before it takes to be silent."""
     free = asyncio.Event()
 
@@ -170,7 +170,7 @@ async def test_a_write_that_does_not_wait_for_its_turn_goes_past_those_before_it
     await gateway.close()
 
 
-async def test_reads_that_pile_up_keep_no_write_in_the_socket() -> None:
+async def test_queued_reads_do_not_delay_a_write_in_the_socket() -> None:
     """Further ones are told to come again: a stop may be behind them."""
     free = asyncio.Event()
 
@@ -239,7 +239,7 @@ async def test_requests_delayed_by_a_suspended_loop_are_recognized() -> None:
     await gateway.close()
 
 
-async def test_one_client_that_waits_holds_up_no_other() -> None:
+async def test_waiting_client_does_not_block_other_clients() -> None:
     gone: list[str] = []
 
     async def answer(request: TcpRequest) -> bytes:
@@ -299,7 +299,7 @@ async def test_idle_client_makes_room_for_another(
         writer.close()
 
 
-async def test_no_number_of_connections_from_elsewhere_keeps_a_client_out(
+async def test_connections_of_other_hosts_do_not_keep_a_client_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(server, "MOST_CLIENTS", 4)
@@ -331,7 +331,7 @@ async def test_no_number_of_connections_from_elsewhere_keeps_a_client_out(
     await gateway.close()
 
 
-async def test_connections_that_all_wait_for_writes_keep_no_client_out(
+async def test_connections_waiting_for_writes_do_not_keep_a_client_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """64 connections of one host did, and the next one came to stop a motor."""
@@ -367,7 +367,7 @@ async def test_connections_that_all_wait_for_writes_keep_no_client_out(
     await gateway.close()
 
 
-async def test_answers_for_who_has_gone_are_dropped_without_a_word(
+async def test_replies_to_a_disconnected_client_are_dropped_silently(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """A client that was killed left as many complaints as requests in the log of a service."""
@@ -397,7 +397,7 @@ async def test_answers_for_who_has_gone_are_dropped_without_a_word(
     assert not [record for record in caplog.records if record.name == "asyncio"]
 
 
-def test_the_address_with_the_most_connections_makes_room() -> None:
+def test_host_with_most_connections_loses_one() -> None:
     here = {
         1: ServedConnection("a", 1.0),
         2: ServedConnection("a", 2.0),

@@ -28,7 +28,7 @@ def holder_socket(lines: SharedLines) -> str:
     return owner.socket
 
 
-async def test_program_whose_loop_is_busy_for_a_moment_stays(share: Share) -> None:
+async def test_program_with_a_briefly_busy_loop_stays_attached(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         holder, program = lines.open("keeper"), lines.open("run")
@@ -52,7 +52,7 @@ async def test_program_whose_loop_hangs_counts_as_gone(share: Share) -> None:
     assert LOOP_HANGS + SILENT_CLIENT + BEAT_INTERVAL < 6.0, "as docs/safety.md says"
 
 
-async def test_heartbeat_goes_on_after_its_connection_is_lost(
+async def test_heartbeat_continues_after_a_lost_connection(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[socket.socket] = []
@@ -77,7 +77,7 @@ async def test_heartbeat_goes_on_after_its_connection_is_lost(
         assert gone == []
 
 
-async def test_another_process_gives_no_heartbeat_for_a_program(
+async def test_heartbeat_from_another_process_is_rejected(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -93,7 +93,7 @@ async def test_another_process_gives_no_heartbeat_for_a_program(
 
 
 @pytest.mark.parametrize("attached", [True, False])
-async def test_heartbeat_of_an_attached_program_only_is_heard(share: Share, attached: bool) -> None:
+async def test_only_heartbeats_of_attached_programs_count(share: Share, attached: bool) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("keeper")

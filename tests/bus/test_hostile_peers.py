@@ -88,7 +88,7 @@ async def test_bytes_before_a_request_are_not_its_reply() -> None:
     master.close()
 
 
-async def test_bytes_from_a_suspension_while_sending_are_no_reply() -> None:
+async def test_bytes_received_while_suspended_in_sending_are_not_a_reply() -> None:
     """Frozen between its look at the line and the request: an answer of before is there first."""
     strays: list[Piece] = []
     transport = CommandBlocked(b"")
@@ -109,7 +109,7 @@ async def test_bytes_from_a_suspension_while_sending_are_no_reply() -> None:
     master.close()
 
 
-async def test_bytes_before_a_request_with_guessed_number_are_no_reply() -> None:
+async def test_bytes_before_a_request_with_a_guessed_transaction_are_not_a_reply() -> None:
     """The transaction ids of a client count up: whoever wants to can tell the next one."""
     transport = CommandBlocked(tcp_reply(bytes([0, 1, 0, 0, 0, 6, 1]) + QUESTION))
     around = context([])
@@ -145,7 +145,7 @@ class Taker:
         raise AssertionError(reason)
 
 
-async def test_a_connection_hands_over_what_the_system_holds() -> None:
+async def test_take_in_reads_pending_bytes_of_a_connection() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         transport = await TcpTransport.connect("127.0.0.1", server.getsockname()[1], 5.0)
         other, _ = server.accept()
@@ -161,7 +161,7 @@ async def test_a_connection_hands_over_what_the_system_holds() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
-async def test_a_port_hands_over_what_the_system_holds() -> None:
+async def test_take_in_reads_pending_bytes_of_a_port() -> None:
     import serial
 
     master, slave = pty.openpty()
@@ -184,7 +184,7 @@ async def test_a_port_hands_over_what_the_system_holds() -> None:
     lumps=st.lists(st.integers(1, 3000), min_size=1, max_size=12),
     filler=st.sampled_from([b"\x01", b"\x01\x03", b"\x01\x03\x02", b"\xff", b"\0"]),
 )
-def test_a_reply_is_found_behind_a_flood_and_the_flood_is_not_kept(
+def test_reply_after_a_flood_is_found_and_the_flood_is_dropped(
     lumps: list[int], filler: bytes
 ) -> None:
     exchange = RtuExchange(b"\x01" + QUESTION + b"\0\0", REQUEST.expectation(), echo=False)
@@ -240,9 +240,7 @@ FLOODS = {
 
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", FLOODS)
-async def test_a_line_that_never_falls_silent_ends_every_request(
-    name: str, open_line: OpenLine
-) -> None:
+async def test_requests_end_on_a_line_that_never_pauses(name: str, open_line: OpenLine) -> None:
     """Before, the search for a reply in all that came held the line's loop up for minutes."""
     link, junk, pause = FLOODS[name]
     with flooding(junk, pause) as port:

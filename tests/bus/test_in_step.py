@@ -94,7 +94,7 @@ def opened(open_line: OpenLine, path: str | RtuTcpLink, limits: Limits) -> Line:
 
 
 @pytest.mark.parametrize("kind", LIMITS)
-async def test_replies_one_behind_are_named_and_no_value_is_wrong(
+async def test_replies_one_behind_are_reported_and_never_used(
     open_line: OpenLine, kind: str
 ) -> None:
     with PtyPeer(Behind()) as peer:
@@ -108,7 +108,7 @@ async def test_replies_one_behind_are_named_and_no_value_is_wrong(
 
 
 @pytest.mark.parametrize("kind", LIMITS)
-async def test_converter_that_falls_behind_later_shows_no_wrong_value(
+async def test_converter_that_falls_behind_later_yields_no_wrong_value(
     open_line: OpenLine, kind: str
 ) -> None:
     converter = Behind(0)
@@ -119,7 +119,7 @@ async def test_converter_that_falls_behind_later_shows_no_wrong_value(
         assert right(await until_named(line))
 
 
-async def test_drive_with_few_forms_shows_no_wrong_value(open_line: OpenLine) -> None:
+async def test_drive_with_few_reply_lengths_yields_no_wrong_value(open_line: OpenLine) -> None:
     """Its identification is the only reply that is unlike that of a read."""
     with PtyPeer(Behind()) as peer:
         line = opened(open_line, peer.path, SINGLE)
@@ -129,7 +129,7 @@ async def test_drive_with_few_forms_shows_no_wrong_value(open_line: OpenLine) ->
         assert right(await until_named(line))
 
 
-async def test_replies_behind_over_rtu_tcp_are_named(open_line: OpenLine) -> None:
+async def test_replies_one_behind_over_rtu_tcp_are_reported(open_line: OpenLine) -> None:
     with TcpPeer(Behind()) as peer:
         line = opened(open_line, RtuTcpLink("127.0.0.1", peer.port), WIDE)
         assert right(await until_named(line))
@@ -138,7 +138,7 @@ async def test_replies_behind_over_rtu_tcp_are_named(open_line: OpenLine) -> Non
         assert is_named(line), "it is looked again whether they are in step"
 
 
-async def test_stop_is_sent_on_a_line_that_is_behind(open_line: OpenLine) -> None:
+async def test_stop_is_sent_on_a_line_with_replies_one_behind(open_line: OpenLine) -> None:
     with PtyPeer(Behind()) as peer:
         line = opened(open_line, peer.path, NO_ECHO)
         await until_named(line)
@@ -152,7 +152,7 @@ def _stopped(line: Line, peer: PtyPeer) -> bool:
     return any(request[1] == 6 for request in peer.requests)
 
 
-async def test_stop_is_kept_while_a_line_that_is_behind_cannot_be_opened_again(
+async def test_stop_is_kept_while_a_line_one_behind_cannot_be_reopened(
     open_line: OpenLine,
 ) -> None:
     """A gateway may refuse the next connection for some seconds: the stop fails, and is sent."""
@@ -173,7 +173,7 @@ async def test_stop_is_kept_while_a_line_that_is_behind_cannot_be_opened_again(
         assert again.requests[0][1:6] == bytes([6, 0, 1, 0, 0]), "before anything else"
 
 
-async def test_line_in_step_again_is_used_again(open_line: OpenLine) -> None:
+async def test_line_is_used_again_once_replies_are_in_step(open_line: OpenLine) -> None:
     converter = Behind()
     with PtyPeer(converter) as peer:
         line = opened(open_line, peer.path, WIDE)
@@ -185,7 +185,7 @@ async def test_line_in_step_again_is_used_again(open_line: OpenLine) -> None:
         assert len(found) >= 4
 
 
-async def test_slow_drive_is_not_named_as_behind(open_line: OpenLine) -> None:
+async def test_slow_drive_is_not_reported_as_one_behind(open_line: OpenLine) -> None:
     """Its replies come after the timeout, by themselves."""
     slow = [0.2]
 
@@ -200,7 +200,7 @@ async def test_slow_drive_is_not_named_as_behind(open_line: OpenLine) -> None:
 
 
 @pytest.mark.parametrize("kind", LIMITS)
-async def test_first_value_costs_one_more_exchange(open_line: OpenLine, kind: str) -> None:
+async def test_first_value_costs_one_additional_exchange(open_line: OpenLine, kind: str) -> None:
     with PtyPeer(honest) as peer:
         line = opened(open_line, peer.path, LIMITS[kind])
         assert (await line.read(1, 100)).words == (100,)
@@ -210,7 +210,7 @@ async def test_first_value_costs_one_more_exchange(open_line: OpenLine, kind: st
         assert len(peer.requests) == 11, "once is enough"
 
 
-async def test_absent_drive_costs_no_more_than_without_a_probe(open_line: OpenLine) -> None:
+async def test_probe_adds_no_cost_for_an_absent_drive(open_line: OpenLine) -> None:
     with PtyPeer(lambda _request, _count: []) as peer:
         line = opened(open_line, peer.path, WIDE)
         with pytest.raises(LineError):
@@ -218,14 +218,14 @@ async def test_absent_drive_costs_no_more_than_without_a_probe(open_line: OpenLi
         assert len(peer.requests) == 1
 
 
-async def test_stop_waits_for_no_probe(open_line: OpenLine) -> None:
+async def test_stop_does_not_wait_for_a_probe(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = opened(open_line, peer.path, WIDE)
         await line.write(1, 1, [0], priority=Priority.STOP)
         assert peer.requests[0][1] == 6
 
 
-async def test_write_is_not_sent_before_the_drive_has_proved_its_step(
+async def test_write_is_not_sent_before_replies_are_proved_in_step(
     open_line: OpenLine,
 ) -> None:
     with PtyPeer(lambda _request, _count: []) as peer:
@@ -235,7 +235,7 @@ async def test_write_is_not_sent_before_the_drive_has_proved_its_step(
         assert 6 not in [request[1] for request in peer.requests]
 
 
-async def test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing(
+async def test_read_after_a_lost_reply_is_lengthened_and_does_not_wait(
     open_line: OpenLine,
 ) -> None:
     def loses_the_third(request: bytes, count: int) -> Sequence[Step]:
@@ -254,7 +254,7 @@ async def test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing(
         assert peer.requests[-1][5] > 1
 
 
-def test_length_of_a_reply_that_may_still_come_is_not_used() -> None:
+def test_lengthened_read_avoids_the_length_of_a_late_reply() -> None:
     devices, timing = Devices(Timing(), mistakable=True), Timing()
     outcomes = Outcomes(devices, Tally(), timing, lambda: 1.0, SharedState(), gateway=False)
     steps = InStep(devices, outcomes, lambda: 1.0, timing, buffers=False)
@@ -267,7 +267,7 @@ def test_length_of_a_reply_that_may_still_come_is_not_used() -> None:
     )  # fmt: skip
 
 
-async def test_longer_read_that_is_refused_is_replaced(open_line: OpenLine) -> None:
+async def test_refused_longer_read_is_replaced(open_line: OpenLine) -> None:
     """The register after the last one does not exist."""
 
     def refuses(request: bytes, count: int) -> Sequence[Step]:
@@ -286,7 +286,7 @@ async def test_longer_read_that_is_refused_is_replaced(open_line: OpenLine) -> N
         assert (await line.read(1, 102)).words == (102,)
 
 
-async def test_late_reply_is_not_taken_for_that_of_a_longer_read(open_line: OpenLine) -> None:
+async def test_late_reply_is_not_taken_for_the_reply_to_a_longer_read(open_line: OpenLine) -> None:
     """Replies out of order, as no echo between them could find."""
 
     def out_of_order(request: bytes, count: int) -> Sequence[Step]:
@@ -306,9 +306,7 @@ async def test_late_reply_is_not_taken_for_that_of_a_longer_read(open_line: Open
 
 
 @pytest.mark.parametrize(("buffers", "longer"), [(False, 0), (True, 5)])
-def test_connection_that_buffers_proves_its_step_every_ten_seconds(
-    buffers: bool, longer: int
-) -> None:
+def test_buffering_connection_is_probed_every_ten_seconds(buffers: bool, longer: int) -> None:
     now = 0.0
     devices, timing = Devices(Timing(), mistakable=True), Timing()
 
@@ -352,7 +350,7 @@ class _Line:
         self.steps.note(job, job.expectation, result)
 
 
-def test_write_after_probes_that_are_refused_is_sent_at_last() -> None:
+def test_write_is_sent_after_refused_probes() -> None:
     """A drive may refuse the echo that its profile gives it."""
     line = _Line()
     write = Job(WriteOne(1, 1, 7), Priority.OPERATOR_WRITE, WIDE)
@@ -363,7 +361,7 @@ def test_write_after_probes_that_are_refused_is_sent_at_last() -> None:
         line.steps.note(write, probe.expectation(), ExchangeResult(ResultKind.EXCEPTION))
 
 
-def test_lost_request_of_a_drive_with_few_forms_does_not_break_the_next_connection() -> None:
+def test_lost_request_does_not_break_the_next_connection() -> None:
     line = _Line()
     few = replace(SINGLE, functions=frozenset({3}))
     line.note(Job(Read(1, 100, 1), Priority.POLL, few), ResultKind.NOTHING)
@@ -373,7 +371,7 @@ def test_lost_request_of_a_drive_with_few_forms_does_not_break_the_next_connecti
     line.note(job, ResultKind.REPLY)
 
 
-def test_gateway_that_missed_a_reply_must_prove_its_step_again() -> None:
+def test_gateway_is_probed_again_after_a_lost_reply() -> None:
     """The reply that it gave up may be given to the next request."""
     line = _Line(gateway=True)
     line.note(Job(Read(1, 100, 2), Priority.POLL, NO_ECHO), ResultKind.REPLY)
@@ -384,7 +382,7 @@ def test_gateway_that_missed_a_reply_must_prove_its_step_again() -> None:
     assert job.form is not None
 
 
-def test_late_reply_some_time_after_the_drain_does_not_name_the_line() -> None:
+def test_late_reply_after_the_drain_is_not_reported_as_one_behind() -> None:
     """The first exchange after it brought nothing: no reply was held back."""
     line = _Line()
     jobs = [Job(Read(1, 100, count), Priority.POLL, NO_ECHO) for count in (1, 2, 3, 4, 5)]
@@ -398,7 +396,7 @@ def test_late_reply_some_time_after_the_drain_does_not_name_the_line() -> None:
     assert not line.steps.behind
 
 
-def test_read_that_keeps_a_drive_alive_does_not_wait_for_the_drain() -> None:
+def test_keep_alive_read_does_not_wait_for_the_drain() -> None:
     timing = Timing()
     devices = Devices(timing, mistakable=True)
     dispatcher = Dispatcher(devices, Tally(), timing, lambda: 1.0, gateway=False)

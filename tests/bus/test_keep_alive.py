@@ -78,7 +78,7 @@ def test_device_is_read_four_times_in_its_timeout(bench: Bench) -> None:
     assert bench.sent == [(time, 1, Priority.FEED) for time in times]
 
 
-def test_device_that_programs_read_needs_no_reads(bench: Bench) -> None:
+def test_device_read_by_a_program_needs_no_keep_alive_reads(bench: Bench) -> None:
     bench.facts.keep_alives.keep(ONE)
     for _ in range(10):
         bench.wait(0.9 * PERIOD)
@@ -86,7 +86,7 @@ def test_device_that_programs_read_needs_no_reads(bench: Bench) -> None:
     assert bench.sent == []
 
 
-def test_device_is_kept_for_the_program_with_its_shortest_timeout(bench: Bench) -> None:
+def test_shortest_timeout_of_all_programs_applies(bench: Bench) -> None:
     """Its share of the line counts for that program, and a pause of polling holds for it."""
     bench.facts.keep_alives.keep(ONE)
     bench.facts.keep_alives.hear("other", KeepAlive(1, TIMEOUT / 2, ADDRESS))
@@ -97,7 +97,7 @@ def test_device_is_kept_for_the_program_with_its_shortest_timeout(bench: Bench) 
     assert bench.programs == ["other", "me"]
 
 
-def test_silent_device_is_read_behind_the_others_once_it_has_acted(bench: Bench) -> None:
+def test_timed_out_device_is_read_after_the_others(bench: Bench) -> None:
     bench.answers = False
     bench.facts.keep_alives.keep(ONE)
     bench.wait(TIMEOUT + 2.1)
@@ -110,7 +110,7 @@ def test_silent_device_is_read_behind_the_others_once_it_has_acted(bench: Bench)
     assert len(after) <= 1 + 2.1 / (PERIOD / 2)
 
 
-def test_reads_end_with_the_program_and_at_their_time(
+def test_keep_alive_reads_end_with_the_program_or_at_their_deadline(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.keep_alive.time.monotonic", lambda: bench.now)
@@ -125,7 +125,7 @@ def test_reads_end_with_the_program_and_at_their_time(
     assert len(bench.sent) == READS_PER_TIMEOUT - 1
 
 
-def test_read_that_waits_for_the_line_is_not_queued_again(
+def test_waiting_keep_alive_read_is_not_queued_twice(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waiting: list[Job] = []
@@ -135,7 +135,7 @@ def test_read_that_waits_for_the_line_is_not_queued_again(
     assert len(waiting) == 1
 
 
-def test_kinds_of_reads() -> None:
+def test_keep_alive_uses_the_request_of_its_function() -> None:
     assert KeepAlive(3, TIMEOUT, function=43).request == Identify(3)
     assert KeepAlive(3, TIMEOUT, 5, 2, 4).request == ReadInput(3, 5, 2)
 
@@ -160,7 +160,7 @@ def test_malformed_message_is_refused(wrong: dict[str, float]) -> None:
 
 
 @pytest.mark.parametrize("timeout", [0.001, 1e9])
-def test_odd_timeout_is_brought_within_bounds(timeout: float) -> None:
+def test_timeout_is_clamped_to_its_bounds(timeout: float) -> None:
     facts = SharedState()
     facts.keep_alives.keep(KeepAlive(1, timeout, ADDRESS))
     (alive,) = facts.keep_alives.of(facts.me.id)
@@ -188,14 +188,14 @@ async def more(peer: PtyPeer) -> None:
 QUICKLY = KeepAlive(1, 0.4, ADDRESS)
 
 
-async def test_line_that_nobody_shares_keeps_its_devices_alive(open_line: OpenLine) -> None:
+async def test_unshared_line_keeps_its_devices_alive(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = open_line(peer.path)
         line.facts.keep_alives.keep(QUICKLY)
         await more(peer)
 
 
-async def test_holder_keeps_devices_alive_while_the_loop_of_their_program_hangs(
+async def test_holder_keeps_devices_alive_while_their_program_hangs(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -207,7 +207,7 @@ async def test_holder_keeps_devices_alive_while_the_loop_of_their_program_hangs(
             await more(peer)
 
 
-async def test_next_holder_keeps_them_alive_and_none_of_a_program_that_left(share: Share) -> None:
+async def test_next_holder_keeps_devices_of_attached_programs_alive_only(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         holder, program, last = (lines.open(name) for name in ("keeper", "run", "panel"))

@@ -60,7 +60,7 @@ async def test_keeper_that_cannot_listen_leaves_its_pid_namespace(tmp_path: Path
         await asyncio.to_thread(keeper.close)
 
 
-async def test_a_keeper_renews_its_alarm_and_sends_early_stops(tmp_path: Path) -> None:
+async def test_keeper_renews_its_alarm_and_sends_early_stops(tmp_path: Path) -> None:
     place, alarms = place_in(tmp_path), list[float]()
     quiet = time.monotonic() + QUIET
     with PtyPeer(honest) as peer:

@@ -53,7 +53,7 @@ def pair(share: Share, peer: PtyPeer) -> tuple[Line, Line]:
     return lines.open("keeper", gated=True), lines.open("run")
 
 
-async def test_only_a_stop_is_sent_to_a_drive_that_is_not_armed(share: Share) -> None:
+async def test_disarmed_drive_is_sent_stops_only(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
         for line in (holder, program):
@@ -64,7 +64,7 @@ async def test_only_a_stop_is_sent_to_a_drive_that_is_not_armed(share: Share) ->
         assert written(peer) == [STOP]
 
 
-async def test_an_armed_drive_is_written_until_it_is_disarmed(share: Share) -> None:
+async def test_armed_drive_is_written_until_it_is_disarmed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
         for line in (holder, program):
@@ -77,7 +77,7 @@ async def test_an_armed_drive_is_written_until_it_is_disarmed(share: Share) -> N
         assert written(peer) == [RUN, RUN]
 
 
-async def test_a_stop_ends_it_for_every_program(share: Share) -> None:
+async def test_stop_ends_the_lease_of_every_program(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
         program.facts.leases.arm(1, 60.0, CARE)
@@ -91,7 +91,7 @@ async def test_a_stop_ends_it_for_every_program(share: Share) -> None:
         assert written(peer) == [RUN, RUN]
 
 
-async def test_it_ends_with_its_time_unless_it_is_renewed(share: Share) -> None:
+async def test_lease_expires_unless_renewed(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         _, program = pair(share, peer)
         program.facts.leases.arm(1, -LEASE_RENEWED_EVERY - 0.01, CARE)
@@ -104,7 +104,7 @@ async def test_it_ends_with_its_time_unless_it_is_renewed(share: Share) -> None:
         assert written(peer) == [RUN, RUN]
 
 
-async def test_a_drive_that_the_holder_cannot_stop_is_not_written(share: Share) -> None:
+async def test_drive_without_stop_instructions_is_not_written(share: Share) -> None:
     heard: list[tuple[int, bytes]] = []
 
     def take(device: int, care: bytes) -> bool:
@@ -125,7 +125,7 @@ async def test_a_drive_that_the_holder_cannot_stop_is_not_written(share: Share) 
         assert written(peer) == [RUN]
 
 
-async def test_the_next_holder_learns_of_it(share: Share) -> None:
+async def test_next_holder_takes_over_leases(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
         first, *others = (lines.open(name, gated=True) for name in ("first", "second", "third"))
@@ -138,7 +138,7 @@ async def test_the_next_holder_learns_of_it(share: Share) -> None:
         assert written(peer) == [RUN, RUN]
 
 
-async def test_the_next_holder_learns_how_to_stop_what_was_armed_before(share: Share) -> None:
+async def test_next_holder_takes_over_stop_instructions(share: Share) -> None:
     heard: list[tuple[int, bytes]] = []
 
     def hear(device: int, care: bytes) -> bool:
@@ -190,7 +190,7 @@ def _meet(lines: SharedLines, programs: list[Line]) -> bool:
     return all({each.id for each in program.facts.programs} == names for program in programs)
 
 
-async def test_it_ends_with_its_program(share: Share) -> None:
+async def test_lease_ends_with_its_program(share: Share) -> None:
     with PtyPeer(prompt) as peer:
         holder, program = pair(share, peer)
         program.facts.leases.arm(1, None, CARE)
@@ -200,7 +200,7 @@ async def test_it_ends_with_its_program(share: Share) -> None:
         await asyncio.to_thread(eventually, lambda: holder.facts.leases.of(me) == {})
 
 
-async def test_a_stop_without_a_word_is_due_once_its_program_is_gone(share: Share) -> None:
+async def test_stop_not_yet_written_is_due_when_its_program_exits(share: Share) -> None:
     due: list[tuple[int, ...]] = []
     with PtyPeer(prompt) as peer:
         lines = share(peer.path)
@@ -216,7 +216,7 @@ async def test_a_stop_without_a_word_is_due_once_its_program_is_gone(share: Shar
         assert due == [(1,)]
 
 
-async def test_a_write_whose_program_is_gone_reaches_the_holder_with_its_result(
+async def test_result_of_a_write_by_an_exited_program_reaches_the_holder(
     share: Share,
 ) -> None:
     left: list[tuple[Program, object, float]] = []
@@ -242,7 +242,7 @@ async def test_a_write_whose_program_is_gone_reaches_the_holder_with_its_result(
         assert written(peer) == [RUN]
 
 
-async def test_a_stop_is_not_due_any_more_once_its_drive_was_armed_again(share: Share) -> None:
+async def test_due_stop_is_cancelled_when_the_drive_is_armed_again(share: Share) -> None:
     """A panel that stopped a drive that was switched off, and is closed an hour later."""
     due: list[tuple[int, ...]] = []
     with PtyPeer(prompt) as peer:

@@ -27,7 +27,7 @@ def owner_of(lines: SharedLines) -> Owner:
     return owner
 
 
-async def test_past_has_frames_from_before_in_more_than_one_piece(share: Share) -> None:
+async def test_past_returns_earlier_frames_in_several_messages(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         line = lines.open("serve", timing=replace(QUICK, trace_length=10 * MOST_FRAMES))
@@ -48,7 +48,7 @@ async def test_past_of_an_unused_line_is_empty(share: Share) -> None:
         assert found == (line.trace, ())
 
 
-def test_past_of_an_older_holder_raises(tmp_path: Path) -> None:
+def test_past_of_a_holder_of_an_older_version_raises(tmp_path: Path) -> None:
     holder = Program("k", KEEPER, 1)
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(tmp_path / "s"))

@@ -130,7 +130,7 @@ def test_all_kinds_at_once_have_their_minimum_shares() -> None:
     assert shares[Priority.FEED] == pytest.approx(1 - sum(MINIMUM_SHARES.values()), rel=0.1)
 
 
-def test_stop_goes_before_kinds_that_are_owed_time() -> None:
+def test_stop_precedes_kinds_that_are_owed_time() -> None:
     line = TimedLine()
     for priority in (*URGENT, *SHARED):
         line.keep_asking(priority)
@@ -142,7 +142,7 @@ def test_stop_goes_before_kinds_that_are_owed_time() -> None:
         assert line.sent[before] is stop
 
 
-def test_repeated_stops_take_turns_with_all_that_waits() -> None:
+def test_repeated_stops_alternate_with_waiting_requests() -> None:
     line = TimedLine()
     for program in ("a", "b"):
         line.keep_asking(Priority.STOP, program, word=STOP_WORD)
@@ -157,7 +157,7 @@ def test_repeated_stops_take_turns_with_all_that_waits() -> None:
     assert all(shares[item] > 0 for item in SHARED)
 
 
-def test_stops_that_a_silent_drive_never_answers_take_turns() -> None:
+def test_unanswered_stops_alternate_with_waiting_requests() -> None:
     line = TimedLine()
     line.away = {1}
     line.keep_asking(Priority.STOP, count=1, word=STOP_WORD)
@@ -166,7 +166,7 @@ def test_stops_that_a_silent_drive_never_answers_take_turns() -> None:
     assert line.shares()[Priority.FEED] == pytest.approx(0.5, rel=0.1)
 
 
-def test_first_stop_waits_for_nothing_beside_repeated_ones() -> None:
+def test_first_stop_precedes_repeated_ones() -> None:
     line = TimedLine()
     for priority in (*URGENT, *SHARED):
         line.keep_asking(priority)
@@ -191,7 +191,7 @@ def test_repeated_stop_waits_for_one_exchange_at_most() -> None:
         assert stop in line.sent[before:]
 
 
-def test_line_with_time_to_spare_goes_by_priority() -> None:
+def test_line_with_spare_time_follows_priority() -> None:
     line = TimedLine()
     line.keep_asking(Priority.POLL)
     line.serve(10.0)
@@ -202,7 +202,7 @@ def test_line_with_time_to_spare_goes_by_priority() -> None:
     assert line.sent == commands + reads
 
 
-def test_search_that_asks_one_by_one_has_its_share_and_no_more() -> None:
+def test_scan_gets_its_share_and_no_more() -> None:
     line = TimedLine()
     line.round_trip = True
     line.keep_asking(Priority.POLL)
@@ -213,7 +213,7 @@ def test_search_that_asks_one_by_one_has_its_share_and_no_more() -> None:
 
 
 @pytest.mark.parametrize("priority", SHARED)
-def test_programs_share_evenly_however_much_each_asks(priority: Priority) -> None:
+def test_programs_share_evenly_whatever_their_demand(priority: Priority) -> None:
     line = TimedLine()
     line.keep_asking(priority, "many", count=31)
     line.keep_asking(priority, "few", count=2)
@@ -222,7 +222,7 @@ def test_programs_share_evenly_however_much_each_asks(priority: Priority) -> Non
     assert counted["few"] == pytest.approx(counted["many"], rel=0.05)
 
 
-def test_program_that_asks_seldom_waits_for_no_more_than_two_exchanges() -> None:
+def test_program_with_few_requests_waits_two_exchanges_at_most() -> None:
     line = TimedLine()
     line.keep_asking(Priority.POLL, "many", count=31)
     line.serve(5.0)
@@ -234,7 +234,7 @@ def test_program_that_asks_seldom_waits_for_no_more_than_two_exchanges() -> None
         line.serve(5 * EXCHANGE)
 
 
-def test_program_that_was_away_makes_up_for_nothing() -> None:
+def test_idle_program_gains_no_credit() -> None:
     line = TimedLine()
     line.keep_asking(Priority.POLL, "here")
     line.ask(Priority.POLL, "away")

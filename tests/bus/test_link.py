@@ -48,12 +48,12 @@ from tui.bus.link import (
         ("serial:/dev/ttyUSB0,9600,8N1,timeout=2", SerialLink("/dev/ttyUSB0", 9600, "8N1", 2.0)),
     ],
 )
-def test_links_that_can_be_typed(text: str, link: Link) -> None:
+def test_valid_link_text_is_parsed(text: str, link: Link) -> None:
     assert parse_link(text) == link
     assert parse_link(label(link)) == link
 
 
-def test_any_path_that_exists_is_a_port(tmp_path: Path) -> None:
+def test_existing_path_is_a_port(tmp_path: Path) -> None:
     port = tmp_path / "port"
     with pytest.raises(LinkSyntaxError):
         parse_link(str(port))
@@ -92,13 +92,13 @@ def test_any_path_that_exists_is_a_port(tmp_path: Path) -> None:
         "rtu-tcp:[::1]",
     ],
 )
-def test_links_that_cannot(text: str) -> None:
+def test_invalid_link_text_is_refused(text: str) -> None:
     with pytest.raises(LinkSyntaxError) as caught:
         parse_link(text)
     assert str(caught.value).endswith((".", "bits."))
 
 
-def test_a_time_out_that_was_set_is_kept() -> None:
+def test_configured_timeout_is_kept() -> None:
     usual, patient = Line(TcpLink("::1")).timing, Line(TcpLink("::1", timeout=5.0)).timing
     assert (patient.first_timeout, patient.late_reply) == (5.0, 10.0)
     assert patient.min_timeout == usual.min_timeout
@@ -107,7 +107,7 @@ def test_a_time_out_that_was_set_is_kept() -> None:
     assert (hurried.first_timeout, hurried.min_timeout, hurried.scan_timeout) == (0.05,) * 3
 
 
-def test_labels() -> None:
+def test_label_includes_the_link_type_and_settings() -> None:
     assert label(SerialLink("/dev/ttyUSB0")) == "serial:/dev/ttyUSB0,19200,8E1"
     assert label(TcpLink("10.0.0.5")) == "tcp:10.0.0.5:502"
     assert label(RtuTcpLink("::1", 4001)) == "rtu-tcp:[::1]:4001"
@@ -124,6 +124,8 @@ def test_labels() -> None:
         (TcpLink("x"), 0.0, 0.0),
     ],
 )
-def test_times(link: Link, character: float, pause: float) -> None:
+def test_character_time_and_gap_follow_baud_and_format(
+    link: Link, character: float, pause: float
+) -> None:
     assert character_time(link) == pytest.approx(character)
     assert silence(link) == pytest.approx(pause)

@@ -50,7 +50,7 @@ def place(tmp_path: Path) -> SharePlace:
     return SharePlace("serial:x", tmp_path / "lines", (tmp_path / "run",))
 
 
-def test_bytes_are_read_as_they_come(talk: Talk) -> None:
+def test_bytes_are_read_as_they_arrive(talk: Talk) -> None:
     with ListeningLine(SerialLink(talk.path), None, ME) as line:
         assert line.read(0.0) == b""
         os.write(talk.ours, b"\x02\x03\x00\r\n\x1a\x11")
@@ -59,7 +59,7 @@ def test_bytes_are_read_as_they_come(talk: Talk) -> None:
         assert line.character == 0.0
 
 
-def test_the_system_lets_nothing_be_written(talk: Talk) -> None:
+def test_port_is_opened_read_only(talk: Talk) -> None:
     with ListeningLine(SerialLink(talk.path), None, ME):
         opened = [int(fd) for fd in os.listdir("/proc/self/fd") if _leads_to(int(fd)) == talk.path]
         (port,) = [fd for fd in opened if fd != talk.theirs]
@@ -76,14 +76,14 @@ def _leads_to(descriptor: int) -> str:
         return ""
 
 
-def test_a_port_that_goes_away_is_reported(talk: Talk) -> None:
+def test_port_that_disappears_is_reported(talk: Talk) -> None:
     with ListeningLine(SerialLink(talk.path), None, ME) as line:
         talk.close()
         with pytest.raises(LineLost, match="disappeared"):
             line.read(5.0)
 
 
-def test_one_program_at_a_time(talk: Talk) -> None:
+def test_port_is_monitored_by_one_program_at_a_time(talk: Talk) -> None:
     with ListeningLine(SerialLink(talk.path), None, ME):
         with pytest.raises(PortBusy), ListeningLine(SerialLink(talk.path), None, ME):
             pass
@@ -93,7 +93,7 @@ def test_one_program_at_a_time(talk: Talk) -> None:
         pass
 
 
-def test_another_program_with_a_real_port_open_is_named(
+def test_program_that_has_a_real_port_open_is_named(
     talk: Talk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.listening_line.others_at", lambda _path: "mbpoll (pid 7)")
@@ -104,7 +104,7 @@ def test_another_program_with_a_real_port_open_is_named(
         pass
 
 
-def test_a_line_of_another_drivepanel_is_left_to_it(talk: Talk, place: SharePlace) -> None:
+def test_line_owned_by_another_drivepanel_is_refused(talk: Talk, place: SharePlace) -> None:
     owner = Line(SerialLink(talk.path), place=place, program=Program("2", "panel", os.getpid()))
     owner.open(wait=5.0)
     try:
@@ -121,7 +121,7 @@ def test_a_line_of_another_drivepanel_is_left_to_it(talk: Talk, place: SharePlac
         pass
 
 
-def test_no_other_drivepanel_takes_a_line_that_is_listened_to(
+def test_monitored_line_is_refused_to_other_programs(
     talk: Talk, place: SharePlace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.share.sharing.NO_OWNER", 0.1)
@@ -134,7 +134,7 @@ def test_no_other_drivepanel_takes_a_line_that_is_listened_to(
             late.close()
 
 
-def test_ports_that_cannot_be_listened_to(talk: Talk, tmp_path: Path) -> None:
+def test_unusable_port_is_refused(talk: Talk, tmp_path: Path) -> None:
     with pytest.raises(PortMissing):
         open_listening(str(tmp_path / "none"), 19200, "8E1")
     with pytest.raises(PortRefused, match="12345 baud"):
@@ -143,7 +143,7 @@ def test_ports_that_cannot_be_listened_to(talk: Talk, tmp_path: Path) -> None:
         open_listening(str(tmp_path), 19200, "8E1")
 
 
-def test_silence_and_characters_are_those_of_the_line(
+def test_gap_and_character_time_follow_the_settings(
     talk: Talk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.listening_line.is_pseudo_terminal", lambda _path: False)

@@ -73,7 +73,7 @@ def ended() -> Ended:
     return Ended()
 
 
-def test_a_count_lasts_for_a_minute_and_little_is_kept() -> None:
+def test_count_lasts_a_minute_in_few_buckets() -> None:
     window = MinuteWindow()
     for second in range(600):
         window.count("good", float(second))
@@ -83,7 +83,7 @@ def test_a_count_lasts_for_a_minute_and_little_is_kept() -> None:
     assert window.total(599.0 + MINUTE) == LastMinute()
 
 
-def test_a_correction_that_outlives_its_count_is_no_count_below_zero() -> None:
+def test_correction_does_not_make_a_count_negative() -> None:
     window = MinuteWindow()
     window.count("silent", 0.0)
     window.count("silent", MINUTE - 1, -1)
@@ -91,7 +91,7 @@ def test_a_correction_that_outlives_its_count_is_no_count_below_zero() -> None:
     assert window.total(MINUTE).silent == 0
 
 
-def test_a_missed_reply_is_the_lines_once_the_drive_answers_again(ended: Ended) -> None:
+def test_missed_reply_counts_for_the_line_once_the_drive_answers(ended: Ended) -> None:
     ended.good(1, 8)
     ended.missed(1, 2)
     assert (ended.line, ended.of(1).silent) == (LastMinute(good=8), 2)
@@ -101,7 +101,7 @@ def test_a_missed_reply_is_the_lines_once_the_drive_answers_again(ended: Ended) 
     assert ended.line.share == pytest.approx(9 / 11)
 
 
-def test_a_reply_that_was_doubted_counts_no_miss_twice(ended: Ended) -> None:
+def test_doubted_reply_does_not_count_a_miss_twice(ended: Ended) -> None:
     ended.good(1)
     ended.missed(1)
     ended.doubted(1)
@@ -109,14 +109,14 @@ def test_a_reply_that_was_doubted_counts_no_miss_twice(ended: Ended) -> None:
     assert ended.line == ended.of(1) == LastMinute(good=3, lost=1)
 
 
-def test_damaged_and_wrong_replies_count_at_once(ended: Ended) -> None:
+def test_damaged_and_wrong_replies_count_immediately(ended: Ended) -> None:
     ended.good(1, 2)
     ended.reply(1, ResultKind.DAMAGED)
     ended.reply(1, ResultKind.WRONG)
     assert ended.line == ended.of(1) == LastMinute(good=2, damaged=2)
 
 
-def test_a_dead_drive_is_a_trouble_of_its_own(ended: Ended) -> None:
+def test_dead_drive_does_not_lower_the_share_of_the_line(ended: Ended) -> None:
     for device in (1, 2, 3):
         ended.good(device, 10)
     ended.missed(3, 9)
@@ -126,7 +126,7 @@ def test_a_dead_drive_is_a_trouble_of_its_own(ended: Ended) -> None:
 
 
 @pytest.mark.parametrize(("silence", "lost"), [(SHORT_SILENCE - 1, MISSES), (SHORT_SILENCE + 1, 0)])
-def test_a_drive_that_comes_back_was_away_or_was_not_heard(
+def test_misses_count_for_the_line_after_a_short_absence_only(
     ended: Ended, silence: float, lost: int
 ) -> None:
     ended.good(1)
@@ -137,7 +137,7 @@ def test_a_drive_that_comes_back_was_away_or_was_not_heard(
     assert ended.of(1).silent == MISSES - lost
 
 
-def test_slow_polls_that_miss_one_reply_are_no_dead_drive(ended: Ended) -> None:
+def test_one_missed_slow_poll_is_not_a_dead_drive(ended: Ended) -> None:
     ended.good(1)
     ended.missed(1)
     ended.now += 30.0
@@ -145,7 +145,7 @@ def test_slow_polls_that_miss_one_reply_are_no_dead_drive(ended: Ended) -> None:
     assert ended.line.lost == 1
 
 
-def test_a_drive_that_never_answered_is_no_trouble_of_the_line(ended: Ended) -> None:
+def test_drive_that_never_answered_does_not_count_for_the_line(ended: Ended) -> None:
     ended.missed(9, 5)
     assert ended.line.share is None
     assert ended.of(9).whole_share == 0.0
@@ -153,7 +153,7 @@ def test_a_drive_that_never_answered_is_no_trouble_of_the_line(ended: Ended) -> 
     assert ended.line == LastMinute(good=1)
 
 
-def test_a_search_does_not_count(ended: Ended) -> None:
+def test_scan_does_not_count(ended: Ended) -> None:
     ended.missed(7, 2, Priority.BACKGROUND)
     ended.reply(7, ResultKind.DAMAGED, Priority.PATIENT)
     assert ended.of(7) == ended.line == LastMinute()
@@ -192,7 +192,7 @@ async def test_all_programs_on_a_line_have_the_same_minute(share: Share) -> None
         assert other.counters.devices[1].minute == owner.counters.devices[1].minute
 
 
-async def test_each_reply_that_comes_twice_is_a_stray(share: Share) -> None:
+async def test_repeated_reply_counts_as_a_stray(share: Share) -> None:
     with PtyPeer(lambda request, _: [reply(request), 0.05, reply(request)]) as peer:
         line = share(peer.path).open("panel")
         await line.read(1, 100)
@@ -200,7 +200,7 @@ async def test_each_reply_that_comes_twice_is_a_stray(share: Share) -> None:
         assert line.counters.minute.share == 1.0
 
 
-def test_an_heir_of_a_line_counts_from_then_on() -> None:
+def test_next_owner_continues_the_counts() -> None:
     heir = MinuteWindow(LastMinute(good=7, lost=2))
     assert heir.total(5.0).lost == 2
     heir.count("good", 6.0)

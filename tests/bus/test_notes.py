@@ -18,7 +18,7 @@ class Bench:
         self.notes = Notes(lambda _: None, lambda: self.now)
 
 
-def test_a_note_is_kept_for_ten_minutes_and_no_longer() -> None:
+def test_note_is_kept_for_ten_minutes() -> None:
     bench = Bench()
     bench.notes.keep(LineNote(1, "a", b"old"))
     bench.now += NOTES_KEPT - 1
@@ -36,7 +36,7 @@ def test_the_same_note_is_kept_once() -> None:
     assert len(bench.notes.all) == 1
 
 
-def test_a_note_that_is_left_again_after_its_time_is_gone() -> None:
+def test_expired_note_is_not_kept_again() -> None:
     bench = Bench()
     bench.notes.keep(LineNote(1, "a", b"old"))
     bench.now += NOTES_KEPT + 1
@@ -46,7 +46,7 @@ def test_a_note_that_is_left_again_after_its_time_is_gone() -> None:
     assert len(bench.notes.all) == 1
 
 
-def test_the_oldest_notes_make_room_for_new_ones() -> None:
+def test_oldest_notes_are_dropped_for_new_ones() -> None:
     bench = Bench()
     for number in range(2 * MOST_NOTES // MOST_NOTE):
         bench.notes.keep(LineNote(1, "a", number.to_bytes(4, "big") * (MOST_NOTE // 4)))
@@ -56,7 +56,7 @@ def test_the_oldest_notes_make_room_for_new_ones() -> None:
     assert kept[-1].data.startswith((2 * MOST_NOTES // MOST_NOTE - 1).to_bytes(4, "big"))
 
 
-async def test_a_program_that_asks_finds_what_one_that_left_has_noted(share: Share) -> None:
+async def test_program_gets_notes_of_a_program_that_has_closed(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("panel")
@@ -74,7 +74,7 @@ async def test_a_program_that_asks_finds_what_one_that_left_has_noted(share: Sha
         eventually(lambda: heard == [b"one", b"two"])
 
 
-async def test_the_next_holder_of_the_line_has_the_notes_of_programs_that_stay(
+async def test_next_holder_has_the_notes_of_remaining_programs(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:

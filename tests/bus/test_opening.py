@@ -43,7 +43,7 @@ def port() -> Iterator[SlowPort]:
     eventually(lambda: not opening._ABANDONED)
 
 
-async def test_the_loop_goes_on_while_a_port_is_opened(port: SlowPort) -> None:
+async def test_loop_runs_while_a_port_opens(port: SlowPort) -> None:
     waiting = asyncio.create_task(port.opened())
     await asyncio.sleep(0.05)
     assert not waiting.done()
@@ -52,7 +52,7 @@ async def test_the_loop_goes_on_while_a_port_is_opened(port: SlowPort) -> None:
     assert not port.closed.is_set()
 
 
-async def test_the_reason_of_a_refused_port_is_raised() -> None:
+async def test_reason_of_a_refused_port_is_raised() -> None:
     def missing() -> SlowPort:
         raise PortMissing("port")
 
@@ -60,7 +60,7 @@ async def test_the_reason_of_a_refused_port_is_raised() -> None:
         await opened_beside("port", missing, lambda _: None)
 
 
-async def test_a_port_that_is_opened_too_late_is_closed(
+async def test_port_that_opens_too_late_is_closed(
     port: SlowPort, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(opening, "OPENS_WITHIN", 0.05)
@@ -75,7 +75,7 @@ async def test_a_port_that_is_opened_too_late_is_closed(
     assert await asyncio.to_thread(port.closed.wait, 20)
 
 
-async def test_a_port_whose_line_was_closed_meanwhile_is_closed(port: SlowPort) -> None:
+async def test_port_that_opens_after_its_line_closed_is_closed(port: SlowPort) -> None:
     waiting = asyncio.create_task(port.opened())
     await asyncio.sleep(0.05)
     waiting.cancel()
@@ -85,7 +85,7 @@ async def test_a_port_whose_line_was_closed_meanwhile_is_closed(port: SlowPort) 
     assert await asyncio.to_thread(port.closed.wait, 20)
 
 
-async def test_loop_goes_on_while_system_closes_port(port: SlowPort) -> None:
+async def test_loop_runs_while_the_system_closes_a_port(port: SlowPort) -> None:
     begun = time.monotonic()
     # a driver that waits for the last bytes of an adapter that takes none
     closed_beside("port", port.open)
@@ -97,14 +97,14 @@ async def test_loop_goes_on_while_system_closes_port(port: SlowPort) -> None:
     assert await port.opened() is port
 
 
-async def test_port_is_closed_before_the_line_goes_on() -> None:
+async def test_line_waits_until_its_port_is_closed() -> None:
     closed = threading.Event()
     closed_beside("port", closed.set)
     assert closed.is_set()
     assert not opening._ABANDONED
 
 
-async def test_serial_line_does_not_wait_for_port_that_hangs_in_closing(
+async def test_serial_line_does_not_wait_for_a_port_that_hangs_on_close(
     port: SlowPort, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     master, slave = os.openpty()

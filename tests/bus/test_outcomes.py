@@ -24,7 +24,7 @@ from tui.bus.tally import Tally
         (0.005, 0.02, 1.2, True),
     ],
 )
-def test_an_answer_is_requested_again_where_it_waited_and_not_where_it_is_long(
+def test_read_is_repeated_if_its_reply_waited_not_if_it_is_long(
     turnaround: float, on_wire: float, lay: float, anew: bool
 ) -> None:
     """A backup at 1200 baud asked for its first long answer again and again, without an end."""
@@ -37,7 +37,7 @@ def test_an_answer_is_requested_again_where_it_waited_and_not_where_it_is_long(
     assert outcomes.waited_for_us(job, result) is anew
 
 
-def test_device_never_polled_silent_or_refusing_are_three_states() -> None:
+def test_not_polled_silent_and_refused_are_distinct_states() -> None:
     devices = Devices(Timing(), mistakable=True)
     expected = Read(1, 0, 1).expectation()
     assert devices.state(1).contact == "not_polled"

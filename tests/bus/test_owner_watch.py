@@ -80,7 +80,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_a_keeper_that_does_not_acknowledge_a_stop_is_killed_after_a_second(bench: Bench) -> None:
+def test_keeper_that_does_not_acknowledge_a_stop_is_killed_after_1_s(bench: Bench) -> None:
     bench.wait(1.0)
     bench.watch.note_stop()
     bench.wait(STOP_HEARD_WITHIN - 0.01)
@@ -89,7 +89,7 @@ def test_a_keeper_that_does_not_acknowledge_a_stop_is_killed_after_a_second(benc
     assert len(bench.process.kills) == 1
 
 
-def test_news_do_not_acknowledge_a_stop(bench: Bench) -> None:
+def test_notices_do_not_acknowledge_a_stop(bench: Bench) -> None:
     bench.watch.note_stop()
     bench.watch.note_stop()
     for message in (Notified(1, "a"), Alive(), Notified(1, "b")):
@@ -101,7 +101,7 @@ def test_news_do_not_acknowledge_a_stop(bench: Bench) -> None:
     assert bench.process.kills
 
 
-def test_a_keeper_that_acknowledges_its_stops_is_let_live(bench: Bench) -> None:
+def test_keeper_that_acknowledges_stops_is_not_killed(bench: Bench) -> None:
     for _ in range(20):
         bench.watch.note_stop()
         bench.wait(0.5)
@@ -110,9 +110,7 @@ def test_a_keeper_that_acknowledges_its_stops_is_let_live(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("attached", [True, False])
-def test_a_keeper_that_says_nothing_is_killed_after_three_seconds(
-    bench: Bench, attached: bool
-) -> None:
+def test_silent_keeper_is_killed_after_3_s(bench: Bench, attached: bool) -> None:
     bench.wait(SILENT_OWNER - 0.01, attached=attached)
     assert not bench.watch.frozen
     bench.wait(HEARD_WITHIN - SILENT_OWNER, attached=attached)
@@ -123,7 +121,7 @@ def test_a_keeper_that_says_nothing_is_killed_after_three_seconds(
     assert bench.watch.remedy == ""
 
 
-def test_stop_to_a_keeper_that_answers_no_greeting_kills_it_after_two_seconds(
+def test_keeper_that_ignores_the_greeting_of_a_stop_is_killed_after_2_s(
     bench: Bench,
 ) -> None:
     """It may be at work for a second to make way; stops are acknowledged after that only."""
@@ -134,7 +132,7 @@ def test_stop_to_a_keeper_that_answers_no_greeting_kills_it_after_two_seconds(
     assert len(bench.process.kills) == 1
 
 
-def test_a_program_that_stood_still_itself_kills_nothing(bench: Bench) -> None:
+def test_program_that_was_suspended_kills_no_keeper(bench: Bench) -> None:
     """What the keeper has said meanwhile is yet to be read."""
     bench.watch.note_stop()
     bench.wait(60.0, awake=False)
@@ -142,7 +140,7 @@ def test_a_program_that_stood_still_itself_kills_nothing(bench: Bench) -> None:
     assert not bench.process.kills
 
 
-def test_a_keeper_that_does_not_die_is_reported(bench: Bench) -> None:
+def test_keeper_that_survives_the_kill_is_reported(bench: Bench) -> None:
     bench.wait(HEARD_WITHIN + 0.1)
     assert len(bench.process.kills) == 1
     bench.wait(DIES_WITHIN - 0.2)
@@ -154,7 +152,7 @@ def test_a_keeper_that_does_not_die_is_reported(bench: Bench) -> None:
     assert (bench.watch.frozen, bench.watch.remedy) == (False, "")
 
 
-def test_a_keeper_that_cannot_be_killed_is_reported_immediately(bench: Bench) -> None:
+def test_keeper_that_cannot_be_killed_is_reported_immediately(bench: Bench) -> None:
     bench.process.may = False
     bench.watch.note_stop()
     bench.wait(STOP_HEARD_WITHIN + 0.1)
@@ -164,7 +162,7 @@ def test_a_keeper_that_cannot_be_killed_is_reported_immediately(bench: Bench) ->
     assert len(bench.process.kills) == 1
 
 
-def test_stops_are_what_a_keeper_acknowledges() -> None:
+def test_is_stop_is_true_for_stop_messages_only() -> None:
     def asking(priority: Priority) -> Asking:
         return Asking(1, "WriteOne", {}, priority, False, 0.0, 0, 0.0)
 
@@ -200,7 +198,7 @@ def owner(pid: int, name: str = KEEPER, version: int = VERSION) -> Owner:
     return Owner(version, Program("k", name, pid), "socket")
 
 
-def test_the_process_at_the_other_end_is_killed(listener: Any) -> None:
+def test_kill_ends_the_process_at_the_other_end(listener: Any) -> None:
     process, connection = listener
     os.kill(process.pid, signal.SIGSTOP)
     keeper = KeeperProcess(owner(process.pid), connection)
@@ -212,7 +210,7 @@ def test_the_process_at_the_other_end_is_killed(listener: Any) -> None:
     keeper.close()
 
 
-def test_nothing_but_a_known_keeper_at_the_other_end_is_killed(listener: Any) -> None:
+def test_only_a_known_keeper_is_killed(listener: Any) -> None:
     process, connection = listener
     for item in (owner(process.pid, name="panel"), owner(process.pid, version=VERSION + 1)):
         found = KeeperProcess(item, connection)
@@ -228,7 +226,7 @@ def test_nothing_but_a_known_keeper_at_the_other_end_is_killed(listener: Any) ->
     assert process.poll() is None
 
 
-def test_keeper_of_another_container_is_named_as_such(
+def test_keeper_in_another_container_is_named_as_such(
     listener: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     process, connection = listener
@@ -242,7 +240,7 @@ def test_keeper_of_another_container_is_named_as_such(
     assert process.poll() is None
 
 
-def test_keeper_without_a_known_peer_is_ended_by_hand(
+def test_keeper_without_a_known_peer_is_not_killed(
     listener: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     process, connection = listener
@@ -252,7 +250,7 @@ def test_keeper_without_a_known_peer_is_ended_by_hand(
     assert found.remedy == BY_HAND.format(pid=process.pid)
 
 
-def test_a_number_that_another_process_has_got_is_not_killed(listener: Any) -> None:
+def test_reused_pid_is_not_killed(listener: Any) -> None:
     process, connection = listener
     process.kill()
     with suppress(ConnectionResetError):
@@ -261,7 +259,7 @@ def test_a_number_that_another_process_has_got_is_not_killed(listener: Any) -> N
     assert not KeeperProcess(owner(process.pid), connection).kill()
 
 
-def test_a_keeper_of_another_user_is_left_to_that_user(
+def test_keeper_of_another_user_is_not_killed(
     listener: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     process, connection = listener

@@ -9,14 +9,16 @@ from hypothesis import strategies as st
 from tui.bus.schedule.pace import SHARE, Pace
 
 
-def test_a_line_with_time_to_spare_keeps_every_wish() -> None:
+def test_line_with_spare_time_keeps_every_period() -> None:
     pace = Pace()
     assert pace.claim("a", 1, 0.02, 0.1) == 0.1
     assert pace.claim("b", 1, 0.05, 0.1) == 0.1
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.05, 10.0)), min_size=1, max_size=31))
-def test_all_are_slowed_down_evenly_until_they_fit(wishes: list[tuple[float, float]]) -> None:
+def test_periods_are_lengthened_by_one_factor_until_they_fit(
+    wishes: list[tuple[float, float]],
+) -> None:
     pace = Pace()
     for who, (seconds, period) in enumerate(wishes):
         pace.claim(who, who, seconds, period)
@@ -28,7 +30,7 @@ def test_all_are_slowed_down_evenly_until_they_fit(wishes: list[tuple[float, flo
     assert factors[0] == 1.0 or load == pytest.approx(SHARE)
 
 
-def test_detached_client_gives_time_back() -> None:
+def test_detached_client_releases_its_time() -> None:
     pace = Pace()
     pace.claim("a", 1, 0.09, 0.1)
     assert pace.claim("b", 1, 0.09, 0.1) == pytest.approx(0.2)
@@ -37,7 +39,7 @@ def test_detached_client_gives_time_back() -> None:
     assert pace.claim("b", 1, 0.09, 0.1) == pytest.approx(0.1)
 
 
-def test_read_of_two_programs_is_sent_once() -> None:
+def test_same_read_of_two_programs_is_sent_once() -> None:
     pace = Pace()
     pace.others = {1: 0.8}
     assert pace.claim("a", 1, 0.08, 0.1) == pytest.approx(0.1)

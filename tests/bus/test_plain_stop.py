@@ -78,7 +78,7 @@ def give(lines: SharedLines, form: bytes) -> bytes:
     return b""
 
 
-def test_plain_stop_head_as_a_length_exceeds_every_message() -> None:
+def test_plain_stop_head_is_not_a_message_length() -> None:
     assert int.from_bytes(STOP_HEAD, "big") > LONGEST_MESSAGE
 
 
@@ -129,7 +129,7 @@ async def test_plain_stop_mutated_returns_its_devices_or_raises() -> None:
     assert refused > 1000
 
 
-async def test_plain_stop_reaches_every_program_as_from_one_that_is_not_attached(
+async def test_plain_stop_reaches_every_program_as_from_an_unattached_one(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -164,7 +164,7 @@ async def test_plain_stop_of_all_stops_the_known_devices(share: Share) -> None:
         assert devices == tuple(range(1, 10))
 
 
-async def test_plain_stops_each_count_and_leave_no_names_behind(share: Share) -> None:
+async def test_plain_stops_each_count_and_keep_few_names(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
@@ -211,7 +211,7 @@ async def test_plain_stop_of_another_user_is_refused(
         assert len(heard) == 1
 
 
-async def test_a_client_stops_by_a_connection_of_its_own(share: Share) -> None:
+async def test_client_stops_by_a_separate_connection(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, client = lines.open("panel"), lines.open("run")
@@ -225,7 +225,7 @@ async def test_a_client_stops_by_a_connection_of_its_own(share: Share) -> None:
         eventually(lambda: [pair[0] for pair in heard] == [(1, 3)])
 
 
-async def test_the_holder_of_a_line_has_nobody_else_to_stop_directly(share: Share) -> None:
+async def test_holder_sends_no_direct_stop(share: Share) -> None:
     with PtyPeer(honest) as peer:
         owner = share(peer.path).open("panel")
         await owner.read(1, 100)
@@ -234,7 +234,7 @@ async def test_the_holder_of_a_line_has_nobody_else_to_stop_directly(share: Shar
         assert owner.facts.stops.plain == {}
 
 
-async def test_a_stop_that_nobody_takes_is_no_stop(tmp_path: Path) -> None:
+async def test_plain_stop_without_an_acknowledgment_raises(tmp_path: Path) -> None:
     """The connection ends without the answer: the keeper has died, or does not know the program."""
 
     async def turns_away(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -13,7 +13,7 @@ from .conftest import OpenLine, Share
 from .peer import PtyPeer, eventually, honest
 
 
-async def test_only_a_stop_asks_a_device_that_is_left_alone(open_line: OpenLine) -> None:
+async def test_paused_device_is_sent_stops_only(open_line: OpenLine) -> None:
     with PtyPeer(honest) as peer:
         line = open_line(peer.path)
         line.facts.pause_polling(1, "It is being proved.")
@@ -30,7 +30,7 @@ async def test_only_a_stop_asks_a_device_that_is_left_alone(open_line: OpenLine)
 
 
 @pytest.mark.parametrize("stopper", ["panel", "prove", "watch"])
-async def test_a_stop_ends_what_a_device_is_left_alone_for(share: Share, stopper: str) -> None:
+async def test_stop_ends_the_pause_of_polling(share: Share, stopper: str) -> None:
     """Whoever stops it looks at it until it stands, and does not wait for who leaves it alone."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)

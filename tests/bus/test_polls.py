@@ -105,7 +105,7 @@ def polled(peer: PtyPeer) -> list[int]:
     return [int.from_bytes(request[2:4], "big") for request in peer.requests]
 
 
-async def test_subscriber_gets_each_cycle_and_nothing_else_is_on_the_wire(share: Share) -> None:
+async def test_subscriber_gets_each_cycle_and_only_its_reads_are_sent(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("keeper")
@@ -122,7 +122,7 @@ async def test_subscriber_gets_each_cycle_and_nothing_else_is_on_the_wire(share:
         assert all(turn.begun <= turn.ended for turn in turns)
 
 
-async def test_two_subscribers_of_one_read_get_it_once_from_the_wire(share: Share) -> None:
+async def test_two_subscribers_share_one_read(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("keeper")
@@ -135,7 +135,7 @@ async def test_two_subscribers_of_one_read_get_it_once_from_the_wire(share: Shar
         assert polled(peer) == [100]
 
 
-async def test_subscriber_is_never_given_one_reply_twice(share: Share) -> None:
+async def test_subscriber_never_gets_a_reply_twice(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("keeper")
@@ -149,7 +149,7 @@ async def test_subscriber_is_never_given_one_reply_twice(share: Share) -> None:
         assert len(peer.requests) < len(watch.turns) + len(panel.turns)
 
 
-async def test_errors_come_by_their_kind_and_a_refusal_ends_no_cycle(share: Share) -> None:
+async def test_errors_keep_their_kind_and_a_refusal_does_not_end_the_cycle(share: Share) -> None:
     def answers(request: bytes, _count: int) -> Sequence[Step]:
         if request[0] == 2:
             return []
@@ -173,7 +173,7 @@ async def test_errors_come_by_their_kind_and_a_refusal_ends_no_cycle(share: Shar
         assert 9 not in polled(peer)
 
 
-async def test_the_end_of_a_subscription_or_of_its_program_ends_the_polling(share: Share) -> None:
+async def test_polling_ends_with_its_subscription_or_program(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch, panel = (lines.open(name) for name in ("keeper", "watch", "panel"))
@@ -190,7 +190,7 @@ async def test_the_end_of_a_subscription_or_of_its_program_ends_the_polling(shar
         assert len(peer.requests) == before
 
 
-async def test_the_plan_of_a_program_that_is_killed_or_frozen_ends(share: Share) -> None:
+async def test_plan_of_a_killed_or_frozen_program_ends(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch = lines.open("keeper"), lines.open("watch")
@@ -205,7 +205,7 @@ async def test_the_plan_of_a_program_that_is_killed_or_frozen_ends(share: Share)
             eventually(lambda: not served(owner)._served)
 
 
-async def test_subscriber_that_takes_nothing_is_polled_for_no_more_until_it_does(
+async def test_polling_pauses_while_the_subscriber_reads_nothing(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -241,7 +241,7 @@ class FullWriter:
         """Take it to nobody."""
 
 
-async def test_commands_and_stops_go_between_the_requests_of_a_cycle(share: Share) -> None:
+async def test_commands_and_stops_are_sent_between_requests_of_a_cycle(share: Share) -> None:
     with PtyPeer(slow) as peer:
         lines = share(peer.path)
         owner, watch = lines.open("keeper"), lines.open("watch")
@@ -258,7 +258,7 @@ async def test_commands_and_stops_go_between_the_requests_of_a_cycle(share: Shar
         assert len(taken(turn, *many)) == len(many)
 
 
-async def test_a_plan_beyond_the_limits_of_its_device_is_refused(share: Share) -> None:
+async def test_plan_beyond_the_limits_of_its_device_is_refused(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("keeper")
@@ -283,7 +283,7 @@ class Stub:
         self.say = heard.append
 
 
-async def test_the_owner_refuses_a_plan_beyond_the_limits_by_itself(share: Share) -> None:
+async def test_owner_checks_the_limits_of_a_plan(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("keeper")
@@ -314,7 +314,7 @@ async def test_the_owner_refuses_a_plan_beyond_the_limits_by_itself(share: Share
         assert last.text == f"Not polled: more than {MOST_PLANNED} reads."
 
 
-async def test_the_owner_tells_over_the_socket_why_a_plan_is_refused(share: Share) -> None:
+async def test_refused_plan_has_its_reason_over_the_socket(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("keeper")
@@ -341,7 +341,7 @@ def refused_plan(lines: SharedLines) -> PolledReply:
     ],
     ids=["a turn too many", "a reply too long", "another function"],
 )
-async def test_cycles_that_are_not_those_of_the_plan_end_the_connection(message: Polled) -> None:
+async def test_cycle_that_does_not_match_its_plan_ends_the_connection(message: Polled) -> None:
     device = SimpleNamespace(limits=WIDE, heard=None)
     inside = cast(Any, SimpleNamespace(devices={1: device}))
     plans = PollsSubmitted(inside, lambda _: None, lambda _device, _limits: None, lambda: True)
@@ -355,7 +355,7 @@ async def test_cycles_that_are_not_those_of_the_plan_end_the_connection(message:
     plans.hear(Polled(2, 0, 5.0, ()))  # one that has ended
 
 
-async def test_an_owner_that_ends_loses_the_plan_and_the_next_one_takes_it(share: Share) -> None:
+async def test_next_owner_takes_the_plan_over(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch, panel = (lines.open(name) for name in ("keeper", "watch", "panel"))
@@ -370,7 +370,7 @@ async def test_an_owner_that_ends_loses_the_plan_and_the_next_one_takes_it(share
         await asyncio.to_thread(Subscriber(client, plan(reads(200))).await_turns, 2)
 
 
-async def test_an_owner_that_does_not_answer_loses_the_plan(share: Share) -> None:
+async def test_owner_that_does_not_answer_loses_the_plan(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, watch = lines.open("keeper"), lines.open("watch")
@@ -391,7 +391,7 @@ def costs(owner: Line, count: int) -> float:
     return float(served(owner)._share(1, {PlannedRead(0, count): 1.0}))
 
 
-async def test_a_full_line_lengthens_the_periods_of_all_programs_by_one_factor(
+async def test_full_line_lengthens_all_periods_by_one_factor(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -434,7 +434,7 @@ async def test_programs_with_different_reads_of_a_device_are_slowed_down_evenly(
         assert owner.pace.stretch > 2
 
 
-async def test_a_program_that_leaves_gives_the_time_back_that_it_wished_for(share: Share) -> None:
+async def test_program_that_leaves_releases_its_time(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         _, watch, panel = (lines.open(name) for name in ("keeper", "watch", "panel"))
@@ -445,7 +445,7 @@ async def test_a_program_that_leaves_gives_the_time_back_that_it_wished_for(shar
         eventually(lambda: watch.pace.stretch == 1.0)
 
 
-def test_rates_of_a_plan_count_each_read_once_for_each_turn_that_has_it() -> None:
+def test_rates_count_a_read_once_per_turn() -> None:
     fast, slow_one = reads(100), reads(100, 300)
     wanted = plan(fast, fast, fast, slow_one, period=0.5)
     assert wanted.rates == {PlannedRead(100, 1): pytest.approx(2.0), PlannedRead(300, 1): 0.5}
@@ -454,7 +454,7 @@ def test_rates_of_a_plan_count_each_read_once_for_each_turn_that_has_it() -> Non
 # The cycle that has come
 
 
-def test_a_reply_is_taken_once_and_only_if_it_is_newer() -> None:
+def test_reply_is_accepted_once_and_only_if_newer() -> None:
     first, second, third = reads(100, 200, 300)
     turn = PolledTurn(0, 1.0, {first: Reply((1,), 5.0), second: NoAnswer(1, 3, 200)})
     assert turn.ended == 5.0

@@ -35,7 +35,7 @@ def counting(*readings: PortErrors) -> Iterator[PortErrors]:
         yield readings[-1]
 
 
-def test_the_systems_table_is_read_in_its_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_counts_are_read_in_the_order_of_the_system(monkeypatch: pytest.MonkeyPatch) -> None:
     def tells(_fd: int, _asks: int, counts: list[int]) -> int:
         for place in range(len(counts)):
             counts[place] = place
@@ -46,7 +46,7 @@ def test_the_systems_table_is_read_in_its_order(monkeypatch: pytest.MonkeyPatch)
     assert port_errors(0) == PortErrors(framing=6, parity=8, breaks=9, overruns=7 + 10)
 
 
-def test_a_pseudo_terminal_tells_nothing() -> None:
+def test_pseudo_terminal_has_no_error_counts() -> None:
     master, slave = pty.openpty()
     try:
         assert port_errors(slave) is None
@@ -55,7 +55,7 @@ def test_a_pseudo_terminal_tells_nothing() -> None:
         os.close(slave)
 
 
-def test_counts_begin_anew_with_the_driver() -> None:
+def test_counts_restart_with_the_driver() -> None:
     before, now = PortErrors(5, 0, 2, 0), PortErrors(9, 1, 2, 0)
     assert now.since(before) == PortErrors(4, 1, 0, 0)
     assert PortErrors(1, 0, 0, 0).since(before) == PortErrors(1, 0, 0, 0)
@@ -90,11 +90,13 @@ async def test_added_request_is_counted_if_a_reply_fails(answered: bool) -> None
 # What is seen of a port without opening it
 
 
-def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_port_is_seen_as_missing(tmp_path: Path) -> None:
     assert see_port(str(tmp_path / "none")).there is False
 
 
-def test_a_port_with_its_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_port_without_permission_names_its_group(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "port"
     path.touch(mode=0o660)
     path.chmod(0o660)
@@ -107,7 +109,7 @@ def test_a_port_with_its_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert see_port(str(path)).group == ""
 
 
-def test_a_user_who_has_not_logged_in_since(
+def test_group_membership_that_needs_a_new_login_is_seen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import grp
@@ -125,7 +127,7 @@ def test_a_user_who_has_not_logged_in_since(
     assert (seen.group, seen.in_group, seen.user) == ("wires", True, user)
 
 
-def test_the_latency_of_an_adapter(adapters: Adapters) -> None:
+def test_latency_of_an_adapter_is_read(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1-1", serial="A1")
     assert latency_of(port) is None
     device = adapters.system / "ttyUSB0" / "device"

@@ -15,7 +15,7 @@ __all__ = ["adapters"]
 PORT_PATH = "/dev/ttyUSB0"
 
 
-def test_an_adapter_with_a_serial_number_keeps_its_name_in_any_socket(adapters: Adapters) -> None:
+def test_adapter_with_a_serial_number_keeps_its_name_in_any_socket(adapters: Adapters) -> None:
     first = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="A50285BI"))
     assert first.path == str(adapters.links / "by-id" / "usb-FTDI_6001_A50285BI-if00-port0")
     assert (first.adapter, first.lasting, first.shared) == ("0403:6001 A50285BI", True, False)
@@ -24,13 +24,13 @@ def test_an_adapter_with_a_serial_number_keeps_its_name_in_any_socket(adapters: 
     assert lasting_name(first.path) == first
 
 
-def test_an_adapter_without_a_serial_number_is_known_by_its_socket(adapters: Adapters) -> None:
+def test_adapter_without_a_serial_number_is_known_by_its_socket(adapters: Adapters) -> None:
     found = lasting_name(adapters.plug("ttyUSB0", "1.1"))
     assert found.path == str(adapters.links / "by-path" / "pci-usb-1.1-port0")
     assert (found.adapter, found.shared) == ("0403:6001", True)
 
 
-def test_two_of_one_make_share_their_by_id_name_and_are_distinguished(adapters: Adapters) -> None:
+def test_adapters_with_the_same_by_id_name_are_distinguished(adapters: Adapters) -> None:
     name = lasting_name(adapters.plug("ttyUSB0", "1.1"))
     two = lasting_name(adapters.plug("ttyUSB1", "1.2"))
     assert name.path != two.path
@@ -39,7 +39,7 @@ def test_two_of_one_make_share_their_by_id_name_and_are_distinguished(adapters: 
     assert lasting_name(str(shared)) == two
 
 
-def test_two_with_one_serial_number_are_distinguished(adapters: Adapters) -> None:
+def test_adapters_with_the_same_serial_number_are_distinguished(adapters: Adapters) -> None:
     port_name = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="0001"))
     assert not port_name.shared
     two = adapters.plug("ttyUSB1", "1.2", serial="0001")
@@ -50,7 +50,7 @@ def test_two_with_one_serial_number_are_distinguished(adapters: Adapters) -> Non
     assert all(name.shared for name in names)
 
 
-def test_the_ports_of_one_adapter_are_no_twins(adapters: Adapters) -> None:
+def test_ports_of_one_adapter_are_not_duplicates(adapters: Adapters) -> None:
     text = adapters.plug("ttyUSB0", "1.1", serial="FT4232")
     interface = adapters.system / "ttyUSB1"
     interface.mkdir()
@@ -58,7 +58,7 @@ def test_the_ports_of_one_adapter_are_no_twins(adapters: Adapters) -> None:
     assert not lasting_name(text).shared
 
 
-def test_a_serial_number_with_signs_that_a_link_cannot_have(adapters: Adapters) -> None:
+def test_serial_number_with_invalid_characters_is_found(adapters: Adapters) -> None:
     assert "by-id" in lasting_name(adapters.plug("ttyUSB0", "1.1", serial="A 5")).path
 
 
@@ -72,7 +72,7 @@ def test_port_without_usb_has_its_own_path(adapters: Adapters) -> None:
     assert lasting_name(str(link)).path == port
 
 
-def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> None:
+def test_machine_without_device_folders_names_no_adapter(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     nowhere = adapters.dev / "nowhere"
     assert lasting_name(port, nowhere, nowhere).path == port
@@ -96,7 +96,7 @@ def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> 
         ),
     ],
 )
-def test_a_port_that_this_user_may_not_use_names_its_group(
+def test_port_without_permission_names_its_group(
     seen: PortSeen, output: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.transport.ports.see_port", lambda _: seen)

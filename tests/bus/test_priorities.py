@@ -64,7 +64,7 @@ async def test_urgent_requests_overtake(
 
 
 @pytest.mark.parametrize("function", [6, 16, 23])
-async def test_a_write_that_became_forbidden_while_it_waited_is_not_sent(
+async def test_write_forbidden_while_it_waits_is_not_sent(
     open_line: OpenLine, function: int
 ) -> None:
     with PtyPeer(slow) as peer:
@@ -107,7 +107,7 @@ async def test_stop_waits_for_the_exchange_in_flight_only(open_line: OpenLine) -
             task.cancel()
 
 
-async def test_stop_is_sent_again_although_its_first_answer_may_come_late(
+async def test_stop_is_repeated_although_its_reply_may_be_late(
     open_line: OpenLine,
 ) -> None:
     def second(request: bytes, count: int) -> Sequence[Step]:
@@ -129,7 +129,7 @@ async def test_stop_is_sent_again_although_its_first_answer_may_come_late(
         assert len(peer.requests) == 4
 
 
-async def test_plain_client_stops_the_line_for_a_dead_drive() -> None:
+async def test_plain_client_blocks_the_line_for_a_dead_drive() -> None:
     with PtyPeer(one_dead) as peer:
         async with plain_serial(peer.path, timeout=0.2, retries=3) as client:
             dead = asyncio.create_task(
@@ -142,7 +142,7 @@ async def test_plain_client_stops_the_line_for_a_dead_drive() -> None:
             assert await dead is None
 
 
-async def test_dead_drive_costs_one_time_out_a_back_off_period(open_line: OpenLine) -> None:
+async def test_dead_drive_costs_one_timeout_per_back_off_period(open_line: OpenLine) -> None:
     timing = Timing(first_timeout=0.2, min_timeout=0.2, back_off_first=60.0, late_reply=0.3)
     with PtyPeer(one_dead) as peer:
         line = open_line(peer.path, timing)
@@ -163,7 +163,7 @@ async def test_dead_drive_costs_one_time_out_a_back_off_period(open_line: OpenLi
         assert line.device_state(8).answers is None
 
 
-async def test_operator_reaches_a_drive_that_polls_leave_alone(open_line: OpenLine) -> None:
+async def test_operator_request_is_sent_during_the_back_off(open_line: OpenLine) -> None:
     timing = Timing(first_timeout=0.2, min_timeout=0.2, back_off_first=60.0, late_reply=0.3)
     with PtyPeer(one_dead) as peer:
         line = open_line(peer.path, timing)
@@ -176,7 +176,7 @@ async def test_operator_reaches_a_drive_that_polls_leave_alone(open_line: OpenLi
         assert (await line.read(DEAD, 3)).words == (3,)
 
 
-async def test_polls_go_on_by_themselves_after_the_back_off(open_line: OpenLine) -> None:
+async def test_polls_resume_after_the_back_off(open_line: OpenLine) -> None:
     timing = Timing(first_timeout=0.1, min_timeout=0.1, back_off_first=0.3, late_reply=0.1)
     with PtyPeer(one_dead) as peer:
         line = open_line(peer.path, timing)
@@ -193,7 +193,7 @@ async def test_polls_go_on_by_themselves_after_the_back_off(open_line: OpenLine)
         assert (await line.read(DEAD, 2)).words == (2,)
 
 
-async def test_full_queue_refuses_polls_but_no_stop(open_line: OpenLine) -> None:
+async def test_full_queue_refuses_polls_but_not_stops(open_line: OpenLine) -> None:
     def very_slow(request: bytes, count: int) -> Sequence[Step]:
         return [1.0 if count == 0 else 0.0, reply(request)]
 
@@ -216,7 +216,7 @@ async def test_full_queue_refuses_polls_but_no_stop(open_line: OpenLine) -> None
         assert peer.requests[1][3] == 99
 
 
-async def test_read_only_line_refuses_everything_that_changes(open_line: OpenLine) -> None:
+async def test_read_only_line_refuses_all_changes(open_line: OpenLine) -> None:
     from .conftest import WIDE
 
     with PtyPeer(honest) as peer:

@@ -36,7 +36,7 @@ class Clock:
         return self.now
 
 
-def test_share_is_the_time_that_a_program_had_of_late() -> None:
+def test_share_is_the_recent_time_of_a_program() -> None:
     clock = Clock()
     use = ProgramUse(clock)
     for step in range(600):
@@ -59,7 +59,7 @@ def test_use_is_bounded_to_the_programs_of_a_message() -> None:
     assert f"program {3 * MOST_PROGRAMS - 1}" in use.shares
 
 
-def test_a_request_of_no_program_leaves_the_counters_a_message() -> None:
+def test_counters_with_an_unknown_program_can_be_encoded() -> None:
     use = ProgramUse(Clock())
     use.count("", 5.0)
     use.count("a", 5.0)
@@ -68,7 +68,7 @@ def test_a_request_of_no_program_leaves_the_counters_a_message() -> None:
     assert list(again.programs) == ["a"]
 
 
-def test_answer_to_a_look_names_programs_and_not_the_keeper() -> None:
+def test_look_answer_names_programs_but_not_the_keeper() -> None:
     programs = [Program("k", KEEPER, 1), Program("a", "watch\n", 3), Program("b", "serve", 2)]
     minute = LastMinute(good=9, lost=1)
     answer = look_answer(programs, {"b": 0.5, "k": 0.1}, minute)
@@ -77,7 +77,7 @@ def test_answer_to_a_look_names_programs_and_not_the_keeper() -> None:
     assert found.minute == minute
 
 
-async def test_attached_programs_and_a_look_have_the_shares(share: Share) -> None:
+async def test_attached_programs_and_a_look_get_the_shares(share: Share) -> None:
     with PtyPeer(slow) as peer:
         lines = share(peer.path)
         owner, client = lines.open("serve"), lines.open("panel")

@@ -27,7 +27,7 @@ def now(_job: Job) -> float:
     return 0.0
 
 
-def test_order() -> None:
+def test_jobs_are_taken_by_priority_then_age() -> None:
     queue = JobQueue(20)
     jobs = [
         job(priority) for priority in (4, 3, 3, 2, 1, 0, 2) for priority in [Priority(priority)]
@@ -40,7 +40,9 @@ def test_order() -> None:
 
 
 @pytest.mark.parametrize(("between", "first"), [(0x000F, True), (None, False)])
-def test_stop_after_another_command_is_a_first_one_again(between: int | None, first: bool) -> None:
+def test_stop_after_another_command_counts_as_a_first_stop(
+    between: int | None, first: bool
+) -> None:
     queue = JobQueue(20)
 
     def send(item: Job) -> None:
@@ -62,7 +64,7 @@ def stop_job(device: int) -> Job:
     return Job(WriteOne(device, 8501, 0x0007), Priority.STOP, WIDE)
 
 
-def test_waiting_job_is_passed_by() -> None:
+def test_job_that_is_not_ready_is_skipped() -> None:
     queue = JobQueue(20)
     first, second = job(Priority.STOP, 1), job(Priority.POLL, 2)
     queue.put(first)
@@ -74,7 +76,7 @@ def test_waiting_job_is_passed_by() -> None:
     assert queue.take(ready.__getitem__, 5.0) == (first, None)
 
 
-def test_job_that_is_sent_again_keeps_its_place() -> None:
+def test_repeated_job_keeps_its_place() -> None:
     queue = JobQueue(20)
     first, second = job(Priority.POLL), job(Priority.POLL)
     queue.put(first)
@@ -126,7 +128,7 @@ def devices() -> Devices:
     return Devices(TIMING, mistakable=True)
 
 
-def test_time_out_follows_the_turnaround(devices: Devices) -> None:
+def test_timeout_follows_the_turnaround(devices: Devices) -> None:
     poll = Priority.POLL
     assert devices.time_out(1, 3, poll) == 1.0
     devices.answered(1, EXPECTED, 0.05, 10.0)
@@ -142,7 +144,7 @@ def test_time_out_follows_the_turnaround(devices: Devices) -> None:
     assert devices.state(1).turnaround == 0.9
 
 
-def test_time_out_grows_with_failures(devices: Devices) -> None:
+def test_timeout_grows_with_failures(devices: Devices) -> None:
     devices.answered(1, EXPECTED, 0.01, 10.0)
     outs = []
     for _ in range(5):
@@ -151,7 +153,7 @@ def test_time_out_grows_with_failures(devices: Devices) -> None:
     assert outs == pytest.approx([0.1, 0.1, 0.1, 0.2, 0.4])
 
 
-def test_known_drive_is_polled_again_at_once_until_three_replies_are_missed(
+def test_known_drive_is_polled_without_a_pause_until_three_misses(
     devices: Devices,
 ) -> None:
     devices.silent(2, EXPECTED, 10.0, 10.1)
@@ -168,7 +170,7 @@ def test_known_drive_is_polled_again_at_once_until_three_replies_are_missed(
     assert devices.backed_off(1, Priority.POLL, 12.1) is None
 
 
-def test_dead_drive_takes_no_more_of_the_line_than_with_a_pause_after_each_miss() -> None:
+def test_dead_drive_takes_no_more_time_than_with_a_pause_after_each_miss() -> None:
     """A minute of polls, as often as they are let through."""
     timing = Timing()
     devices = Devices(timing, mistakable=True)
@@ -188,7 +190,7 @@ def test_dead_drive_takes_no_more_of_the_line_than_with_a_pause_after_each_miss(
     assert spent <= before + 1e-9
 
 
-def test_repeat_waits_for_no_earlier_try_of_its_own(devices: Devices) -> None:
+def test_repeat_does_not_wait_for_its_own_earlier_try(devices: Devices) -> None:
     pdu = READ.pdu()
     devices.silent(1, EXPECTED, 9.0, 10.0, pdu)
     ask = (1, EXPECTED, Priority.POLL, 10.0)
@@ -201,7 +203,7 @@ def test_repeat_waits_for_no_earlier_try_of_its_own(devices: Devices) -> None:
     assert devices.doubts(1, EXPECTED, 10.0, (pdu, 9.5)) == (False, 1)
 
 
-def test_scan_waits_shortly_for_unknown_devices_only(devices: Devices) -> None:
+def test_scan_waits_briefly_for_unknown_devices_only(devices: Devices) -> None:
     background = Priority.BACKGROUND
     assert devices.time_out(1, 3, background) == 0.3
     devices.answered(1, EXPECTED, 0.01, 10.0)
@@ -218,14 +220,14 @@ def test_repeated_request_waits_longer(devices: Devices) -> None:
     assert devices.backed_off(1, Priority.PATIENT, 10.0) is None
 
 
-def test_caller_sets_wait_for_stranger(devices: Devices) -> None:
+def test_caller_sets_the_wait_for_an_unknown_device(devices: Devices) -> None:
     background = Priority.BACKGROUND
     assert devices.time_out(1, 3, background, 0.01) == 0.01
     assert devices.time_out(1, 3, background, 5.0) == 1.0, "no longer than the longest"
     assert devices.time_out(1, 3, background, float("nan")) == 0.3
 
 
-def test_an_address_that_never_answered_owes_no_reply(devices: Devices) -> None:
+def test_address_that_never_answered_has_no_late_reply(devices: Devices) -> None:
     devices.silent(1, EXPECTED, 10.0, 11.0)
     assert devices.last_reply_by(11.0) == 11.0
     devices.answered(2, EXPECTED, 0.01, 10.0)
@@ -233,7 +235,7 @@ def test_an_address_that_never_answered_owes_no_reply(devices: Devices) -> None:
     assert devices.last_reply_by(11.0) == 12.0
 
 
-def test_silent_device_is_left_alone_by_polls(devices: Devices) -> None:
+def test_silent_device_is_not_polled_during_the_back_off(devices: Devices) -> None:
     devices.silent(1, EXPECTED, 9.0, 10.0)
     assert devices.backed_off(1, Priority.POLL, 10.0) == 1.0
     assert devices.backed_off(1, Priority.POLL, 11.0) is None
@@ -259,7 +261,7 @@ def test_silent_device_is_left_alone_by_polls(devices: Devices) -> None:
         (Read(2, 5, 1), False),
     ],
 )
-def test_only_what_could_be_mistaken_waits(
+def test_only_requests_with_the_same_reply_form_wait(
     devices: Devices, request_: Request, waits: bool
 ) -> None:
     devices.silent(1, EXPECTED, 9.0, 10.0)
@@ -269,7 +271,7 @@ def test_only_what_could_be_mistaken_waits(
     assert devices.not_before(*wanted, Priority.OPERATOR_READ, 11.0) == 0.0
 
 
-def test_late_reply_ends_the_wait_and_is_remembered(devices: Devices) -> None:
+def test_late_reply_ends_the_wait_and_sets_the_lateness(devices: Devices) -> None:
     devices.silent(1, EXPECTED, 9.0, 10.0)
     assert devices.stray(LATE, 13.0)
     assert devices.not_before(1, EXPECTED, Priority.POLL, 13.0) == 0.0
@@ -280,14 +282,14 @@ def test_late_reply_ends_the_wait_and_is_remembered(devices: Devices) -> None:
     assert devices.not_before(2, EXPECTED, Priority.STOP, 20.0) == 0.0
 
 
-def test_nothing_is_mistaken_over_modbus_tcp() -> None:
+def test_modbus_tcp_request_never_waits_for_a_late_reply() -> None:
     devices = Devices(TIMING, mistakable=False)
     devices.silent(1, EXPECTED, 9.0, 10.0)
     assert devices.not_before(1, EXPECTED, Priority.POLL, 10.0) == 0.0
 
 
 @pytest.mark.parametrize(("after", "memory"), [(0.04, LONG_MEMORY), (0.2, SHORT_MEMORY)])
-def test_reply_that_came_twice_slows_the_same_request(
+def test_repeated_reply_delays_the_same_request(
     devices: Devices, after: float, memory: float
 ) -> None:
     devices.answered(1, EXPECTED, 0.01, 10.0)
@@ -308,7 +310,7 @@ def test_reply_that_came_twice_slows_the_same_request(
     assert devices.not_before(1, EXPECTED, Priority.POLL, end) == 0.0
 
 
-def test_copies_that_go_on_are_waited_for_as_long_as_they_come(devices: Devices) -> None:
+def test_request_waits_as_long_as_copies_arrive(devices: Devices) -> None:
     """Only the first one counted, and ten minutes later the next was taken for an answer."""
     for now in range(10, 10 + 3 * int(LONG_MEMORY), 20):
         devices.answered(1, EXPECTED, 0.01, now)
@@ -330,7 +332,7 @@ def test_new_owner_knows_that_line_repeats_replies(devices: Devices) -> None:
     assert waited == pytest.approx(0.004 + TIMING.frame_gap)
 
 
-def test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before(devices: Devices) -> None:
+def test_wait_for_a_copy_exceeds_the_previous_gap(devices: Devices) -> None:
     """An adapter hands over in lumps: a copy was 4 ms behind its reply, the next one 16."""
     devices.answered(1, EXPECTED, 0.01, 10.0)
     assert devices.stray(LATE, 10.004)
@@ -339,7 +341,7 @@ def test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before(devices: Devic
     assert waited == pytest.approx(0.004 + TIMING.frame_gap)
 
 
-def test_quickly_repeated_entries_share_a_line(devices: Devices) -> None:
+def test_repeated_trace_entries_share_a_line(devices: Devices) -> None:
     devices.answered(1, EXPECTED, 0.01, 10.0)
     assert devices.stray(LATE, 10.02)
     other = Read(2, 5, 1).expectation()
@@ -347,7 +349,7 @@ def test_quickly_repeated_entries_share_a_line(devices: Devices) -> None:
     assert devices.not_before(2, other, Priority.POLL, 11.0) == pytest.approx(11.04)
 
 
-def test_a_copy_of_the_reply_before_is_known_by_its_time(devices: Devices) -> None:
+def test_copy_of_the_previous_reply_is_recognized_by_its_time(devices: Devices) -> None:
     requested, reply = Read(1, 5, 1).pdu(), bytes([3, 2, 0, 7])
     for _ in range(5):
         devices.answered(1, EXPECTED, 0.01, 10.0, (requested, reply))
@@ -360,7 +362,7 @@ def test_a_copy_of_the_reply_before_is_known_by_its_time(devices: Devices) -> No
     assert not devices.is_repeat(1, other, bytes([3, 2, 0, 8]), 0.03), "another value"
 
 
-def test_frame_of_nobody_is_unexplained(devices: Devices) -> None:
+def test_frame_without_a_request_is_unexplained(devices: Devices) -> None:
     assert not devices.stray(LATE, 10.0)
     devices.silent(1, WriteOne(1, 5, 1).expectation(), 9.0, 10.0)
     assert not devices.stray(LATE, 10.0)
@@ -377,7 +379,7 @@ def test_frame_of_nobody_is_unexplained(devices: Devices) -> None:
         (Read(2, 5, 1), (True, 0)),
     ],
 )
-def test_doubts_of_a_stop(devices: Devices, request_: Request, doubts: tuple[bool, int]) -> None:
+def test_doubts_about_a_stop(devices: Devices, request_: Request, doubts: tuple[bool, int]) -> None:
     for earlier in (READ, WriteOne(1, 5, 1), WriteMany(1, 5, (7, 8))):
         devices.silent(1, earlier.expectation(), 9.0, 10.0)
     assert devices.doubts(request_.device, request_.expectation(), 10.0) == doubts
@@ -395,7 +397,7 @@ def write(value: int, register: int = 8502, *, replaceable: bool = True) -> Job:
     return Job(request, Priority.OPERATOR_WRITE, WIDE, replaceable=replaceable)
 
 
-def test_a_newer_reference_takes_the_place_of_one_that_waits() -> None:
+def test_newer_reference_replaces_a_waiting_one() -> None:
     queue = JobQueue(20)
     other, first, second = job(Priority.OPERATOR_WRITE), write(300), write(500)
     for each in (first, other, second):
@@ -415,7 +417,7 @@ def test_a_newer_reference_takes_the_place_of_one_that_waits() -> None:
     ],
     ids=["commands", "a reference after a command", "a command between", "another register"],
 )
-def test_nothing_else_is_ever_replaced(older: Job, between: Job | None, newer: Job) -> None:
+def test_only_references_are_replaced(older: Job, between: Job | None, newer: Job) -> None:
     queue = JobQueue(20)
     jobs = [each for each in (older, between, newer) if each is not None]
     for each in jobs:
@@ -423,7 +425,7 @@ def test_nothing_else_is_ever_replaced(older: Job, between: Job | None, newer: J
     assert [queue.take(now, 0.0)[0] for _ in jobs] == jobs
 
 
-def test_a_reference_under_way_is_not_replaced() -> None:
+def test_reference_in_flight_is_not_replaced() -> None:
     queue = JobQueue(20)
     first, second = write(300), write(500)
     queue.put(first)
@@ -433,7 +435,7 @@ def test_a_reference_under_way_is_not_replaced() -> None:
     assert not first.answer.done()
 
 
-def test_a_feed_is_not_held_back_but_skips_what_may_come_late() -> None:
+def test_keep_alive_read_avoids_forms_of_late_replies_without_waiting() -> None:
     devices = Devices(Timing(), mistakable=True)
     request = Read(1, 3201, 1)
     devices.silent(1, request.expectation(), 10.0, 11.0)
@@ -461,7 +463,7 @@ def test_new_owner_knows_late_and_repeated_replies() -> None:
     assert heir.quiet_until > 13.3
 
 
-def test_when_a_device_was_last_heard() -> None:
+def test_time_of_the_last_reply_of_a_device() -> None:
     devices = Devices(Timing(), mistakable=True)
     expectation = Read(1, 3201, 1).expectation()
     assert devices.state(1).heard is None
@@ -474,8 +476,6 @@ def test_when_a_device_was_last_heard() -> None:
     ("priority", "stops"),
     [(Priority.STOP, True), (Priority.FEED, True), (Priority.OPERATOR_WRITE, False)],
 )
-def test_only_writes_up_to_the_repeat_of_a_stop_are_stop_words(
-    priority: Priority, stops: bool
-) -> None:
+def test_writes_until_the_repeat_of_a_stop_are_stop_words(priority: Priority, stops: bool) -> None:
     assert is_stop_word(Job(WriteOne(1, 8501, 0), priority, WIDE)) is stops
     assert not is_stop_word(Job(Read(1, 8501, 1), priority, WIDE))

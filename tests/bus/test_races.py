@@ -67,7 +67,7 @@ class MetState(SharedState):
         self._commanders = new
 
 
-def test_control_that_another_program_takes_is_not_taken_back_in_the_same_moment() -> None:
+def test_control_taken_by_another_program_is_not_taken_back() -> None:
     facts = MetState()
     facts.meeting = Meeting(lambda: facts.note_commander(1, "other"))
     facts.claim(1)
@@ -75,7 +75,7 @@ def test_control_that_another_program_takes_is_not_taken_back_in_the_same_moment
     assert facts._commanders == {1: "other"}
 
 
-def test_control_that_another_program_takes_is_not_released_in_the_same_moment() -> None:
+def test_control_taken_by_another_program_is_not_released() -> None:
     facts = MetState()
     facts.claim(1)
     facts.meeting = Meeting(lambda: facts.note_commander(1, "other"))

@@ -39,7 +39,7 @@ def missing_after(data: bytes, request: Request = READ, **more: bool | int | Non
     return exchange.missing
 
 
-def test_missing_counts_the_rest_of_a_reply_that_has_begun() -> None:
+def test_missing_counts_the_rest_of_a_partial_reply() -> None:
     found = [missing_after(REPLY[:length], echo=False) for length in range(len(REPLY))]
     # before the byte count it may be a refusal
     assert found == [0, 4, 3, *range(len(REPLY) - 3, 0, -1)]
@@ -133,7 +133,7 @@ async def test_paused_port_takes_bytes_once_the_time_is_over(
     assert taker.data == b"rest of a reply"
 
 
-async def test_short_pause_takes_what_came_without_a_turn_of_the_loop(
+async def test_short_pause_reads_pending_bytes_without_the_loop(
     port: tuple[PosixSerial, Taker, int],
 ) -> None:
     transport, taker, peer = port
@@ -144,7 +144,7 @@ async def test_short_pause_takes_what_came_without_a_turn_of_the_loop(
     assert taker.data == b"rest of a reply"
 
 
-async def test_paused_port_closes(port: tuple[PosixSerial, Taker, int]) -> None:
+async def test_paused_port_can_be_closed(port: tuple[PosixSerial, Taker, int]) -> None:
     transport, taker, peer = port
     transport.pause(SHORT_PAUSE + 0.001)
     transport.close()

@@ -56,12 +56,14 @@ REQUESTS: list[tuple[Request, str]] = [
         (ReportId(1), 0, False),
     ],
 )
-def test_first_register_and_effect(request_: Request, register: int, changes: bool) -> None:
+def test_request_has_first_register_and_effect(
+    request_: Request, register: int, changes: bool
+) -> None:
     assert (request_.register, request_.changes) == (register, changes)
 
 
 @pytest.mark.parametrize(("request_", "text"), REQUESTS)
-def test_bytes(request_: Request, text: str) -> None:
+def test_request_is_encoded_as_bytes(request_: Request, text: str) -> None:
     assert frame(request_.device, request_.pdu()) == bytes.fromhex(text)
 
 
@@ -106,11 +108,11 @@ def test_counter_of_function_8_answers_with_a_value() -> None:
         (43, [0xAB, 13, 1], None),
     ],
 )
-def test_exceptions(function: int, pdu: list[int], code: int | None) -> None:
+def test_exception_code_is_decoded(function: int, pdu: list[int], code: int | None) -> None:
     assert exception_code(function, bytes(pdu)) == code
 
 
-def test_contents_of_replies() -> None:
+def test_reply_is_decoded() -> None:
     assert words_of(bytes.fromhex("03 08 00 28 02 58 01 F4 00 00")) == (40, 600, 500, 0)
     pdu = bytes.fromhex(
         "2B 0E 01 02 00 00 03 00 0D 54 45 4C 45 4D 45 43 41 4E 49 51 55 45"
@@ -123,7 +125,7 @@ def test_contents_of_replies() -> None:
     assert found.next_object is None
 
 
-def test_the_text_of_function_17_is_found_among_the_bytes_of_its_maker() -> None:
+def test_text_of_function_17_is_found_among_vendor_bytes() -> None:
     assert own_words_of(b"\x11\x0f\x02ATV71HU15M3\xff\0AB") == b"ATV71HU15M3"
     assert own_words_of(b"\x11\x02\x05\xff") == b""
 
@@ -152,7 +154,7 @@ REFUSED: list[tuple[Request, str]] = [
 
 
 @pytest.mark.parametrize(("request_", "text"), REFUSED)
-def test_never_sent(request_: Request, text: str) -> None:
+def test_impossible_request_is_refused(request_: Request, text: str) -> None:
     reason = send_refusal(request_, WIDE)
     assert text in reason
     assert reason.endswith(".")
@@ -206,7 +208,9 @@ SCANNER = replace(ATV21, read_windows=(Window(100, 1, 8, fixed_start=False),))
         (Diagnose(0, 0, 1), WIDE, False),
     ],
 )
-def test_limits_of_a_device(request_: Request, limits: Limits, allowed: bool) -> None:
+def test_request_beyond_the_limits_of_a_device_is_refused(
+    request_: Request, limits: Limits, allowed: bool
+) -> None:
     assert (send_refusal(request_, limits) == "") is allowed
 
 
@@ -224,11 +228,11 @@ def test_limits_of_a_device(request_: Request, limits: Limits, allowed: bool) ->
         (WriteOne(0, 5, 1), False),
     ],
 )
-def test_read_only(request_: Request, allowed: bool) -> None:
+def test_read_only_allows_requests_that_change_nothing(request_: Request, allowed: bool) -> None:
     assert (send_refusal(request_, WIDE, read_only=True) == "") is allowed
 
 
-def test_a_refusal_ends_with_one_point() -> None:
+def test_refusal_ends_with_one_period() -> None:
     refusal = DeviceException(1, 6, 64001, 3, "Value not allowed: it is out of range.")
     assert str(refusal).endswith("out of range.")
     assert not str(refusal).endswith("..")

@@ -64,7 +64,7 @@ def test_refusals_of_identification_are_found(pdu: bytes) -> None:
     assert find_reply(frame(1, pdu), 1, Identify(1).expectation(), exceptions=False) is None
 
 
-def test_pieces() -> None:
+def test_pieces_separates_whole_frames_from_noise() -> None:
     assert pieces(b"\x33" + OTHER + b"\x44\x55" + REPLY) == [
         Piece(b"\x33", whole=False),
         Piece(OTHER, whole=True),
@@ -81,7 +81,7 @@ def test_pieces_lose_no_byte(data: bytes) -> None:
 
 
 @given(st.lists(st.integers(1, 5), max_size=20))
-def test_reply_in_lumps(sizes: list[int]) -> None:
+def test_reply_that_arrives_in_pieces_is_found(sizes: list[int]) -> None:
     exchange, rest, verdict = exchange_of(READ), OTHER + REPLY, None
     for size in [*sizes, len(rest)]:
         lump, rest = rest[:size], rest[size:]
@@ -91,7 +91,7 @@ def test_reply_in_lumps(sizes: list[int]) -> None:
     assert verdict.resynchronised
 
 
-def test_first_replies_can_belong_to_others() -> None:
+def test_skipped_replies_are_not_accepted() -> None:
     exchange = exchange_of(READ, skip=1)
     assert exchange.feed(REPLY) is None
     verdict = exchange.feed(REPLY)
@@ -117,7 +117,9 @@ COPY = frame(1, WRITE.pdu())
         (None, COPY + frame(1, bytes([0x86, 3])), ResultKind.EXCEPTION),
     ],
 )
-def test_write_through_an_adapter(echo: bool | None, received: bytes, kind: ResultKind) -> None:
+def test_write_reply_depends_on_the_echo_of_the_adapter(
+    echo: bool | None, received: bytes, kind: ResultKind
+) -> None:
     exchange = exchange_of(WRITE, echo=echo)
     verdict = exchange.feed(received) or exchange.expired()
     assert verdict.kind is kind
@@ -134,7 +136,7 @@ def test_write_through_an_adapter(echo: bool | None, received: bytes, kind: Resu
         (b"\x55", None),
     ],
 )
-def test_echo_is_learnt_from_reads(received: bytes, echo: bool | None) -> None:
+def test_echo_is_learned_from_reads(received: bytes, echo: bool | None) -> None:
     exchange = exchange_of(READ)
     if exchange.feed(received) is None:
         exchange.expired()
@@ -156,7 +158,7 @@ def test_echo_is_learnt_from_reads(received: bytes, echo: bool | None) -> None:
         (b"\x01\x83\x02", True),
     ],
 )
-def test_silence_ends_the_wait_for_remains_of_the_reply_only(received: bytes, ends: bool) -> None:
+def test_gap_ends_the_wait_for_a_partial_reply_only(received: bytes, ends: bool) -> None:
     exchange = exchange_of(READ)
     assert exchange.feed(received) is None
     verdict = exchange.silent()
@@ -175,13 +177,15 @@ def test_silence_ends_the_wait_for_remains_of_the_reply_only(received: bytes, en
         (frame(1, bytes([4, 2, 0, 9])), ResultKind.WRONG),
     ],
 )
-def test_end_of_time(received: bytes, kind: ResultKind) -> None:
+def test_result_at_the_timeout_depends_on_the_bytes_received(
+    received: bytes, kind: ResultKind
+) -> None:
     exchange = exchange_of(READ)
     exchange.feed(received)
     assert exchange.expired().kind is kind
 
 
-def test_whole_frames_around_a_reply_are_strays_and_noise_is_not() -> None:
+def test_whole_frames_around_a_reply_are_strays_but_noise_is_not() -> None:
     exchange = exchange_of(READ)
     result = exchange.feed(b"\x33" + OTHER + b"\x44\x55" + REPLY)
     assert result is not None

@@ -39,7 +39,7 @@ def kinds(peer: PtyPeer) -> list[tuple[int, int]]:
     return [(request[1], int.from_bytes(request[2:4], "big")) for request in peer.requests]
 
 
-async def test_the_second_program_works_as_if_it_had_the_line(share: Share) -> None:
+async def test_attached_program_can_send_every_request(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("backup")
@@ -54,7 +54,7 @@ async def test_the_second_program_works_as_if_it_had_the_line(share: Share) -> N
         assert other.state.status is LineStatus.CONNECTED
 
 
-async def test_an_exception_of_a_drive_reaches_its_sender(share: Share) -> None:
+async def test_exception_of_a_drive_reaches_the_sender(share: Share) -> None:
     def refuses(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(request[0], bytes([request[1] | 0x80, 2]))]
 
@@ -66,7 +66,7 @@ async def test_an_exception_of_a_drive_reaches_its_sender(share: Share) -> None:
         assert (caught.value.device, caught.value.code, caught.value.address) == (3, 2, 700)
 
 
-async def test_one_exchange_is_in_flight_and_the_priorities_hold_across_programs(
+async def test_priorities_hold_across_programs_with_one_exchange_in_flight(
     share: Share,
 ) -> None:
     with PtyPeer(slow) as peer:
@@ -89,7 +89,7 @@ async def test_one_exchange_is_in_flight_and_the_priorities_hold_across_programs
         assert [len(burst) for burst in peer.bursts] == [8] * len(order)
 
 
-async def test_a_program_that_asks_for_too_much_takes_no_room_from_the_others(
+async def test_program_with_too_many_requests_does_not_block_others(
     share: Share,
 ) -> None:
     with PtyPeer(slow) as peer:
@@ -120,7 +120,7 @@ async def test_abandoned_request_is_not_sent(share: Share) -> None:
         assert (3, 66) not in kinds(peer)
 
 
-async def test_a_client_sees_counters_devices_frames_and_the_state_of_the_line(
+async def test_client_gets_counters_devices_frames_and_line_state(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -134,9 +134,7 @@ async def test_a_client_sees_counters_devices_frames_and_the_state_of_the_line(
         eventually(lambda: any(frame.data[1:4] == b"\x03\x00\x65" for frame in other.trace))
 
 
-async def test_a_lost_line_is_reported_to_clients_which_recover_with_it(
-    share: Share, tmp_path: Path
-) -> None:
+async def test_clients_report_a_lost_line_and_recover_with_it(share: Share, tmp_path: Path) -> None:
     link = tmp_path / "port"
     with PtyPeer(honest, link=link) as peer:
         lines = share(str(link))
@@ -150,7 +148,7 @@ async def test_a_lost_line_is_reported_to_clients_which_recover_with_it(
         assert (await other.read(1, 5)).words == (5,)
 
 
-async def test_value_is_reused_by_program_that_accepts_its_age(
+async def test_value_is_reused_if_a_program_accepts_its_age(
     share: Share,
 ) -> None:
     values = iter(range(100, 200))
@@ -193,7 +191,7 @@ async def test_value_is_reused_by_program_that_accepts_its_age(
         assert len(peer.requests) == 10
 
 
-async def test_alone_on_the_line_nothing_is_shared(share: Share) -> None:
+async def test_single_program_reuses_no_value(share: Share) -> None:
     with PtyPeer(honest) as peer:
         line = share(peer.path).open("panel")
         await line.read(1, 10)
@@ -204,7 +202,7 @@ async def test_alone_on_the_line_nothing_is_shared(share: Share) -> None:
 # Who commands
 
 
-async def test_a_drive_that_another_program_commands_takes_no_write(share: Share) -> None:
+async def test_drive_commanded_by_another_program_is_not_written(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other, third = (lines.open(name) for name in ("panel", "run", "restore"))
@@ -230,7 +228,7 @@ async def test_a_drive_that_another_program_commands_takes_no_write(share: Share
         assert [request[5] for request in peer.requests if request[1] == 6] == [2, 3, 0, 4]
 
 
-async def test_of_two_that_claim_at_once_one_is_informed_no(share: Share) -> None:
+async def test_one_of_two_simultaneous_claims_is_denied(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         await lines.open("panel").read(1, 1)
@@ -250,7 +248,7 @@ async def test_of_two_that_claim_at_once_one_is_informed_no(share: Share) -> Non
             await loser.write(4, 8, [1])
 
 
-async def test_a_program_that_ended_commands_nothing(share: Share) -> None:
+async def test_program_that_exited_commands_no_drive(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("run")
@@ -261,7 +259,7 @@ async def test_a_program_that_ended_commands_nothing(share: Share) -> None:
         assert owner.facts.claim(1) == ""
 
 
-async def test_a_question_reaches_the_commander_and_its_yes_frees_the_drive(share: Share) -> None:
+async def test_request_reaches_the_commander_and_consent_frees_the_drive(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("panel")
@@ -289,7 +287,7 @@ async def test_a_question_reaches_the_commander_and_its_yes_frees_the_drive(shar
 # Where programs meet
 
 
-async def test_socket_and_lock_are_the_users_alone_and_go_with_the_program(
+async def test_socket_and_lock_are_private_and_removed_with_the_program(
     share: Share, tmp_path: Path
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -307,9 +305,7 @@ async def test_socket_and_lock_are_the_users_alone_and_go_with_the_program(
         assert lines.left_behind == []
 
 
-async def test_a_socket_whose_folder_was_taken_away_is_made_anew(
-    share: Share, tmp_path: Path
-) -> None:
+async def test_socket_is_recreated_if_its_folder_is_removed(share: Share, tmp_path: Path) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("panel")
@@ -320,7 +316,7 @@ async def test_a_socket_whose_folder_was_taken_away_is_made_anew(
         assert (await lines.open("late").read(1, 4)).words == (4,)
 
 
-async def test_a_lock_that_was_taken_away_is_made_anew_so_that_nobody_else_owns(
+async def test_removed_lock_is_recreated_so_that_no_other_program_owns(
     share: Share, tmp_path: Path
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -338,7 +334,7 @@ async def test_a_lock_that_was_taken_away_is_made_anew_so_that_nobody_else_owns(
     [b"", b"\0\xff" * 50, b'{"version":1}', b"[" * 4000, b"9" * 100_000],
     ids=["empty", "garbage", "half", "deep", "huge"],
 )
-async def test_damaged_lock_file_keeps_nobody_out(
+async def test_damaged_lock_file_blocks_no_program(
     share: Share, tmp_path: Path, held: bytes
 ) -> None:
     place = place_in(tmp_path)
@@ -351,7 +347,7 @@ async def test_damaged_lock_file_keeps_nobody_out(
 
 
 @pytest.mark.parametrize("trouble", ["a file", "not to be written"])
-async def test_the_next_folder_is_taken_where_the_first_takes_no_socket(
+async def test_next_folder_is_used_if_the_first_cannot_hold_a_socket(
     share: Share, tmp_path: Path, trouble: str
 ) -> None:
     first = tmp_path / "first"
@@ -370,9 +366,7 @@ async def test_the_next_folder_is_taken_where_the_first_takes_no_socket(
         assert [path.suffix for path in (tmp_path / "run").iterdir()] == [".sock"]
 
 
-async def test_a_path_that_is_too_long_for_a_socket_is_none_for_us(
-    share: Share, tmp_path: Path
-) -> None:
+async def test_socket_with_a_too_long_path_works(share: Share, tmp_path: Path) -> None:
     folder = tmp_path / ("long" * 30)
     place = SharePlace("serial:line", tmp_path / "lines", (folder,))
     with PtyPeer(honest) as peer:
@@ -393,7 +387,7 @@ async def test_line_works_unshared_without_socket_folder(share: Share, tmp_path:
         await line.write(1, 8, [1])
 
 
-async def test_how_long_a_stranger_is_waited_for_is_reported_to_the_owner(share: Share) -> None:
+async def test_wait_for_an_unknown_device_is_sent_to_the_owner(share: Share) -> None:
     patient = replace(QUICK, first_timeout=600.0, scan_timeout=600.0, retries=0)
     with PtyPeer(silent) as peer:
         lines = share(peer.path)

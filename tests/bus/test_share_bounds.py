@@ -117,7 +117,7 @@ def test_stop_count_wraps_and_each_stop_changes_the_total() -> None:
     assert 0 <= counts.stamp(0) < STOPS_WRAP
 
 
-def test_stop_count_at_the_wrap_still_news_to_others() -> None:
+def test_wrapped_stop_count_is_still_new_to_others() -> None:
     stop_counts, other = StopCounts(), StopCounts()
     for counts in (stop_counts, other):
         for count in (HIGHEST // 3, 2 * HIGHEST // 3, HIGHEST):
@@ -128,7 +128,7 @@ def test_stop_count_at_the_wrap_still_news_to_others() -> None:
     assert other.stamp(1) == stop_counts.stamp(1)
 
 
-def test_stop_count_that_others_raised_falls_back_to_its_own_program() -> None:
+def test_stop_count_raised_by_others_is_corrected_by_its_program() -> None:
     """Else its next stop would be no news, and what waits would go out after it."""
     owner = StopCounts()
     owner.learn_greeting("liar", {1: {"run": 1000}}, ["panel", "liar"])
@@ -331,7 +331,7 @@ def framed(data: bytes) -> bytes:
     return len(data).to_bytes(4, "big") + data
 
 
-def test_unpacked_with_mutated_messages_refuses_or_takes_what_can_be_sent_on() -> None:
+def test_mutated_message_is_refused_or_can_be_sent_on() -> None:
     found = mutants()
     assert len(found) > MUTANTS
     taken = 0
@@ -375,7 +375,7 @@ def batches(found: list[bytes], size: int = 50) -> Iterator[list[bytes]]:
         yield found[start : start + size]
 
 
-async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
+async def test_client_with_mutated_messages_of_its_owner_continues_and_stops(
     share: Share, caplog: pytest.LogCaptureFixture
 ) -> None:
     chance = random.Random(29)
@@ -400,7 +400,7 @@ async def test_client_with_mutated_messages_of_its_owner_goes_on_and_stops(
     assert other.state.status is LineStatus.CONNECTED
 
 
-def test_texts_of_other_programs_are_shown_plain_and_not_endless() -> None:
+def test_texts_of_other_programs_are_shown_plain_and_bounded() -> None:
     facts, heard = SharedState(), list[str]()
     on_event(facts, NoticeReceived, lambda event: heard.append(event.text))
     on_event(facts, DevicesStopped, lambda event: heard.extend((event.by, event.program.text)))

@@ -64,7 +64,7 @@ async def come(condition: Callable[[], bool]) -> None:
 # The owner ends
 
 
-async def test_the_owners_end_hands_the_line_over_and_reads_are_requested_again(
+async def test_owner_that_closes_hands_the_line_over_and_reads_are_repeated(
     share: Share,
 ) -> None:
     with PtyPeer(slow_at_77) as peer:
@@ -86,7 +86,7 @@ async def test_the_owners_end_hands_the_line_over_and_reads_are_requested_again(
         eventually(lambda: [len(line.facts.others) for line in (other, third)] == [1, 1])
 
 
-async def test_a_write_that_the_owner_left_unanswered_is_never_repeated_a_stop_is(
+async def test_unanswered_write_is_not_repeated_by_the_next_owner_but_a_stop_is(
     share: Share,
 ) -> None:
     with PtyPeer(slow_at_77) as peer:
@@ -108,7 +108,7 @@ async def test_a_write_that_the_owner_left_unanswered_is_never_repeated_a_stop_i
         assert times_sent(peer, 6) == 3
 
 
-async def test_a_client_that_closes_during_a_write_tells_that_its_fate_is_not_known(
+async def test_client_that_closes_during_a_write_reports_an_unknown_outcome(
     share: Share,
 ) -> None:
     with PtyPeer(slow_at_77) as peer:
@@ -123,9 +123,7 @@ async def test_a_client_that_closes_during_a_write_tells_that_its_fate_is_not_kn
         assert (await owner.read(1, 4)).words == (4,)
 
 
-async def test_a_killed_owner_is_followed_once_no_reply_to_it_may_come(
-    share: Share, tmp_path: Path
-) -> None:
+async def test_next_owner_waits_for_replies_to_a_killed_owner(share: Share, tmp_path: Path) -> None:
     with PtyPeer(slow_at_77) as peer, other_program(peer.path, tmp_path, "run", 1.0) as owner:
         owner.tell("read 1")
         lines = share(peer.path)
@@ -145,7 +143,7 @@ async def test_a_killed_owner_is_followed_once_no_reply_to_it_may_come(
         await come(lambda: gone == ["run"])
 
 
-async def test_a_write_by_a_client_of_a_killed_owner_is_not_known_and_not_repeated(
+async def test_write_lost_with_a_killed_owner_is_unknown_and_not_repeated(
     share: Share, tmp_path: Path
 ) -> None:
     with PtyPeer(slow_at_77) as peer, other_program(peer.path, tmp_path, "run") as owner:
@@ -160,7 +158,7 @@ async def test_a_write_by_a_client_of_a_killed_owner_is_not_known_and_not_repeat
         assert times_sent(peer, 6) == 1
 
 
-async def test_one_that_comes_after_a_killed_owner_keeps_the_same_silence(
+async def test_program_that_opens_after_a_killed_owner_waits_for_late_replies(
     share: Share, tmp_path: Path
 ) -> None:
     with PtyPeer(slow_at_77) as peer, other_program(peer.path, tmp_path, "run", 1.0) as owner:
@@ -174,7 +172,7 @@ async def test_one_that_comes_after_a_killed_owner_keeps_the_same_silence(
         assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
 
 
-async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Share) -> None:
+async def test_program_that_opens_after_a_closed_owner_waits_for_late_replies(share: Share) -> None:
     """Whoever was not attached was not told."""
     late = replace(QUICK, late_reply=1.0)
     with PtyPeer(slow_at_77) as peer:
@@ -197,7 +195,7 @@ async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Shar
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
+async def test_next_owner_reports_programs_that_exited_with_the_owner(
     share: Share, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
     monkeypatch.setattr("tui.bus.share.heartbeat.BACK_WITHIN", 0.5)
@@ -276,7 +274,9 @@ NONSENSE = {
 
 
 @pytest.mark.parametrize("output", NONSENSE.values(), ids=NONSENSE.keys())
-async def test_message_of_one_program_costs_others_nothing(share: Share, output: bytes) -> None:
+async def test_malformed_message_of_one_program_does_not_affect_others(
+    share: Share, output: bytes
+) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
@@ -289,7 +289,7 @@ async def test_message_of_one_program_costs_others_nothing(share: Share, output:
         assert (await other.read(1, 6)).words == (6,)
 
 
-async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Share) -> None:
+async def test_command_delayed_in_the_socket_is_not_sent(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("panel")
@@ -308,7 +308,7 @@ async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Shar
         assert [request[1] for request in peer.requests] == [3, 6]
 
 
-async def test_a_client_that_reads_nothing_is_let_go(
+async def test_client_that_reads_nothing_is_disconnected(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.bus.share.attached.MOST_UNREAD", 1 << 14)
@@ -324,7 +324,7 @@ async def test_a_client_that_reads_nothing_is_let_go(
             assert (await other.read(1, 6)).words == (6,)
 
 
-async def test_a_client_that_was_let_go_comes_back(share: Share) -> None:
+async def test_disconnected_client_reconnects(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
@@ -336,7 +336,7 @@ async def test_a_client_that_was_let_go_comes_back(share: Share) -> None:
         eventually(lambda: other.state.status is LineStatus.CONNECTED)
 
 
-async def test_another_version_is_turned_away_in_words(share: Share) -> None:
+async def test_program_of_another_version_is_refused_with_a_reason(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("panel")
@@ -348,7 +348,7 @@ async def test_another_version_is_turned_away_in_words(share: Share) -> None:
         assert "another version" in reported.why
 
 
-async def test_another_user_is_turned_away_in_words(
+async def test_program_of_another_user_is_refused_with_a_reason(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -360,7 +360,7 @@ async def test_another_user_is_turned_away_in_words(
             lines.open("foreign")
 
 
-async def test_an_owner_that_cannot_be_reached_is_named_at_once(
+async def test_unreachable_owner_is_named_immediately(
     share: Share, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("tui.bus.share.sharing.NO_OWNER", 0.3)
@@ -375,7 +375,9 @@ async def test_an_owner_that_cannot_be_reached_is_named_at_once(
         lock.give_back()
 
 
-async def test_an_owner_that_talks_nonsense_is_left_again(share: Share, tmp_path: Path) -> None:
+async def test_client_disconnects_from_an_owner_that_sends_garbage(
+    share: Share, tmp_path: Path
+) -> None:
     """What takes connections on the socket, and is no program of ours, must not hang the others."""
     lock = OwnerLock(place_in(tmp_path))
     assert lock.take()
@@ -404,7 +406,7 @@ def held() -> tuple[int, int]:
     return len(os.listdir("/proc/self/fd")), threading.active_count()
 
 
-async def test_attaching_and_leaving_again_and_again_leaves_nothing_behind(share: Share) -> None:
+async def test_repeated_attaching_leaves_nothing_behind(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("panel")
@@ -430,7 +432,7 @@ async def test_attaching_and_leaving_again_and_again_leaves_nothing_behind(share
         assert len(owner.facts.departed) <= 16
 
 
-async def test_one_that_ends_as_it_begins_to_listen_leaves_no_socket_behind(
+async def test_program_closed_while_it_starts_listening_leaves_no_socket(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def takes_long(*_: object, **__: object) -> None:
@@ -445,7 +447,7 @@ async def test_one_that_ends_as_it_begins_to_listen_leaves_no_socket_behind(
         assert lines.left_behind == []
 
 
-async def test_a_killed_program_leaves_a_socket_that_the_next_takes_away(
+async def test_socket_of_a_killed_program_is_removed_by_the_next(
     share: Share, tmp_path: Path
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -458,7 +460,7 @@ async def test_a_killed_program_leaves_a_socket_that_the_next_takes_away(
         assert lines.left_behind == []
 
 
-async def test_closing_while_waiting_for_a_frozen_owner_takes_no_time(share: Share) -> None:
+async def test_close_does_not_wait_for_a_frozen_owner(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("panel")
@@ -469,7 +471,7 @@ async def test_closing_while_waiting_for_a_frozen_owner_takes_no_time(share: Sha
             await asyncio.wait_for(asyncio.to_thread(other.close), 5)
 
 
-async def test_a_disk_that_takes_nothing_does_not_keep_a_line_closed(
+async def test_hung_disk_does_not_keep_a_line_closed(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answers = threading.Event()
@@ -494,7 +496,7 @@ async def test_a_disk_that_takes_nothing_does_not_keep_a_line_closed(
         other.give_back()
 
 
-async def test_a_line_that_closes_leaves_the_lock_to_the_thread_that_uses_it(
+async def test_closing_line_leaves_the_lock_to_the_thread_that_uses_it(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken, goes_on = threading.Event(), threading.Event()
@@ -522,7 +524,7 @@ async def test_a_line_that_closes_leaves_the_lock_to_the_thread_that_uses_it(
         other.give_back()
 
 
-async def test_no_keeper_is_started_once_its_program_holds_the_line(
+async def test_keeper_is_not_started_once_its_program_holds_the_line(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answers, ended = threading.Event(), threading.Event()
@@ -565,11 +567,11 @@ async def test_no_keeper_is_started_once_its_program_holds_the_line(
         other.give_back()
 
 
-def test_a_disk_has_less_time_than_a_person_has_patience() -> None:
+def test_disk_has_at_most_2_s() -> None:
     assert DISK_WITHIN <= 2.0
 
 
-async def test_a_full_disk_does_not_keep_a_line_closed(
+async def test_full_disk_does_not_keep_a_line_closed(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def is_full(_lock: OwnerLock, _owner: Owner) -> None:

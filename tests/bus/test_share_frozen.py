@@ -34,7 +34,7 @@ async def come(condition: Callable[[], bool]) -> None:
     await asyncio.to_thread(eventually, condition)
 
 
-async def test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more(
+async def test_frozen_client_counts_as_gone_and_loses_its_drives(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -64,7 +64,7 @@ async def test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_m
         assert (await other.read(1, 5)).words == (5,)
 
 
-async def test_clients_of_an_owner_that_stood_still_itself_are_kept(share: Share) -> None:
+async def test_owner_that_was_suspended_keeps_its_clients(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("watch"), lines.open("run")
@@ -83,7 +83,7 @@ async def test_clients_of_an_owner_that_stood_still_itself_are_kept(share: Share
         assert owner.facts.commander(1) is not None
 
 
-async def test_a_client_that_has_nothing_to_say_is_kept(share: Share) -> None:
+async def test_idle_client_is_kept(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, _ = lines.open("watch"), lines.open("panel")
@@ -93,7 +93,7 @@ async def test_a_client_that_has_nothing_to_say_is_kept(share: Share) -> None:
         assert gone == []
 
 
-async def test_a_disk_that_hangs_holds_up_neither_the_line_nor_its_signs_of_life(
+async def test_hung_disk_delays_neither_the_line_nor_its_heartbeat(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     goes_on, hangs, access = threading.Event(), threading.Event(), os.access

@@ -67,7 +67,7 @@ async def refused(task: asyncio.Task[float]) -> str:
     return str(caught.value)
 
 
-async def test_a_stop_discards_pending_work_for_that_drive_and_only_that(
+async def test_stop_discards_pending_work_for_its_drive_only(
     share: Share,
 ) -> None:
     with PtyPeer(slow) as peer:
@@ -91,7 +91,7 @@ async def test_a_stop_discards_pending_work_for_that_drive_and_only_that(
             await program.write(1, 1, [RUN])
 
 
-async def test_each_is_reported_a_stop_once_and_by_which_program(share: Share) -> None:
+async def test_each_program_reports_a_stop_once_with_its_source(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         programs = [lines.open(name) for name in ("panel", "remote", "run")]
@@ -110,7 +110,7 @@ async def test_each_is_reported_a_stop_once_and_by_which_program(share: Share) -
         assert sorted(heard) == sorted((me, by) for me in names for by in names if me != by)
 
 
-async def test_a_write_of_before_a_stop_is_refused_though_it_arrives_after_it(
+async def test_write_typed_before_a_stop_is_refused_after_it(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -126,7 +126,7 @@ async def test_a_write_of_before_a_stop_is_refused_though_it_arrives_after_it(
         assert written(peer) == [(1, STOP)]
 
 
-async def test_stops_of_two_that_cannot_hear_each_other_add_up(share: Share) -> None:
+async def test_stops_of_two_disconnected_programs_both_count(share: Share) -> None:
     """A greatest count of both would be the same for a write of after the one stop only."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
@@ -146,7 +146,7 @@ async def test_stops_of_two_that_cannot_hear_each_other_add_up(share: Share) -> 
         assert written(peer) == []
 
 
-async def test_a_stop_that_nobody_could_hear_is_heard_on_coming_back(share: Share) -> None:
+async def test_stop_given_while_disconnected_is_reported_on_reconnecting(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("panel")
@@ -161,7 +161,7 @@ async def test_a_stop_that_nobody_could_hear_is_heard_on_coming_back(share: Shar
         assert [line.facts.stops.stamp(1) for line in (first, second)] == [1, 1]
 
 
-def test_counts_only_go_up_and_one_telling_counts_once() -> None:
+def test_stop_counts_only_increase_and_count_a_message_once() -> None:
     counts, other = StopCounts(), StopCounts()
     counts.give("a", (1, 2), "key")
     other.give("b", (1,), "key")
@@ -182,7 +182,7 @@ def test_counts_only_go_up_and_one_telling_counts_once() -> None:
 # An owner that is frozen
 
 
-async def test_a_stop_waits_for_a_frozen_owner_and_nothing_of_before_goes_out_after_it(
+async def test_stop_waits_for_a_frozen_owner_and_cancels_earlier_writes(
     share: Share,
 ) -> None:
     """The owner goes on with commands in its queue, and in its sockets, that a stop has voided."""
@@ -214,7 +214,7 @@ async def test_a_stop_waits_for_a_frozen_owner_and_nothing_of_before_goes_out_af
         eventually(lambda: other.state.status is LineStatus.CONNECTED)
 
 
-async def test_a_stop_that_a_frozen_owner_has_kept_is_sent_by_the_next(share: Share) -> None:
+async def test_stop_kept_by_a_frozen_owner_is_sent_by_the_next(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("run"), lines.open("stop")
@@ -233,7 +233,7 @@ async def test_a_stop_that_a_frozen_owner_has_kept_is_sent_by_the_next(share: Sh
         assert sorted(written(peer)) == [(1, STOP), (2, STOP)]
 
 
-async def test_the_look_before_a_stop_fails_so_that_the_stop_is_given(share: Share) -> None:
+async def test_read_before_a_stop_fails_so_that_the_stop_is_sent(share: Share) -> None:
     """A stop word that waits is worth more than a look that fails: it is sent by the next owner."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
@@ -249,7 +249,7 @@ async def test_the_look_before_a_stop_fails_so_that_the_stop_is_given(share: Sha
         ]
 
 
-async def test_the_owner_hears_a_stop_of_a_program_that_is_gone_again(share: Share) -> None:
+async def test_owner_counts_a_stop_of_a_program_that_has_exited(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("run")
@@ -268,7 +268,7 @@ async def test_the_owner_hears_a_stop_of_a_program_that_is_gone_again(share: Sha
         assert written(peer) == [(1, STOP), (1, RUN)]
 
 
-async def test_a_keeper_in_another_container_is_named_with_what_to_do(share: Share) -> None:
+async def test_keeper_in_another_container_is_named_with_advice(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         keeper, other = lines.open(KEEPER, space="pid:[1]"), lines.open("panel")
@@ -294,7 +294,7 @@ async def test_request_for_frozen_owner_is_reported_and_not_sent_late(
         assert written(peer) == []
 
 
-async def test_a_command_that_waited_for_a_frozen_owner_is_too_old_to_be_sent(
+async def test_command_delayed_by_a_frozen_owner_is_not_sent(
     share: Share,
 ) -> None:
     with PtyPeer(honest) as peer:
@@ -311,7 +311,7 @@ async def test_a_command_that_waited_for_a_frozen_owner_is_too_old_to_be_sent(
         assert written(peer) == []
 
 
-async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share: Share) -> None:
+async def test_program_that_was_suspended_does_not_report_a_frozen_owner(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("run")
@@ -325,7 +325,7 @@ async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share
         assert [text for text in output if "does not answer" in text] == []
 
 
-async def test_an_answer_that_waited_for_a_stopped_program_is_requested_again(
+async def test_reply_delayed_by_a_suspended_program_is_requested_again(
     share: Share,
 ) -> None:
     """Nobody can tell when it came: its time would be that of the program's going on."""
@@ -340,7 +340,7 @@ async def test_an_answer_that_waited_for_a_stopped_program_is_requested_again(
         assert len(peer.requests) == 2
 
 
-async def test_late_client_learns_when_stop_was_given(share: Share) -> None:
+async def test_late_client_gets_the_time_of_a_stop(share: Share) -> None:
     """A command that was typed before the stop, and comes to the line after it, must know."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
@@ -358,7 +358,7 @@ async def test_late_client_learns_when_stop_was_given(share: Share) -> None:
         assert 2 not in next_owner.facts.stops.times
 
 
-async def test_the_lock_tells_of_stops_where_the_owner_is_killed(share: Share) -> None:
+async def test_lock_file_records_stops_of_the_owner(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         panel, place = lines.open("panel"), place_in(lines.folder)
@@ -371,7 +371,7 @@ async def test_the_lock_tells_of_stops_where_the_owner_is_killed(share: Share) -
         await asyncio.to_thread(eventually, is_reported)
 
 
-def test_a_time_to_come_is_none_of_this_run_of_the_machine() -> None:
+def test_stop_time_in_the_future_is_ignored() -> None:
     counts = StopCounts()
     counts.give("a", (1,), "the stop key")
     given = counts.times[1]

@@ -73,7 +73,7 @@ async def ask(line: Line, seed: int, count: int) -> tuple[int, int]:
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("way", ["serial", "thread", "tcp"])
-async def test_no_answer_goes_astray(
+async def test_every_reply_reaches_its_request(
     way: str, seed: int, open_line: OpenLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if way == "thread":
@@ -91,7 +91,7 @@ async def test_no_answer_goes_astray(
         assert sum(answered + failed for answered, failed in results) == 60
 
 
-async def test_port_read_by_a_thread_of_its_own(
+async def test_port_read_by_its_own_thread_keeps_gaps(
     open_line: OpenLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "PosixSerial", ThreadedSerial)

@@ -53,7 +53,7 @@ def next_program(share: Share, peer: PtyPeer, limits: Limits, patience: float = 
     return line
 
 
-async def test_values_are_back_as_soon_as_the_drive_has_echoed_a_number(
+async def test_values_return_once_the_drive_has_echoed_a_number(
     share: Share, tmp_path: Path
 ) -> None:
     with PtyPeer(slow) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
@@ -69,7 +69,7 @@ async def test_values_are_back_as_soon_as_the_drive_has_echoed_a_number(
 
 
 @pytest.mark.parametrize("why", ["it has no echo", "it never echoes"])
-async def test_a_drive_that_proves_nothing_waits_until_no_reply_may_come(
+async def test_drive_without_echo_waits_until_no_late_reply_can_come(
     share: Share, tmp_path: Path, why: str
 ) -> None:
     drive, limits = (slow, NO_ECHO) if why == "it has no echo" else (never_echoes, WIDE)
@@ -81,7 +81,7 @@ async def test_a_drive_that_proves_nothing_waits_until_no_reply_may_come(
         assert functions(peer).count(8) <= 2
 
 
-async def test_the_words_of_a_stop_wait_for_no_proof(share: Share, tmp_path: Path) -> None:
+async def test_stop_words_do_not_wait_for_the_proof(share: Share, tmp_path: Path) -> None:
     with PtyPeer(slow) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
         killed = await killed_while_it_waits(owner, peer)
         line = await asyncio.to_thread(next_program, share, peer, NO_ECHO)
@@ -107,7 +107,7 @@ def doubting(open_line: OpenLine, peer: PtyPeer, seconds: float) -> Line:
     return line
 
 
-async def test_late_replies_to_a_proof_that_failed_are_taken_for_no_others(
+async def test_late_replies_to_a_failed_proof_are_not_used(
     open_line: OpenLine,
 ) -> None:
     with PtyPeer(busy_once) as peer:
@@ -121,7 +121,7 @@ async def test_late_replies_to_a_proof_that_failed_are_taken_for_no_others(
         assert len(found) >= 3
 
 
-async def test_a_write_that_waits_for_a_proof_can_be_withdrawn(open_line: OpenLine) -> None:
+async def test_write_that_waits_for_a_proof_can_be_cancelled(open_line: OpenLine) -> None:
     with PtyPeer(never_echoes) as peer:
         line = doubting(open_line, peer, 1.2)
         write = asyncio.create_task(line.write(1, 1, [15]))
@@ -131,7 +131,7 @@ async def test_a_write_that_waits_for_a_proof_can_be_withdrawn(open_line: OpenLi
         assert 6 not in functions(peer)
 
 
-async def test_a_stop_waits_for_one_request_of_a_proof_at_most(open_line: OpenLine) -> None:
+async def test_stop_waits_for_one_request_of_a_proof_at_most(open_line: OpenLine) -> None:
     def silent_at_1(request: bytes, _count: int) -> Sequence[Step]:
         return [] if request[0] == 1 else [reply(request)]
 
@@ -199,7 +199,7 @@ async def test_only_last_stop_of_a_drive_is_repeated(open_line: OpenLine) -> Non
         assert writes(peer) == [7, 0, 0]
 
 
-async def test_stop_of_one_drive_passes_repeat_of_another(open_line: OpenLine) -> None:
+async def test_stop_of_one_drive_precedes_the_repeat_of_another(open_line: OpenLine) -> None:
     with PtyPeer(never_echoes) as peer:
         line = doubting(open_line, peer, 60.0)
         await line.write(1, 1, [0], priority=Priority.STOP)

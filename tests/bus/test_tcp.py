@@ -42,7 +42,7 @@ WRONG: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("case", ["another function", "too few words", "too many words"])
-async def test_plain_client_takes_a_wrong_reply(case: str) -> None:
+async def test_plain_client_accepts_a_wrong_reply(case: str) -> None:
     with TcpPeer(lambda request, _: [WRONG[case](request)], length=tcp_request_length) as peer:
         async with plain_tcp(peer.port) as client:
             got = await outcome(client.read_holding_registers(5, count=1, device_id=1))
@@ -50,14 +50,14 @@ async def test_plain_client_takes_a_wrong_reply(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", WRONG)
-async def test_wrong_reply_is_thrown_away(case: str, open_line: OpenLine) -> None:
+async def test_wrong_reply_is_discarded(case: str, open_line: OpenLine) -> None:
     with TcpPeer(lambda request, _: [WRONG[case](request)], length=tcp_request_length) as peer:
         line = open_line(TcpLink("127.0.0.1", peer.port))
         with pytest.raises(WrongReply):
             await line.read(1, 5)
 
 
-async def test_dead_network_is_noticed_without_requests() -> None:
+async def test_dead_network_is_detected_without_requests() -> None:
     with TcpPeer(tcp_honest, length=tcp_request_length) as peer:
         transport = await TcpTransport.connect("127.0.0.1", peer.port, 5.0)
         assert transport._connection is not None
@@ -74,14 +74,14 @@ async def test_dead_network_is_noticed_without_requests() -> None:
         transport._connection.close()
 
 
-async def test_reply_of_another_unit_is_thrown_away(open_line: OpenLine) -> None:
+async def test_reply_of_another_unit_is_discarded(open_line: OpenLine) -> None:
     with TcpPeer(lambda request, _: [other_unit(request)], length=tcp_request_length) as peer:
         line = open_line(TcpLink("127.0.0.1", peer.port))
         with pytest.raises(WrongReply, match="unit 99"):
             await line.read(1, 5)
 
 
-async def test_reply_of_another_transaction_is_passed_over(open_line: OpenLine) -> None:
+async def test_reply_of_another_transaction_is_skipped(open_line: OpenLine) -> None:
     def script(request: bytes, _count: int) -> Sequence[Step]:
         other = (int.from_bytes(request[:2], "big") - 1) % 0x10000
         return [tcp_reply(request, bytes([3, 2, 0, 9]), transaction=other), tcp_reply(request)]
@@ -92,7 +92,7 @@ async def test_reply_of_another_transaction_is_passed_over(open_line: OpenLine) 
         assert line.counters.stale == 1
 
 
-async def test_late_replies_shift_nothing(open_line: OpenLine) -> None:
+async def test_late_replies_do_not_shift_later_replies(open_line: OpenLine) -> None:
     def late(request: bytes, count: int) -> Sequence[Step]:
         return [0.4 if count == 0 else 0.0, tcp_reply(request)]
 
@@ -109,7 +109,7 @@ async def test_late_replies_shift_nothing(open_line: OpenLine) -> None:
         assert (await line.read(1, 40, priority=OPERATOR)).words == (40,)
 
 
-async def test_every_function_is_answered(open_line: OpenLine) -> None:
+async def test_reply_to_every_function_is_accepted(open_line: OpenLine) -> None:
     with TcpPeer(tcp_honest, length=tcp_request_length) as peer:
         line = open_line(TcpLink("127.0.0.1", peer.port))
         assert (await line.read(1, 5, 3)).words == (5, 6, 7)
@@ -124,7 +124,7 @@ async def test_every_function_is_answered(open_line: OpenLine) -> None:
         assert line.counters.replies == 7
 
 
-async def test_reply_in_crumbs(open_line: OpenLine) -> None:
+async def test_reply_that_arrives_byte_by_byte_is_found(open_line: OpenLine) -> None:
     def crumbs(request: bytes, _count: int) -> Sequence[Step]:
         whole = tcp_reply(request)
         return [step for byte in whole for step in (bytes([byte]), 0.005)]
@@ -134,7 +134,7 @@ async def test_reply_in_crumbs(open_line: OpenLine) -> None:
         assert (await line.read(1, 5, 2)).words == (5, 6)
 
 
-async def test_refusals_are_raised_and_a_gateways_mean_silence(open_line: OpenLine) -> None:
+async def test_refusal_raises_and_gateway_exception_means_no_answer(open_line: OpenLine) -> None:
     codes = {1: 2, 77: 11}
 
     def refuse(request: bytes, _count: int) -> Sequence[Step]:
@@ -151,9 +151,7 @@ async def test_refusals_are_raised_and_a_gateways_mean_silence(open_line: OpenLi
 
 
 @pytest.mark.parametrize("case", ["no protocol", "half a reply"])
-async def test_connection_whose_bytes_make_no_sense_is_made_anew(
-    case: str, open_line: OpenLine
-) -> None:
+async def test_connection_with_garbage_is_reopened(case: str, open_line: OpenLine) -> None:
     garbage = b"HTTP/1.0 400 Bad Request" if case == "no protocol" else b"\0\1\0\0\0\x09\1\3"
     script: dict[str, type[Exception]] = {"no protocol": LineLost, "half a reply": NoAnswer}
     timing = Timing(first_timeout=0.3, min_timeout=0.3, reconnect_first=0.1, retries=0)
@@ -167,7 +165,7 @@ async def test_connection_whose_bytes_make_no_sense_is_made_anew(
         assert (await line.read(1, 5, priority=OPERATOR)).words == (5,)
 
 
-async def test_rtu_over_tcp(open_line: OpenLine) -> None:
+async def test_rtu_over_tcp_reads_and_writes(open_line: OpenLine) -> None:
     with TcpPeer(honest) as peer:
         line = open_line(RtuTcpLink("127.0.0.1", peer.port))
         got = await asyncio.gather(*(line.read(1, address) for address in range(20)))
@@ -176,7 +174,7 @@ async def test_rtu_over_tcp(open_line: OpenLine) -> None:
         await line.broadcast(5, [1], limits=WIDE)
 
 
-async def test_rtu_over_tcp_late_and_damaged(open_line: OpenLine) -> None:
+async def test_rtu_over_tcp_survives_late_and_damaged_replies(open_line: OpenLine) -> None:
     def script(request: bytes, count: int) -> Sequence[Step]:
         whole = reply(request)
         steps: list[list[Step]] = [[0.35, whole], [whole[:4]], [b"\0" + whole]]
@@ -192,7 +190,7 @@ async def test_rtu_over_tcp_late_and_damaged(open_line: OpenLine) -> None:
 
 
 @pytest.mark.parametrize("unit", [255, 0])
-async def test_requests_to_the_only_drive_of_a_gateway_carry_its_unit(
+async def test_requests_to_the_only_drive_of_a_gateway_have_its_unit(
     open_line: OpenLine, unit: int
 ) -> None:
     def only(request: bytes, _count: int) -> Sequence[Step]:
@@ -209,7 +207,7 @@ async def test_requests_to_the_only_drive_of_a_gateway_carry_its_unit(
     assert prepared_write(link, WIDE, 2, 8501, [0]).frame[6] == 2
 
 
-async def test_reply_with_the_number_of_the_device_is_not_that_of_the_unit(
+async def test_reply_with_the_device_address_instead_of_the_unit_is_rejected(
     open_line: OpenLine,
 ) -> None:
     def number(request: bytes, _count: int) -> Sequence[Step]:

@@ -20,7 +20,7 @@ from .conftest import WIDE, OpenLine
 from .peer import PtyPeer, eventually, honest, silent
 
 
-def test_many_threads_get_their_own_answers(open_line: OpenLine) -> None:
+def test_many_threads_get_their_own_replies(open_line: OpenLine) -> None:
     wrong: list[tuple[int, tuple[int, ...]]] = []
 
     def ask(line: Line, seed: int) -> None:
@@ -46,7 +46,7 @@ def test_many_threads_get_their_own_answers(open_line: OpenLine) -> None:
         assert line.counters.replies == 180
 
 
-def test_cancelling_at_any_moment_shifts_nothing(open_line: OpenLine) -> None:
+def test_cancelling_at_any_moment_does_not_shift_replies(open_line: OpenLine) -> None:
     chance = random.Random(1)
 
     async def work(line: Line) -> int:
@@ -69,7 +69,7 @@ def test_cancelling_at_any_moment_shifts_nothing(open_line: OpenLine) -> None:
         asyncio.run(work(line))
 
 
-def test_closing_at_any_moment_answers_everybody() -> None:
+def test_closing_at_any_moment_ends_all_requests() -> None:
     async def ask(line: Line) -> None:
         while True:
             await line.read(1, 5)
@@ -96,7 +96,7 @@ def test_closing_at_any_moment_answers_everybody() -> None:
             assert [type(error) for error in ended] == [LineClosed] * 4
 
 
-def test_caller_that_ends_leaves_no_trace(
+def test_caller_that_ends_leaves_nothing_behind(
     open_line: OpenLine, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def leave(line: Line) -> None:
@@ -111,7 +111,7 @@ def test_caller_that_ends_leaves_no_trace(
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
 
 
-def test_worker_goes_on_while_the_callers_loop_stands_still(open_line: OpenLine) -> None:
+def test_worker_runs_while_the_loop_of_the_caller_hangs(open_line: OpenLine) -> None:
     seen: list[int] = []
 
     with PtyPeer(honest) as peer:
@@ -136,7 +136,9 @@ def test_worker_goes_on_while_the_callers_loop_stands_still(open_line: OpenLine)
         assert worker.error is None
 
 
-def test_worker_that_fails_says_so(open_line: OpenLine, caplog: pytest.LogCaptureFixture) -> None:
+def test_error_in_the_worker_is_reported(
+    open_line: OpenLine, caplog: pytest.LogCaptureFixture
+) -> None:
     async def fail() -> None:
         raise ValueError("on purpose")
 
@@ -149,7 +151,7 @@ def test_worker_that_fails_says_so(open_line: OpenLine, caplog: pytest.LogCaptur
         assert line.state.status is LineStatus.CONNECTED
 
 
-def test_worker_may_close_the_line_that_it_works_in(open_line: OpenLine) -> None:
+def test_worker_may_close_its_own_line(open_line: OpenLine) -> None:
     with PtyPeer(silent) as peer:
         line = open_line(peer.path)
 
@@ -161,7 +163,7 @@ def test_worker_may_close_the_line_that_it_works_in(open_line: OpenLine) -> None
         eventually(lambda: line.state.status is LineStatus.CLOSED)
 
 
-def test_listener_that_fails_does_no_harm(
+def test_error_in_a_listener_does_no_harm(
     open_line: OpenLine, caplog: pytest.LogCaptureFixture
 ) -> None:
     def listen(_event: object) -> None:
@@ -176,7 +178,7 @@ def test_listener_that_fails_does_no_harm(
     assert "listener" in caplog.text
 
 
-def test_protocol_library_says_nothing(
+def test_protocol_library_logs_nothing(
     open_line: OpenLine, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with PtyPeer(lambda _request, _count: [b"\x01\x2b\x0e\x01\x02"]) as peer:
@@ -186,7 +188,7 @@ def test_protocol_library_says_nothing(
     assert capfd.readouterr() == ("", "")
 
 
-def test_ports(tmp_path: Path) -> None:
+def test_ports_are_listed_in_order(tmp_path: Path) -> None:
     with PtyPeer(honest) as peer:
         assert is_pseudo_terminal(peer.path)
     assert not is_pseudo_terminal(str(tmp_path))

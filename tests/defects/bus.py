@@ -31,7 +31,7 @@ DEFECTS = (
         "if head != self.prefix[: len(head)]:",
         "if head[1:] != self.prefix[1 : len(head)]:",
         "The answer to another kind of request is accepted as values.",
-        ("tests/bus/test_faults.py::test_wrong_reply_is_thrown_away",),
+        ("tests/bus/test_faults.py::test_wrong_reply_is_discarded",),
     ),
     Defect(
         "reply-of-another-length",
@@ -39,7 +39,7 @@ DEFECTS = (
         "return bool(pdu) and self.extent(pdu) == len(pdu)",
         "return bool(pdu) and bool(self.extent(pdu))",
         "Words of a longer or shorter answer are accepted as the requested ones.",
-        ("tests/bus/test_requests.py", "tests/bus/test_tcp.py::test_wrong_reply_is_thrown_away"),
+        ("tests/bus/test_requests.py", "tests/bus/test_tcp.py::test_wrong_reply_is_discarded"),
     ),
     Defect(
         "echoed-value-not-compared",
@@ -47,7 +47,7 @@ DEFECTS = (
         "return Expectation(self.function, pdu, len(pdu))",
         "return Expectation(self.function, pdu[:3], len(pdu))",
         "A write counts as acknowledged although the drive received another value.",
-        ("tests/bus/test_faults.py::test_wrong_reply_is_thrown_away", "tests/bus/test_requests.py"),
+        ("tests/bus/test_faults.py::test_wrong_reply_is_discarded", "tests/bus/test_requests.py"),
     ),
     Defect(
         "echoed-count-not-compared",
@@ -55,7 +55,7 @@ DEFECTS = (
         "return Expectation(self.function, self.pdu()[:5], 5)",
         "return Expectation(self.function, self.pdu()[:3], 5)",
         "A write of several words counts as acknowledged although the drive took fewer.",
-        ("tests/bus/test_faults.py::test_wrong_reply_is_thrown_away", "tests/bus/test_requests.py"),
+        ("tests/bus/test_faults.py::test_wrong_reply_is_discarded", "tests/bus/test_requests.py"),
     ),
     Defect(
         "write-sent-twice",
@@ -87,7 +87,7 @@ DEFECTS = (
         "return result.end if job.first_sent is None else min(job.first_sent, result.end)",
         "return result.end",
         "A value from some seconds ago is shown with the current time.",
-        ("tests/bus/test_faults.py::test_late_reply_to_the_first_try_is_no_newer_than_that",),
+        ("tests/bus/test_faults.py::test_late_reply_has_the_time_of_its_own_try",),
     ),
     Defect(
         "reply-before-a-write-taken",
@@ -130,7 +130,7 @@ DEFECTS = (
         "self._silence = silence(link)",
         "self._silence = 0.0",
         "Strict drives receive two frames as one and do not answer.",
-        ("tests/bus/test_faults.py::test_silence_is_kept",),
+        ("tests/bus/test_faults.py::test_gap_between_frames_is_kept",),
     ),
     Defect(
         "echo-taken-for-the-answer",
@@ -138,7 +138,7 @@ DEFECTS = (
         "return 0 if copy < 0 else copy + len(self.frame)",
         "return 0",
         "A write through an echoing adapter counts as done without any drive.",
-        ("tests/bus/test_rtu.py", "tests/bus/test_echo.py::test_echo_alone_is_no_answer"),
+        ("tests/bus/test_rtu.py", "tests/bus/test_echo.py::test_echo_alone_is_not_a_reply"),
     ),
     Defect(
         "queue-serves-polls-first",
@@ -274,7 +274,7 @@ DEFECTS = (
         "max(time, self._sent, self._over) + self._gap",
         "max(time, self._sent) + self._gap",
         "A backup on a busy computer fails: the next request interrupts a reply.",
-        (f"{FAULTS}::test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_wire",),
+        (f"{FAULTS}::test_reply_with_a_pause_is_awaited_for_its_time_on_the_wire",),
     ),
     Defect(
         "copies-counted-once",
@@ -282,7 +282,7 @@ DEFECTS = (
         "                    self._note_copy(record, now - late.sent, now)\n",
         "                    pass\n",
         "Ten minutes after the first copy of a reply, the next copy is accepted as an answer.",
-        (f"{QUEUE}::test_copies_that_go_on_are_waited_for_as_long_as_they_come",),
+        (f"{QUEUE}::test_request_waits_as_long_as_copies_arrive",),
     ),
     Defect(
         "copies-waited-for-without-a-gap",
@@ -290,7 +290,7 @@ DEFECTS = (
         "after = max(LATE_MARGIN * came, came + self._timing.frame_gap)",
         "after = LATE_MARGIN * came",
         "A copy that an adapter delivers in its next block is accepted as an answer.",
-        (f"{QUEUE}::test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before",),
+        (f"{QUEUE}::test_wait_for_a_copy_exceeds_the_previous_gap",),
     ),
     Defect(
         "copies-unknown-to-the-heir",
@@ -306,7 +306,7 @@ DEFECTS = (
         "bytes([link.unit_of(device)])",
         "bytes([device])",
         "A prepared stop goes to a unit that the gateway does not answer.",
-        ("tests/bus/test_tcp.py::test_requests_to_the_only_drive_of_a_gateway_carry_its_unit",),
+        ("tests/bus/test_tcp.py::test_requests_to_the_only_drive_of_a_gateway_have_its_unit",),
     ),
     Defect(
         "replies-behind-trusted-on-contact",
@@ -314,7 +314,7 @@ DEFECTS = (
         "        return self._probes.find(job, 1) if own == before[-1] else None\n",
         "        return None\n",
         "A converter one reply behind shows another register's value of an Altivar 21.",
-        (f"{IN_STEP}::test_drive_with_few_forms_shows_no_wrong_value",),
+        (f"{IN_STEP}::test_drive_with_few_reply_lengths_yields_no_wrong_value",),
     ),
     Defect(
         "replies-behind-trusted-after-a-loss",
@@ -322,7 +322,7 @@ DEFECTS = (
         "            self._distrust(device)\n        for piece",
         "            pass\n        for piece",
         "A converter that falls one reply behind shows another register's value.",
-        (f"{IN_STEP}::test_converter_that_falls_behind_later_shows_no_wrong_value",),
+        (f"{IN_STEP}::test_converter_that_falls_behind_later_yields_no_wrong_value",),
     ),
     Defect(
         "slow-drive-named-as-behind",
@@ -330,7 +330,7 @@ DEFECTS = (
         "due = max(self._devices.last_reply_by(now), now + self._timing.first_timeout)",
         "due = now",
         "A drive slower than its timeout takes the whole line out of use.",
-        (f"{IN_STEP}::test_slow_drive_is_not_named_as_behind",),
+        (f"{IN_STEP}::test_slow_drive_is_not_reported_as_one_behind",),
     ),
     Defect(
         "stop-refused-on-a-line-that-is-behind",
@@ -338,7 +338,7 @@ DEFECTS = (
         "if not self.behind or is_stop_word(job):",
         "if not self.behind:",
         "A stop is not sent on a line whose replies are one behind.",
-        (f"{IN_STEP}::test_stop_is_sent_on_a_line_that_is_behind",),
+        (f"{IN_STEP}::test_stop_is_sent_on_a_line_with_replies_one_behind",),
     ),
     Defect(
         "longer-read-of-a-length-that-may-come",
@@ -346,7 +346,7 @@ DEFECTS = (
         "        return free <= max(now, self._devices.quiet_until)\n",
         "        return True\n",
         "The late reply to a longer read is accepted for another one.",
-        (f"{IN_STEP}::test_length_of_a_reply_that_may_still_come_is_not_used",),
+        (f"{IN_STEP}::test_lengthened_read_avoids_the_length_of_a_late_reply",),
     ),
     Defect(
         "longer-read-handed-out-whole",
@@ -354,6 +354,6 @@ DEFECTS = (
         "        own = self.own_part(pdu)\n",
         "        own = pdu\n",
         "A client of the gateway gets more registers than it requested.",
-        (f"{IN_STEP}::test_read_after_a_lost_reply_is_sent_longer_and_waits_for_nothing",),
+        (f"{IN_STEP}::test_read_after_a_lost_reply_is_lengthened_and_does_not_wait",),
     ),
 )

@@ -186,7 +186,8 @@ DEFECTS = (
         "    scale = Decimal(parameter.scale)\n    found = encode",
         "20 Hz are written as 200 Hz if the scale of the reference follows another word.",
         (
-            "tests/session/test_reference.py::test_run_with_scale_by_turns_at_the_hertz_that_were_typed",
+            "tests/session/test_reference.py"
+            "::test_run_with_scale_by_turns_at_the_hertz_that_were_typed",
         ),
     ),
     Defect(
@@ -204,7 +205,8 @@ DEFECTS = (
         "    if unit:\n        return places[0], typed\n",
         "20Hz are written as 20 % to a drive whose reference is a percentage.",
         (
-            "tests/session/test_reference.py::test_reference_in_a_unit_that_leads_nowhere_is_refused",
+            "tests/session/test_reference.py"
+            "::test_reference_in_a_unit_that_leads_nowhere_is_refused",
         ),
     ),
     Defect(
@@ -334,7 +336,8 @@ DEFECTS = (
         "self._sent[task.drive] = -math.inf",
         "The record of a start is removed before the motor turns.",
         (
-            "tests/session/test_starts.py::test_a_rest_read_before_the_run_frame_does_not_take_the_record",
+            "tests/session/test_starts.py"
+            "::test_a_rest_read_before_the_run_frame_does_not_take_the_record",
         ),
     ),
     Defect(

@@ -82,7 +82,7 @@ DEFECTS = (
         "            if objects.setdefault(number, content) != content:\n",
         "            if objects.setdefault(number, content) is None:\n",
         "Two drives at one address appear as the one whose name arrived first.",
-        ("tests/bus/test_faults.py::test_object_with_two_contents_is_named_and_refused",),
+        ("tests/bus/test_faults.py::test_object_with_two_different_values_is_refused",),
     ),
     Defect(
         "silent-read-ends-the-finding",

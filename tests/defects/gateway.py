@@ -298,7 +298,7 @@ DEFECTS = (
         "if request.pdu[0] in WRITE_FUNCTIONS:",
         "if not request.pdu:",
         "A stop waits until a silent drive before it times out.",
-        ("tests/bus/test_gateway.py::test_a_write_waits_for_no_read_before_it",),
+        ("tests/bus/test_gateway.py::test_write_does_not_wait_for_earlier_reads",),
     ),
     Defect(
         "foreign-stop-behind-writes",
@@ -330,7 +330,7 @@ DEFECTS = (
         "if not writes and talk.full:",
         "if False:",
         "A client with endless requests is served without a limit.",
-        ("tests/bus/test_gateway.py::test_reads_that_pile_up_keep_no_write_in_the_socket",),
+        ("tests/bus/test_gateway.py::test_queued_reads_do_not_delay_a_write_in_the_socket",),
     ),
     Defect(
         "foreign-start-of-long-ago",

@@ -73,7 +73,8 @@ DEFECTS = (
         "                pass\n",
         "An error in the panel disables the stop key.",
         (
-            "tests/ui/test_stop_keys.py::test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive",
+            "tests/ui/test_stop_keys.py"
+            "::test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive",
         ),
     ),
     Defect(

@@ -116,7 +116,8 @@ DEFECTS = (
         "pass",
         "No record shows what stopped or moved a motor.",
         (
-            "tests/session/test_first_stop.py::test_it_is_in_the_journal_with_what_was_reported_to_it",
+            "tests/session/test_first_stop.py"
+            "::test_it_is_in_the_journal_with_what_was_reported_to_it",
         ),
     ),
     Defect(
@@ -150,7 +151,8 @@ DEFECTS = (
         "                raise\n",
         "A late SIGTERM gives a successful command a traceback and status 1.",
         (
-            f"{LEFT}::test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done",
+            f"{LEFT}"
+            "::test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done",
         ),
     ),
     Defect(

@@ -16,7 +16,7 @@ DEFECTS = (
         "own = bool(usb.serial) and not _has_twin(usb, os.path.basename(real), system)",
         "own = True",
         "With two adapters of one make, settings are written to the drive on the wrong one.",
-        (f"{NAMES}::test_two_with_one_serial_number_are_distinguished",),
+        (f"{NAMES}::test_adapters_with_the_same_serial_number_are_distinguished",),
     ),
     Defect(
         "another-adapter-not-noticed",

@@ -13,7 +13,7 @@ DEFECTS = (
         "os.O_RDONLY | os.O_NOCTTY",
         "os.O_RDWR | os.O_NOCTTY",
         "A listener that should send nothing could disturb a motor of another master.",
-        ("tests/bus/test_listening_line.py::test_the_system_lets_nothing_be_written",),
+        ("tests/bus/test_listening_line.py::test_port_is_opened_read_only",),
     ),
     Defect(
         "listener-drains",
@@ -29,7 +29,7 @@ DEFECTS = (
         "        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)\n",
         "",
         "Listener and master on one port take each other's bytes.",
-        ("tests/bus/test_listening_line.py::test_one_program_at_a_time",),
+        ("tests/bus/test_listening_line.py::test_port_is_monitored_by_one_program_at_a_time",),
     ),
     Defect(
         "listener-takes-an-owned-line",
@@ -37,7 +37,7 @@ DEFECTS = (
         "if self._lock.take() or (",
         "if True or (",
         "Listening takes the replies from the panel that commands a motor.",
-        ("tests/bus/test_listening_line.py::test_a_line_of_another_drivepanel_is_left_to_it",),
+        ("tests/bus/test_listening_line.py::test_line_owned_by_another_drivepanel_is_refused",),
     ),
     Defect(
         "frame-cut-at-its-zero",
@@ -46,7 +46,8 @@ DEFECTS = (
         "and True:",
         "A reply that ends with a zero is truncated, and its values are lost.",
         (
-            "tests/wire/test_heard.py::test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it",
+            "tests/wire/test_heard.py"
+            "::test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it",
         ),
     ),
     Defect(

@@ -145,7 +145,7 @@ DEFECTS = (
         "A gateway that guesses the next transaction number answers early and is accepted.",
         (
             "tests/bus/test_hostile_peers.py"
-            "::test_bytes_before_a_request_with_guessed_number_are_no_reply",
+            "::test_bytes_before_a_request_with_a_guessed_transaction_are_not_a_reply",
         ),
     ),
     Defect(
@@ -154,7 +154,7 @@ DEFECTS = (
         "        await asyncio.sleep(0)\n        await asyncio.sleep(0)\n",
         "        await asyncio.sleep(0)\n",
         "An answer that arrived before its request is shown as the current value.",
-        ("tests/bus/test_hostile_peers.py::test_a_connection_hands_over_what_the_system_holds",),
+        ("tests/bus/test_hostile_peers.py::test_take_in_reads_pending_bytes_of_a_connection",),
     ),
     Defect(
         "flood-is-kept",
@@ -164,7 +164,7 @@ DEFECTS = (
         "A device server that sends noise delays every stop of its line for minutes.",
         (
             "tests/bus/test_hostile_peers.py"
-            "::test_a_reply_is_found_behind_a_flood_and_the_flood_is_not_kept",
+            "::test_reply_after_a_flood_is_found_and_the_flood_is_dropped",
         ),
     ),
     Defect(

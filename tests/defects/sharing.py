@@ -145,7 +145,7 @@ DEFECTS = (
         "owner.program.name == KEEPER and owner.version == VERSION",
         "owner.version == VERSION",
         "Another program kills a panel that holds its line.",
-        (f"{WATCH}::test_nothing_but_a_known_keeper_at_the_other_end_is_killed",),
+        (f"{WATCH}::test_only_a_known_keeper_is_killed",),
     ),
     Defect(
         "keeper-killed-after-an-own-pause",
@@ -153,7 +153,7 @@ DEFECTS = (
         "            self._awake = now\n",
         "            pass\n",
         "After each pause of the computer a program kills a healthy keeper.",
-        (f"{WATCH}::test_a_program_that_stood_still_itself_kills_nothing",),
+        (f"{WATCH}::test_program_that_was_suspended_kills_no_keeper",),
     ),
     Defect(
         "line-comes-and-goes-for-ever",
@@ -193,7 +193,7 @@ DEFECTS = (
         "            if stops:\n",
         "            if False:\n",
         "A stop is not even handed over because the read before it failed.",
-        (f"{STOPS}::test_the_look_before_a_stop_fails_so_that_the_stop_is_given",),
+        (f"{STOPS}::test_read_before_a_stop_fails_so_that_the_stop_is_sent",),
     ),
     Defect(
         "keeper-that-stays-not-reported",
@@ -225,7 +225,7 @@ DEFECTS = (
         "if client.is_silent(now, LOOKS_IN_VAIN):",
         "if False:",
         "A frozen program keeps command of its drive, and a recorder keeps its motor running.",
-        (f"{FROZEN}::test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more",),
+        (f"{FROZEN}::test_frozen_client_counts_as_gone_and_loses_its_drives",),
     ),
     Defect(
         "thawed-client-commands-again",
@@ -233,7 +233,7 @@ DEFECTS = (
         "gone = client.program.id in self._gone_before",
         "gone = False",
         "A program that was frozen for a minute takes its drive back, still armed.",
-        (f"{FROZEN}::test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more",),
+        (f"{FROZEN}::test_frozen_client_counts_as_gone_and_loses_its_drives",),
     ),
     Defect(
         "clients-of-a-thawed-owner-let-go",
@@ -284,7 +284,7 @@ DEFECTS = (
         "if job.commands and late > COMMAND_TOO_LATE:",
         "if False:",
         'A run command is sent long after its person got a "no answer" message.',
-        (f"{ENDS}::test_a_command_that_lay_in_the_socket_for_long_is_not_sent",),
+        (f"{ENDS}::test_command_delayed_in_the_socket_is_not_sent",),
     ),
     Defect(
         "stops-counted-together",
@@ -292,7 +292,7 @@ DEFECTS = (
         "known[program] = count",
         'known[""] = max(known.get("", 0), count)',
         "Of two stops at the same time, one cancels nothing.",
-        (f"{STOPS}::test_counts_only_go_up_and_one_telling_counts_once",),
+        (f"{STOPS}::test_stop_counts_only_increase_and_count_a_message_once",),
     ),
     Defect(
         "stop-counts-without-bounds",
@@ -308,7 +308,7 @@ DEFECTS = (
         "if program in counts and is_newer(known := counts[program], own):",
         "if program in counts and is_newer(known := counts[program], own) and False:",
         "A program's stop counts as known because another program counted for it before.",
-        (f"{BOUNDS}::test_stop_count_that_others_raised_falls_back_to_its_own_program",),
+        (f"{BOUNDS}::test_stop_count_raised_by_others_is_corrected_by_its_program",),
     ),
     Defect(
         "stop-in-another-programs-name",
@@ -340,7 +340,7 @@ DEFECTS = (
         "if holder is not None and holder != program:",
         "if False:",
         "Two programs write to one drive in turn.",
-        ("tests/bus/test_share.py::test_a_drive_that_another_program_commands_takes_no_write",),
+        ("tests/bus/test_share.py::test_drive_commanded_by_another_program_is_not_written",),
     ),
     Defect(
         "write-repeated-by-the-next-owner",
@@ -364,7 +364,7 @@ DEFECTS = (
         "inside.timing.late_reply if before.socket else",
         "0.0 if before.socket else",
         "The first value after a killed holder is the reply to the holder's last request.",
-        (f"{ENDS}::test_one_that_comes_after_a_killed_owner_keeps_the_same_silence",),
+        (f"{ENDS}::test_program_that_opens_after_a_killed_owner_waits_for_late_replies",),
     ),
     Defect(
         "any-reply-proves-the-step",
@@ -404,7 +404,7 @@ DEFECTS = (
         "self._lock.give_back(last if quiet > 0 or stopped else None)",
         "self._lock.give_back(None)",
         "A program that opens the line just after another one gets the other's answer.",
-        (f"{ENDS}::test_one_that_comes_after_an_owner_that_ended_keeps_it_too",),
+        (f"{ENDS}::test_program_that_opens_after_a_closed_owner_waits_for_late_replies",),
     ),
     Defect(
         "programs-gone-with-the-owner-not-missed",
@@ -412,7 +412,7 @@ DEFECTS = (
         "                self._missing(program)\n",
         "                pass\n",
         "A recorder keeps a motor running whose program was killed together with the panel.",
-        (f"{ENDS}::test_programs_that_went_with_the_owner_are_missed_by_the_next",),
+        (f"{ENDS}::test_next_owner_reports_programs_that_exited_with_the_owner",),
     ),
     Defect(
         "shared-values-outlive-a-write",
@@ -484,7 +484,7 @@ DEFECTS = (
         "return result.turnaround + self._clock() - result.end > longest + STILL",
         "return False",
         "After a program was frozen, an old value has the current time.",
-        (f"{STOPS}::test_an_answer_that_waited_for_a_stopped_program_is_requested_again",),
+        (f"{STOPS}::test_reply_delayed_by_a_suspended_program_is_requested_again",),
     ),
     Defect(
         "long-answer-asked-for-without-end",
@@ -565,8 +565,8 @@ DEFECTS = (
         "if note.device == self._device:",
         "Monitor shows the trend of the drive that had the address before.",
         (
-            "tests/session/test_trend_notes.py::test_a_trend_of_another_family_at_the_same_address"
-            "_is_not_taken",
+            "tests/session/test_trend_notes.py"
+            "::test_a_trend_of_another_family_at_the_same_address_is_not_taken",
         ),
     ),
     Defect(
@@ -575,7 +575,7 @@ DEFECTS = (
         "while self._size > MOST_NOTES or (",
         "while (",
         "A keeper stores the data of exited programs until the computer has no memory left.",
-        ("tests/bus/test_notes.py::test_the_oldest_notes_make_room_for_new_ones",),
+        ("tests/bus/test_notes.py::test_oldest_notes_are_dropped_for_new_ones",),
     ),
     Defect(
         "message-of-another-program-as-new",
@@ -593,7 +593,8 @@ DEFECTS = (
         "            if given and now > direct_at:",
         "The line's loop hangs in the panel, and its stop key takes effect after 2 s.",
         (
-            "tests/session/test_hung_loop.py::test_the_keeper_stops_drives_whose_stop_does_not_begin",
+            "tests/session/test_hung_loop.py"
+            "::test_the_keeper_stops_drives_whose_stop_does_not_begin",
         ),
     ),
     Defect(
@@ -602,7 +603,7 @@ DEFECTS = (
         'b"%s %s\\n" % (STOP_HEAD',
         'b"%s %s" % (STOP_HEAD',
         "The keeper waits for the end of the line, and no drive is stopped.",
-        ("tests/bus/test_plain_stop.py::test_a_client_stops_by_a_connection_of_its_own",),
+        ("tests/bus/test_plain_stop.py::test_client_stops_by_a_separate_connection",),
     ),
     Defect(
         "stop-in-proof-not-repeated",
@@ -626,9 +627,7 @@ DEFECTS = (
         "path, self._find_holder, self._drop_lock, within",
         "path, self._find_holder, self._drop_lock",
         "The keeper dies while the disk hangs: for 10 s no program reads or stops.",
-        (
-            "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
-        ),
+        ("tests/bus/test_share_ends.py::test_hung_disk_does_not_keep_a_line_closed",),
     ),
     Defect(
         "late-lock-kept",
@@ -636,9 +635,7 @@ DEFECTS = (
         "        self._lock.hand_over()\n\n    def _give_to_keeper",
         "\n    def _give_to_keeper",
         "After the disk recovers no program can attach: one keeps a lock and serves no line.",
-        (
-            "tests/bus/test_share_ends.py::test_a_disk_that_takes_nothing_does_not_keep_a_line_closed",
-        ),
+        ("tests/bus/test_share_ends.py::test_hung_disk_does_not_keep_a_line_closed",),
     ),
     Defect(
         "use-of-no-program-told",
@@ -646,10 +643,7 @@ DEFECTS = (
         "        if not program:\n            return",
         "        if program is None:\n            return",
         "After a repeated stop no client understands the keeper, and none stays attached.",
-        (
-            "tests/bus/test_program_use.py::test_a_request_of_no_program_leaves_the_counters"
-            "_a_message",
-        ),
+        ("tests/bus/test_program_use.py::test_counters_with_an_unknown_program_can_be_encoded",),
     ),
     Defect(
         "lock-given-back-while-a-thread-uses-it",
@@ -658,8 +652,8 @@ DEFECTS = (
         "        if True:\n            self._lock",
         "A keeper starts with a lock that is already closed, and the line's thread ends.",
         (
-            "tests/bus/test_share_ends.py::test_a_line_that_closes_leaves_the_lock_to_the_thread_that"
-            "_uses_it",
+            "tests/bus/test_share_ends.py"
+            "::test_closing_line_leaves_the_lock_to_the_thread_that_uses_it",
         ),
     ),
     Defect(
@@ -669,7 +663,8 @@ DEFECTS = (
         "{record.device for record in living}",
         "After a container was killed, the motor of the next killed program keeps running.",
         (
-            "tests/session/test_starts.py::test_a_record_of_an_earlier_container_hides_no_later_start",
+            "tests/session/test_starts.py"
+            "::test_a_record_of_an_earlier_container_hides_no_later_start",
         ),
     ),
     Defect(
@@ -679,7 +674,8 @@ DEFECTS = (
         "            if False:\n                raise",
         "On a slow disk a keeper holds the line beside its program, and stops its motor.",
         (
-            "tests/bus/test_share_ends.py::test_no_keeper_is_started_once_its_program_holds_the_line",
+            "tests/bus/test_share_ends.py"
+            "::test_keeper_is_not_started_once_its_program_holds_the_line",
         ),
     ),
     Defect(
@@ -696,6 +692,6 @@ DEFECTS = (
         "        if connection.recv(len(GIVEN)) != GIVEN:",
         "        if connection.recv(len(GIVEN)) is None:",
         "A stop that the keeper did not accept counts as sent, and is not retried.",
-        ("tests/bus/test_plain_stop.py::test_a_stop_that_nobody_takes_is_no_stop",),
+        ("tests/bus/test_plain_stop.py::test_plain_stop_without_an_acknowledgment_raises",),
     ),
 )
