@@ -46,7 +46,7 @@ def slots(text: str) -> dict[str, Any]:
     return {slot["slot"]: slot for b in json.loads(text)["blocks"] for slot in b["slots"]}
 
 
-def test_set_show_verify_save_load_factory(line: str, tmp_path: Path) -> None:
+def test_block_is_set_shown_verified_saved_loaded_and_reset(line: str, tmp_path: Path) -> None:
     drive, file = ("-d", "2"), tmp_path / "scanner.toml"
     shown = run(0, line, *drive)
     assert re.search(r"NMA1 +ETA", shown)
@@ -75,7 +75,7 @@ def test_set_show_verify_save_load_factory(line: str, tmp_path: Path) -> None:
     assert slots(run(0, line, "--json", *drive))["NMA3"]["code"] == "LCR"
 
 
-def test_json_is_one_document_after_writing_too(line: str) -> None:
+def test_json_after_a_write_is_one_document(line: str) -> None:
     done = run(0, line, "set", "NCA3=ACC", "--arm", "--json", "-d", "2")
     reported = json.loads(done)
     assert {b["id"] for b in reported["blocks"]} == {"scanner-read", "scanner-write"}
@@ -102,11 +102,11 @@ def test_json_is_one_document_after_writing_too(line: str) -> None:
         (("look",), 2, "look"),
     ],
 )
-def test_refusals_and_their_statuses(arguments: tuple[str, ...], status: int, says: str) -> None:
+def test_refusal_has_its_exit_status(arguments: tuple[str, ...], status: int, says: str) -> None:
     assert says in refused(status, "sim:atv71", *arguments)
 
 
-def test_a_bad_file_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_bad_file_is_refused_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "bad.toml"
     run(0, "sim:atv71", "save", file)
     text = file.read_text()
@@ -115,11 +115,11 @@ def test_a_bad_file_is_refused_with_its_line(tmp_path: Path) -> None:
     assert f"bad.toml:{number}: NMA2" in refused(2, "sim:atv71", "load", file, "--arm")
 
 
-def test_a_drive_that_does_not_answer() -> None:
+def test_drive_that_does_not_answer_exits_with_3() -> None:
     assert "answer" in refused(3, "sim:atv71@2", "-d", "9", "-p", "atv71")
 
 
-def test_a_running_motor_keeps_its_assignment() -> None:
+def test_running_motor_keeps_its_assignment() -> None:
     with tcp_line("atv71@2", "--run", "30") as line:
         output = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
         assert "motor stopped only" in output
@@ -137,7 +137,7 @@ def test_write_cut_by_signal_is_reported_by_slot(
     assert "Slots written and verified: NMA3. NMA4 may have been written too: look at it." in output
 
 
-def test_a_line_that_is_lost_meanwhile_is_no_refusal(
+def test_line_lost_during_a_write_is_not_a_refusal(
     line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fail_write(monkeypatch, "NMA4", LineLost("The owner ended."))
@@ -157,7 +157,7 @@ def fail_write(monkeypatch: pytest.MonkeyPatch, code: str, error: BaseException)
     monkeypatch.setattr(Writer, "write_parameter", failing)
 
 
-def test_the_indirect_block_counts_after_a_reset() -> None:
+def test_indirect_block_takes_effect_after_a_reset() -> None:
     with tcp_line("atv21@1") as line:
         done = run(0, line, "set", "F875=FD01", "F876=FD00", "--arm", "-p", "atv21")
         assert "In force after the drive's next reset" in done
@@ -168,7 +168,7 @@ def test_the_indirect_block_counts_after_a_reset() -> None:
 
 
 @pytest.mark.parametrize("family", LONELY)
-def test_a_family_without_blocks_says_so_and_shows_its_neighbors(family: str) -> None:
+def test_family_without_blocks_says_so_and_shows_neighbors(family: str) -> None:
     line = f"sim:{family}"
     text = run(0, line, "-p", family)
     assert "neither an indirect block nor a communication scanner" in text

@@ -41,7 +41,7 @@ def bundled(file: Path, *words: str) -> tuple[dict[str, Any], dict[str, bytes]]:
     return report, files
 
 
-def test_two_drives_are_whole_and_nothing_is_written(tmp_path: Path) -> None:
+def test_bundle_of_two_drives_is_complete_and_writes_nothing(tmp_path: Path) -> None:
     file = tmp_path / "a.zip"
     with counted("atv71") as served:
         report, files = bundled(file, served.line)
@@ -69,7 +69,7 @@ def test_two_drives_are_whole_and_nothing_is_written(tmp_path: Path) -> None:
 
 
 @posix
-def test_missing_port_gives_all_that_needs_no_line(tmp_path: Path) -> None:
+def test_bundle_without_a_port_has_all_parts_that_need_no_line(tmp_path: Path) -> None:
     port = tmp_path / "ttyUSB7"
     report, files = bundled(tmp_path / "a.zip", f"serial:{port}", "-d", "2", "-d", "5")
     assert json.loads(files["drive-2/why.json"])["rung"] == "no-port"
@@ -106,7 +106,7 @@ PEOPLE = "/".join(("", "home"))
 PLANTED = ("erna.muster", "Erna Muster", "press7-pc", "Tr0ub4dor&3", "S3cr3t+pw", "gw9.factory.lan")
 
 
-def test_no_planted_name_or_password_is_in_it(
+def test_bundle_has_no_planted_name_or_password(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state = tmp_path / "people" / "erna.muster"
@@ -173,9 +173,7 @@ def test_file_is_private_and_replaced_by_force_only(tmp_path: Path) -> None:
     assert "no folder" in ended(2, "bundle", "sim:atv312", "--output", tmp_path / "x" / "a").stderr
 
 
-def test_usual_name_is_made_of_line_and_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_default_name_has_line_and_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ended(0, "bundle", "sim:atv312")
     (file,) = tmp_path.glob("*.zip")

@@ -59,7 +59,7 @@ SHORT = [text for text in EXAMPLES.values() if not LONG & {*commands_of(text)}]
 
 
 @pytest.mark.parametrize("text", kept(EXAMPLES.values(), *SHORT), ids=EXAMPLES.keys())
-def test_the_commands_of_a_section(
+def test_commands_of_a_section_run_as_printed(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for line, status in printed(text):
@@ -103,7 +103,7 @@ def test_every_option_is_in_the_help_of_its_command() -> None:
                     assert word in reported, line
 
 
-def test_every_metric_is_on_the_page_of_the_plant() -> None:
+def test_every_metric_is_on_the_plant_page() -> None:
     page = (DOCS / "plant.md").read_text("utf-8")
     for name in METRICS:
         assert f"`drivepanel_{name}`" in page, name

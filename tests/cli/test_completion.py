@@ -33,13 +33,13 @@ def completed(typed: str) -> list[str]:
     return [item.value for item in found]
 
 
-def test_commands() -> None:
+def test_commands_are_completed() -> None:
     assert completed("st") == ["status", "stop"]
     assert set(COMMANDS) <= set(completed(""))
     assert completed("-v re") == ["read", "reference", "report", "reset", "restore"]
 
 
-def test_commands_are_not_imported_for_it() -> None:
+def test_completion_imports_no_command() -> None:
     # in a program of its own: modules taken out here would be other ones for the tests after it
     program = (
         "import sys; from click.shell_completion import ShellComplete as S;"
@@ -58,7 +58,7 @@ def test_profiles_are_completed_with_their_names() -> None:
     assert [(item.value, item.help) for item in found] == [("atv71", library.load("atv71").name)]
 
 
-def test_options() -> None:
+def test_options_are_completed() -> None:
     assert {"--device", "--profile", "--every", "--csv", "--json"} <= set(completed("watch --"))
     assert {"--read-only", "--low-bandwidth", "--verbose"} <= set(completed("--"))
     assert "--on-hangup" in completed("/dev/ttyUSB0 --")
@@ -66,21 +66,21 @@ def test_options() -> None:
 
 
 @pytest.mark.parametrize("command", ["", "read ", "status ", "block ", "backup "])
-def test_lines(command: str) -> None:
+def test_lines_are_completed(command: str) -> None:
     assert completed(f"{command}/dev/") == ["/dev/ttyUSB0", "/dev/ttyUSB1"]
     assert completed(f"{command}tc") == ["tcp:"]
     assert completed(f"{command}sim:atv3") == ["sim:atv31", "sim:atv312"]
     assert completed(f"{command}sim:atv71@2,atv31") == ["sim:atv71@2,atv31", "sim:atv71@2,atv312"]
 
 
-def test_profiles() -> None:
+def test_profiles_are_completed() -> None:
     packaged = {listing.id for listing in library.listings()}
     assert set(completed("read /dev/ttyUSB0 -p ")) == packaged
     assert completed("profiles pow") == ["powerdrive"]
     assert completed("simulate pow") == ["powerdrive"]
 
 
-def test_codes() -> None:
+def test_codes_are_completed() -> None:
     assert completed("read /dev/ttyUSB0 -p atv312 AC") == ["ACC", "AC2"]
     assert completed("watch sim:atv71@2,atv312 -d 1 ac") == ["ACC", "AC2"]
     assert completed("read sim:atv71@2,atv312 -d 2 RFRD") == ["RFRD"]
@@ -107,7 +107,7 @@ def test_wrong_word_completes_to_nothing() -> None:
         ("drivepanel write sim:atv312 ACC", "ACC="),
     ],
 )
-def test_bash_itself(typed: str, replies: str, tmp_path: Path) -> None:
+def test_bash_completes_commands_and_lines(typed: str, replies: str, tmp_path: Path) -> None:
     program = tmp_path / "drivepanel"
     program.write_text(f'#!/bin/bash\nexec {shlex.quote(sys.executable)} -m tui "$@"\n')
     program.chmod(0o755)
@@ -125,7 +125,7 @@ def test_bash_itself(typed: str, replies: str, tmp_path: Path) -> None:
     assert (done.stdout.strip(), done.stderr) == (replies, "")
 
 
-def test_bash_without_a_place_of_the_cursor(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bash_without_a_cursor_position_completes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COMP_LINE", "drivepanel st")
     monkeypatch.setenv("COMP_POINT", "")
     assert BashByLine(main, {}, "drivepanel", "_X").get_completion_args() == ([], "st")

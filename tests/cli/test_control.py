@@ -20,7 +20,7 @@ def line() -> Iterator[str]:
         yield served
 
 
-def test_the_control_is_taken_and_given_back(line: str) -> None:
+def test_control_is_taken_and_given_back(line: str) -> None:
     output = motor(5, line, *DRIVE, "--arm", "--for", "1")
     assert "run --take-control takes the control first." in output
     assert held(line, COMMAND_WORD) == 0
@@ -54,27 +54,27 @@ def test_stop_without_arming_gives_nothing_back_exits_with_6(line: str) -> None:
     assert held(line, IN_FORCE) == 1
 
 
-def test_control_that_would_start_motor_is_not_taken_exits_with_5(line: str) -> None:
+def test_taking_control_that_would_start_the_motor_exits_with_5(line: str) -> None:
     put(line, COMMAND_WORD, 0x0003)
     output = motor(5, line, *DRIVE, "--arm", "--take-control")
     assert "the motor would start as soon as that word takes effect" in output
     assert held(line, IN_FORCE) == 0
 
 
-def test_giving_back_needs_one_drive_exits_with_2() -> None:
+def test_giving_back_several_drives_exits_with_2() -> None:
     refused(2, "stop", "sim:powerdrive", "--all", "--give-back")
 
 
-def test_family_without_control_to_take_exits_with_5() -> None:
+def test_taking_control_of_a_family_without_it_exits_with_5() -> None:
     output = motor(5, "sim:atv71@1", "--arm", "--take-control")
     assert "has no control to take" in output
 
 
-def test_family_without_control_to_give_back_is_stopped_exits_with_6() -> None:
+def test_giving_back_control_of_a_family_without_it_stops_and_exits_with_6() -> None:
     output = refused(6, "stop", "sim:atv71@1", "--give-back", "--arm")
     assert "has no control to give back" in output
 
 
-def test_status_names_no_control_where_a_family_has_none() -> None:
+def test_status_omits_control_for_a_family_without_it() -> None:
     assert "Control  " not in run(0, "status", "sim:atv71@1")
     assert json.loads(run(0, "status", "sim:atv71@1", "--json"))["control"] is None

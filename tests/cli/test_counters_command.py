@@ -12,7 +12,7 @@ def counted(status: int, *words: str) -> Any:
     return json.loads(ended(status, "counters", *words, "--json").stdout)
 
 
-def test_a_good_line_ends_with_0() -> None:
+def test_good_line_exits_with_0() -> None:
     reported = counted(0, "sim:atv71", "--frames", "7")
     assert reported["test"] == {"frames": 7, "answered": 7}
     assert reported["agree"] is True
@@ -32,7 +32,7 @@ def test_a_good_line_ends_with_0() -> None:
     assert (minutes["line"]["foreign"], minutes["line"]["strays"]) == (0, 0)
 
 
-def test_lost_answers_end_with_1_and_are_reported() -> None:
+def test_lost_replies_are_reported_and_exit_with_1() -> None:
     with tcp_line("atv71@2", "--line-fault", "lost=0.2", "--seed", "3") as line:
         reported = counted(1, line, "-d", "2", "--frames", "10")
         (found,) = reported["differences"]
@@ -44,12 +44,12 @@ def test_lost_answers_end_with_1_and_are_reported() -> None:
         assert own["share"] < 1.0
 
 
-def test_a_drive_without_counters_is_compared_with_nothing() -> None:
+def test_drive_without_counters_is_not_compared() -> None:
     done = ended(0, "counters", "sim:atv312", "--frames", "3")
     assert "reports no counters of its own" in done.stdout
 
 
-def test_the_drives_counters_are_reset_armed_only_and_where_it_has_them() -> None:
+def test_counters_of_a_drive_are_reset_only_if_armed_and_available() -> None:
     with tcp_line("atv71@2") as line:
         assert "Not armed" in ended(5, "counters", line, "-d", "2", "--reset-drive").stderr
         before = counted(0, line, "-d", "2")["drive"][0]["frames"]

@@ -25,7 +25,7 @@ TYPED = {
 
 
 @pytest.mark.parametrize("words", TYPED.values(), ids=TYPED)
-def test_no_command_shows_more_digits_than_a_count_has(words: tuple[str, ...]) -> None:
+def test_no_command_shows_more_digits_than_the_scale(words: tuple[str, ...]) -> None:
     installed_mixer(FINE)
     with tcp_line(f"{MIXER}@1", "--set", "REF=16385") as line:
         shown = run(0, words[0], line, *words[1:], "-p", MIXER)
@@ -34,7 +34,7 @@ def test_no_command_shows_more_digits_than_a_count_has(words: tuple[str, ...]) -
         assert "20.001" in shown
 
 
-def test_numbers_in_json_and_csv_are_those_that_are_shown(tmp_path: Path) -> None:
+def test_numbers_in_json_and_csv_equal_the_numbers_shown(tmp_path: Path) -> None:
     installed_mixer(FINE)
     with tcp_line(f"{MIXER}@1", "--set", "REF=16385") as line:
         found = json.loads(run(0, "read", line, "REF", "--json", "-p", MIXER))["values"]["REF"]

@@ -124,7 +124,7 @@ def test_every_document_names_a_command_and_every_command_has_one() -> None:
     assert named == set(COMMANDS) - NO_JSON
 
 
-def test_a_motor_that_runs_and_its_stop() -> None:
+def test_run_and_stop_print_their_documents() -> None:
     done = drivepanel("run", *DRIVE, "--reference", "20Hz", "--for", "2", "--arm", "--json")
     assert done.returncode == 0, done.stderr
     assert forms_of(done.stdout) == {"RunDocument"}
@@ -132,7 +132,7 @@ def test_a_motor_that_runs_and_its_stop() -> None:
     assert {"reference", "order", "state", "stopping", "stopped"} <= set(events)
 
 
-def test_a_drive_that_is_held() -> None:
+def test_hold_prints_its_document() -> None:
     with served([*DRIVEPANEL, "hold", *DRIVE, "--json"], ready="{") as holding:
         (reported,) = documents(holding.ready)
     assert form_of(reported) == "HoldDocument"
@@ -147,7 +147,7 @@ def test_first_stop_word_is_reported() -> None:
     assert reported["timeout"]["begun"] is True
 
 
-def test_a_proof() -> None:
+def test_prove_prints_its_document() -> None:
     with tcp_line("atv312@1", "--set", "ttO=5", "--any-settings") as line:
         (reported,) = documents(ended(0, "prove", line, "--arm", "--reset", "--json").stdout)
     assert form_of(reported) == "ProveDocument"
@@ -156,7 +156,7 @@ def test_a_proof() -> None:
     assert reported["reset"] is True
 
 
-async def test_a_drive_in_fault() -> None:
+async def test_status_of_a_fault_prints_its_document() -> None:
     async with fault_status.line("atv71") as opened:
         fault_status.provoke(opened, "ObF")
         status = await fault_status.status_of(opened, "atv71")
@@ -166,7 +166,7 @@ async def test_a_drive_in_fault() -> None:
     assert row["fault"]["reset"]
 
 
-def test_a_simulated_line() -> None:
+def test_simulate_prints_its_documents() -> None:
     simulate = [*DRIVEPANEL, "simulate", "atv71@2", "--tcp", "127.0.0.1:0", "--json"]
     with served(simulate, ready="{", stdin=subprocess.PIPE) as simulation:
         (reported,) = documents(simulation.ready)
@@ -181,7 +181,7 @@ def test_a_simulated_line() -> None:
     assert reported["drives"] == [{"profile": "atv71", "device": 2}]
 
 
-def test_lines_that_are_served() -> None:
+def test_serve_prints_its_documents() -> None:
     options = ["--tcp", ":0", "--allow-writes", "all", "--metrics", ":0", "--json"]
     with served([*DRIVEPANEL, "serve", "sim:atv71@2", *options], ready="{") as program:
         (reported,) = documents(program.ready)
@@ -196,7 +196,7 @@ def test_lines_that_are_served() -> None:
     assert reported["mqtt"] is None
 
 
-def test_values_that_are_published() -> None:
+def test_publish_prints_its_documents() -> None:
     url = f"mqtt://127.0.0.1:{free_port()}/plant"
     with served([*DRIVEPANEL, "publish", *DRIVE, "--mqtt", url, "--json"], ready="{") as program:
         (reported,) = documents(program.ready)
@@ -204,7 +204,7 @@ def test_values_that_are_published() -> None:
     assert reported["mqtt"] == url
 
 
-def test_events_of_a_search_that_are_rare(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rare_scan_events_have_their_documents(capsys: pytest.CaptureFixture[str]) -> None:
     telling = ScanTelling("/dev/ttyUSB0", as_json=True)
     telling.slow([LineSetting(1200, "8E1")], 12.34, "It takes 12 s.")
     telling.unclear(LineSetting(1200, "8E1"), ScanResult(3, None, "Damaged."))
@@ -214,7 +214,7 @@ def test_events_of_a_search_that_are_rare(capsys: pytest.CaptureFixture[str]) ->
     ]  # fmt: skip
 
 
-def test_a_reset_of_a_fault() -> None:
+def test_reset_prints_its_document() -> None:
     with Simulation(parse_drives("atv71@1")) as simulation:
         host, port = simulation.serve_tcp()
         simulation.drive(1).provoke("ObF")
@@ -237,7 +237,7 @@ def test_every_command_has_json() -> None:
         assert "--json" in invoked(name, "--help").stdout
 
 
-def test_the_committed_schema_is_up_to_date() -> None:
+def test_committed_schema_is_up_to_date() -> None:
     assert SCHEMA.read_text("utf-8") == documents_schema()
 
 
@@ -249,18 +249,18 @@ WRONG: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("change", WRONG.values(), ids=WRONG.keys())
-def test_the_check_sees_what_it_is_for(change: dict[str, Any]) -> None:
+def test_wrong_document_fails_the_check(change: dict[str, Any]) -> None:
     (reported,) = documents(ended(0, "read", *DRIVE, "ACC", "--json").stdout)
     with pytest.raises(ValueError, match="ReadDocument"):
         form_of({**reported, **change})
 
 
-def test_the_check_sees_a_document_without_its_version() -> None:
+def test_document_without_a_version_fails_the_check() -> None:
     (reported,) = documents(ended(0, "read", *DRIVE, "ACC", "--json").stdout)
     del reported["schema"]
     with pytest.raises(ValueError, match="a field is missing"):
         form_of(reported)
 
 
-def test_documents_have_names_of_their_own() -> None:
+def test_document_names_are_unique() -> None:
     assert len({form.__name__ for form in forms()}) == len(forms())

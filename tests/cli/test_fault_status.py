@@ -48,7 +48,7 @@ def text_of(status: Status) -> str:
     return "\n".join(f"{title}: {text}" for title, text in status_table(status))
 
 
-async def test_a_fault_with_causes_checks_and_live_values() -> None:
+async def test_fault_has_causes_checks_and_live_values() -> None:
     async with line("atv71") as opened:
         assert opened.simulation is not None
         opened.simulation.drive(1).set("DEC", 5)
@@ -85,7 +85,7 @@ async def test_a_fault_with_causes_checks_and_live_values() -> None:
         assert part in text
 
 
-async def test_the_drive_tells_that_the_cause_is_there_still() -> None:
+async def test_drive_reports_that_the_cause_is_still_present() -> None:
     async with line("atv312") as opened:
         provoke(opened, "ObF", persists=True)
         status = await status_of(opened, "atv312")
@@ -93,7 +93,7 @@ async def test_the_drive_tells_that_the_cause_is_there_still() -> None:
     assert "reset: Not yet, says the drive" in text_of(status)
 
 
-async def test_a_wait_before_the_reset() -> None:
+async def test_fault_that_needs_a_wait_before_the_reset_says_so() -> None:
     async with line("atv21") as opened:
         provoke(opened, "OL2")
         status = await status_of(opened, "atv21")
@@ -103,7 +103,7 @@ async def test_a_wait_before_the_reset() -> None:
     assert "wait about 120 s before it (general practice)" in text_of(status)
 
 
-async def test_a_trip_without_a_number() -> None:
+async def test_trip_without_a_fault_number_has_help() -> None:
     async with line("varmeca") as opened:
         provoke(opened, 1)
         status = await status_of(opened, "varmeca")
@@ -113,7 +113,7 @@ async def test_a_trip_without_a_number() -> None:
     assert {row["code"] for row in reported["look_at"]} == {"11.63", "15.07", "10.33"}
 
 
-async def test_an_alarm_has_its_causes_and_no_reset() -> None:
+async def test_alarm_has_causes_but_no_reset() -> None:
     async with line("atv71") as opened:
         assert opened.simulation is not None
         opened.simulation.drive(1).set("LRS6", 1 << 8)
@@ -128,7 +128,7 @@ async def test_an_alarm_has_its_causes_and_no_reset() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71", "varmeca"])
-async def test_nothing_is_read_or_reported_where_there_is_no_fault(family: str) -> None:
+async def test_no_fault_reads_and_reports_nothing(family: str) -> None:
     async with line(family) as opened:
         status = await status_of(opened, family)
     assert status.finding is None
@@ -136,7 +136,7 @@ async def test_nothing_is_read_or_reported_where_there_is_no_fault(family: str) 
     assert "probably" not in text_of(status)
 
 
-def test_a_profile_is_checked_with_its_help(tmp_path: Path) -> None:
+def test_profile_is_checked_with_its_help(tmp_path: Path) -> None:
     profile = own_drive(tmp_path, '[[faults]]\nraw = 900\nprobable = ["A jam"]\n')
     output = refused(2, "profiles", "--check", profile)
     assert "help/mine.toml:1: help of fault 900: there is no such fault." in output

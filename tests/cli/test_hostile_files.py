@@ -70,19 +70,19 @@ def odd(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
     return path, reported
 
 
-def test_as_a_profile(odd: tuple[Path, str]) -> None:
+def test_hostile_file_as_a_profile_is_refused(odd: tuple[Path, str]) -> None:
     assert odd[1] in refused(2, "profiles", "--check", odd[0])
 
 
-def test_as_a_parameter_set(odd: tuple[Path, str]) -> None:
+def test_hostile_file_as_a_parameter_set_is_refused(odd: tuple[Path, str]) -> None:
     assert odd[1] in refused(2, "compare", odd[0], "factory")
 
 
-def test_as_a_block_file(odd: tuple[Path, str]) -> None:
+def test_hostile_file_as_a_block_file_is_refused(odd: tuple[Path, str]) -> None:
     assert odd[1] in refused(2, "block", PUMP, "load", odd[0], "--dry-run")
 
 
-def test_among_ones_own_profiles_it_hinders_no_other(
+def test_hostile_file_among_own_profiles_does_not_affect_others(
     odd: tuple[Path, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "own"))
@@ -106,7 +106,7 @@ STATE = (
 
 
 @pytest.mark.parametrize("make", [pipe, zeros, folder, loop, text(b"\xff" * 50), text("[" * 99999)])
-def test_in_the_state_folder_it_keeps_no_write_and_no_stop_from_its_end(
+def test_hostile_file_in_the_state_folder_blocks_no_write_and_no_stop(
     make: Callable[[Path], None],
 ) -> None:
     state = Path(os.environ["DRIVEPANEL_STATE"])

@@ -34,7 +34,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_another_drive_is_reported_and_not_written_exits_with_5(
+def test_write_to_a_drive_of_another_family_exits_with_5(
     atv71: str, command: str, tmp_path: object
 ) -> None:
     words = [text.format(line=atv71, folder=tmp_path) for text in COMMANDS[command]]
@@ -45,25 +45,25 @@ def test_another_drive_is_reported_and_not_written_exits_with_5(
     assert [held(atv71, address) for address in (CMD, ACC)] == before
 
 
-def test_restore_is_refused_too(atv71: str, tmp_path: object) -> None:
+def test_restore_to_a_drive_of_another_family_is_refused(atv71: str, tmp_path: object) -> None:
     backup = f"{tmp_path}/b.toml"
     run(0, "backup", atv71, backup)
     output = refused(5, "restore", atv71, backup, "--arm", "-p", "atv312")
     assert "says it is ATV71HU15M3" in output
 
 
-def test_run_is_refused_too(atv71: str) -> None:
+def test_run_of_a_drive_of_another_family_is_refused(atv71: str) -> None:
     output = motor(5, atv71, "--arm", "--for", "1", "-p", "atv312")
     assert "says it is ATV71HU15M3" in output
     assert held(atv71, CMD) == 0
 
 
 @pytest.mark.parametrize("profile", ["atv71", "ATV71"])
-def test_the_drives_own_profile_is_taken(atv71: str, profile: str) -> None:
+def test_own_profile_of_the_drive_is_accepted(atv71: str, profile: str) -> None:
     assert "ETA" in run(0, "read", atv71, "ETA", "-p", profile)
 
 
-def test_forced_it_reads_watches_and_writes_and_says_so(atv71: str) -> None:
+def test_force_profile_reads_watches_and_writes_with_a_warning(atv71: str) -> None:
     put(atv71, ACC, 30)
     for words in (("read", atv71, "ETA"), ("watch", atv71, "ETA", "--count", "1")):
         done = ended(0, *words, "-p", "atv312", "--force-profile")
@@ -78,7 +78,9 @@ NEVER = ("run", "reference", "reset", "restore", "block", "teach", "backup", "re
 
 
 @pytest.mark.parametrize("command", NEVER)
-def test_moving_or_storing_needs_own_identity_exits_with_2(atv71: str, command: str) -> None:
+def test_force_profile_with_a_moving_or_storing_command_exits_with_2(
+    atv71: str, command: str
+) -> None:
     more = {"reference": ["20Hz"], "restore": ["x"], "backup": ["x"], "report": ["x"]}
     words = [command, atv71, *more.get(command, ["factory"] if command == "compare" else [])]
     output = refused(2, *words, "-p", "atv312", "--force-profile")
@@ -86,11 +88,11 @@ def test_moving_or_storing_needs_own_identity_exits_with_2(atv71: str, command: 
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "varmeca"])
-def test_a_family_that_says_nothing_contradicts_nothing(family: str) -> None:
+def test_family_without_identification_contradicts_no_profile(family: str) -> None:
     with tcp_line("powerdrive@1") as line:
         assert "10.40" in run(0, "read", line, "10.40", "-p", family)
 
 
-def test_no_drive_to_contradict_exits_with_3() -> None:
+def test_absent_drive_exits_with_3() -> None:
     with tcp_line("powerdrive@1") as line:
         refused(3, "read", line, "10.40", "-p", "powerdrive", "-d", "9")

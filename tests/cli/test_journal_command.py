@@ -54,7 +54,7 @@ def test_entry_begins_with_its_local_time() -> None:
     assert entry_line(replace(made, time="cut off")).startswith("cut off  1/")
 
 
-def test_drive_and_time_select(journal: Path) -> None:
+def test_entries_are_selected_by_drive_and_time(journal: Path) -> None:
     assert len(run(0, "journal", "--drive", "2").splitlines()) == 1
     assert len(run(0, "journal", "--drive", "1/tcp:HOST").splitlines()) == 1
     assert len(run(0, "journal", "--drive", "tcp:HOST").splitlines()) == 2
@@ -65,7 +65,7 @@ def test_drive_and_time_select(journal: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", get_args(get_type_hints(Entry)["kind"]))
-def test_every_kind_of_entry_has_its_line_and_its_form(kind: Any, journal: Path) -> None:
+def test_every_kind_of_entry_has_its_line_and_its_document(kind: Any, journal: Path) -> None:
     made = replace(entry(1), kind=kind, new="4.0 s", answer="as it was")
     journal.write_text(json.dumps(asdict(made)) + "\n")
     forms_of(run(0, "journal", "--json"))
@@ -74,7 +74,7 @@ def test_every_kind_of_entry_has_its_line_and_its_form(kind: Any, journal: Path)
     assert ("->" in reported) is (kind == "write")
 
 
-def test_as_json(journal: Path) -> None:
+def test_journal_as_json_has_entries_and_damage(journal: Path) -> None:
     reported = json.loads(run(0, "journal", "--json", "--drive", "1"))
     assert reported["journal"] == str(journal)
     assert [item["new_raw"] for item in reported["entries"]] == [1, 3]
@@ -82,7 +82,7 @@ def test_as_json(journal: Path) -> None:
     assert reported["damaged"] == [{"file": str(journal), "line": 4, "text": '{"ha\x1b]0;lf'}]
 
 
-def test_no_journal_yet_and_one_that_cannot_be_read() -> None:
+def test_missing_or_unreadable_journal_is_reported() -> None:
     state = Path(os.environ["DRIVEPANEL_STATE"])
     assert "The journal is empty" in run(0, "journal")
     state.mkdir(exist_ok=True)
@@ -90,7 +90,7 @@ def test_no_journal_yet_and_one_that_cannot_be_read() -> None:
     assert "cannot be read: Is a directory" in refused(2, "journal")
 
 
-def test_a_write_is_found_again() -> None:
+def test_write_is_listed_in_the_journal() -> None:
     with tcp_line("atv71@1") as line:
         put(line, 9001, 50)
         run(0, "write", line, "ACC=4.0", "--arm")
@@ -115,5 +115,5 @@ def test_a_write_is_found_again() -> None:
         ("9999-99-99", None),
     ],
 )
-def test_times(text: str, wanted: datetime | None) -> None:
+def test_since_accepts_durations_times_and_dates(text: str, wanted: datetime | None) -> None:
     assert since(text, NOW) == wanted

@@ -56,7 +56,7 @@ def program(
     )
 
 
-def test_a_write_whose_journal_cannot_be_kept_is_done_and_reported() -> None:
+def test_write_without_a_journal_is_done_and_reported() -> None:
     state = state_folder()
     state.parent.mkdir(parents=True, exist_ok=True)
     state.write_text("a file where the folder should be")
@@ -70,7 +70,7 @@ def test_a_write_whose_journal_cannot_be_kept_is_done_and_reported() -> None:
 
 
 @pytest.mark.parametrize("command", kept([WRITE, STOP, STOP_ALL, REFERENCE, RUN], WRITE, RUN))
-def test_a_full_disk_is_reported_in_a_sentence_and_nothing_else_fails(
+def test_full_disk_is_reported_and_fails_nothing_else(
     command: tuple[str, ...],
 ) -> None:
     done = program(*command, limit=no_room)
@@ -83,14 +83,14 @@ def test_a_full_disk_is_reported_in_a_sentence_and_nothing_else_fails(
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
-def test_a_folder_that_is_read_only() -> None:
+def test_read_only_folder_is_reported() -> None:
     state_folder().mkdir(mode=0o500)
     done = program(*STOP)
     assert done.returncode == 0
     assert "The journal cannot be written: Permission denied" in done.stderr
 
 
-def test_a_disk_that_does_not_answer_is_reported_at_the_end(
+def test_hung_disk_is_reported_at_the_end(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     journal = Journal()
@@ -120,7 +120,7 @@ def test_lost_output_does_not_report_done_work_as_failed(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="without /dev/full")
 @pytest.mark.parametrize("more", [(), ("--json",)])
-def test_lost_output_that_was_requested_is_a_failure(more: tuple[str, ...]) -> None:
+def test_lost_requested_output_is_a_failure(more: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = program(*READ, *more, out=full.fileno())
     assert done.returncode == 70
@@ -131,7 +131,7 @@ def test_lost_output_that_was_requested_is_a_failure(more: tuple[str, ...]) -> N
 
 
 @pytest.mark.parametrize("which", kept(CLOSED, "2", "all"))
-def test_streams_that_are_closed_hurt_nothing(which: str) -> None:
+def test_closed_streams_do_no_harm(which: str) -> None:
     command = f'exec "$@" {CLOSED[which]}'
     done = subprocess.run(
         ["/bin/sh", "-c", command, "sh", *DRIVEPANEL, *STOP],

@@ -27,7 +27,7 @@ def reported(*arguments: str, status: int = 0) -> Any:
     return json.loads(done.stdout)
 
 
-def test_read() -> None:
+def test_read_prints_values_as_json() -> None:
     read = reported("read", *LINE, "ETA", "ACC", "LFT")
     assert set(read) == {*HEAD, "line", "device", "profile", "timeout", "values"}
     assert (read["line"], read["device"], read["profile"]) == ("sim:atv71@2", 2, "atv71")
@@ -45,11 +45,11 @@ def test_read() -> None:
 
 
 @pytest.mark.parametrize("typed", ["acc", "Acc", "w9001", "W9001", "16#2329", "0x2329", "9001"])
-def test_read_takes_any_notation_in_any_case(typed: str) -> None:
+def test_read_accepts_any_notation_in_any_case(typed: str) -> None:
     assert list(reported("read", *LINE, typed)["values"]) == ["ACC"]
 
 
-def test_a_parameter_that_the_drive_refuses_is_null_and_the_others_are_not_hurt() -> None:
+def test_refused_parameter_is_null_and_others_have_values() -> None:
     with tcp_line("atv71@2", "--protect", "ACC") as line:
         read = reported("read", line, "-d", "2", "ETA", "ACC", status=4)
     refused = read["values"]["ACC"]
@@ -57,7 +57,7 @@ def test_a_parameter_that_the_drive_refuses_is_null_and_the_others_are_not_hurt(
     assert read["values"]["ETA"]["quality"] == "good"
 
 
-def test_watch_prints_one_object_a_cycle() -> None:
+def test_watch_prints_one_object_per_cycle() -> None:
     done = drivepanel("watch", *LINE, "RFR", "ETA", "--every", "0.1", "--count", "3", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     cycles = [json.loads(line) for line in done.stdout.splitlines()]
@@ -76,14 +76,14 @@ def test_watch_prints_one_object_a_cycle() -> None:
     assert len(set(times)) == 3
 
 
-def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
+def test_watch_uses_the_monitoring_set_of_the_profile() -> None:
     done = drivepanel("watch", *LINE, "--every", "0.1", "--count", "1", "--json")
     assert done.returncode == 0, done.stderr
     watched = json.loads(done.stdout)["values"]
     assert set(watched) == set(monitoring_codes(library.load("atv71")))
 
 
-def test_identify() -> None:
+def test_identify_prints_the_identity_as_json() -> None:
     who = reported("identify", *LINE)
     keys = {"line", "device", "vendor", "reference", "version", "name", "profile", "model"}
     assert set(who) == HEAD | keys | {"timeout"}
@@ -91,7 +91,7 @@ def test_identify() -> None:
     assert who["reference"].startswith("ATV71")
 
 
-def test_profiles() -> None:
+def test_profiles_are_listed_as_json() -> None:
     listed = reported("profiles")
     assert [set(item) for item in listed] == [
         {*HEAD, "id", "name", "vendor", "parameters", "own", "file", "remark"}
@@ -102,12 +102,12 @@ def test_profiles() -> None:
         assert item["parameters"] == len(library.load(item["id"]).parameters)
 
 
-def test_one_profile() -> None:
+def test_one_profile_is_printed_as_json() -> None:
     shown = reported("profiles", "atv71")
     assert shown["profile"]["id"] == "atv71"
     assert {p["code"] for p in shown["parameters"]} >= {"ETA", "ACC"}
 
 
-def test_ports() -> None:
+def test_ports_are_listed_as_json() -> None:
     for port in reported("ports"):
         assert set(port) >= {"path", "description"}

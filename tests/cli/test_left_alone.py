@@ -48,7 +48,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("command", [*READING, *OTHERS])
-def test_it_is_reported_which_drive_how_long_what_follows_and_what_to_do(
+def test_warning_names_drive_timeout_reaction_and_remedy(
     atv21: str, command: str, tmp_path: object
 ) -> None:
     words = (READING | OTHERS)[command]
@@ -62,7 +62,7 @@ def test_it_is_reported_which_drive_how_long_what_follows_and_what_to_do(
 
 
 @pytest.mark.parametrize("command", READING)
-def test_one_object_of_json_everywhere(atv21: str, command: str) -> None:
+def test_json_has_the_timeout_in_every_command(atv21: str, command: str) -> None:
     words = [text.format(line=atv21) for text in READING[command]]
     reported = json.loads(run(0, *words, "--json"))
     assert reported["timeout"] == ERR5
@@ -70,22 +70,22 @@ def test_one_object_of_json_everywhere(atv21: str, command: str) -> None:
         assert reported["watch"]["timeout_s"] == reported["timeout"]["seconds"]
 
 
-def test_it_is_reported_where_the_command_failed(atv21: str) -> None:
+def test_warning_is_shown_if_the_command_fails(atv21: str) -> None:
     done = ended(5, "write", atv21, "ACC=99999s", "--arm")
     assert "F803 runs" in done.stderr
 
 
-def test_a_drive_that_was_never_heard_leaves_nothing_running(atv21: str) -> None:
+def test_silent_drive_has_no_warning(atv21: str) -> None:
     assert "timeout" not in refused(3, "read", atv21, "FD01", "-d", "9", "-p", "atv21")
 
 
-def test_none_where_it_is_off() -> None:
+def test_disabled_timeout_has_no_warning() -> None:
     with tcp_line("atv21@1", "--set", "F803=0") as line:
         done = ended(0, "read", line, "FD01", "--json")
         assert (json.loads(done.stdout)["timeout"], done.stderr) == (None, "")
 
 
-def test_a_drive_that_refuses_the_words_fails_no_command() -> None:
+def test_drive_that_refuses_the_timeout_words_fails_no_command() -> None:
     with tcp_line("atv21@1", "--protect", "F803") as line:
         done = ended(0, "read", line, "FD01", "--json")
         reported = json.loads(done.stdout)["timeout"]
@@ -93,7 +93,7 @@ def test_a_drive_that_refuses_the_words_fails_no_command() -> None:
         assert "its communication timeout cannot be read; it may react" in done.stderr
 
 
-def test_a_watch_that_begins_with_a_command_is_reported_once_one_was_written() -> None:
+def test_timeout_that_starts_with_a_command_is_reported_after_one() -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         done = ended(0, "read", line, "ETA", "--json")
         assert done.stderr == ""
@@ -104,7 +104,7 @@ def test_a_watch_that_begins_with_a_command_is_reported_once_one_was_written() -
         assert json.loads(done.stdout)["timeout"]["begun"] is True
 
 
-def test_a_lost_line_that_goes_unnoticed_is_not_reported_as_an_act() -> None:
+def test_ignored_communication_loss_has_no_warning() -> None:
     with tcp_line("atv71@1", "--set", "SLL=0") as line:
         put(line, CMD, 6)
         done = ended(0, "read", line, "ETA", "--json")
@@ -124,14 +124,14 @@ def test_undocumented_reaction_is_not_reported_as_certain() -> None:
         assert "timeout ttO runs (when it begins is in no document). After 10 s" in output
 
 
-def test_a_family_that_was_named_is_named_again() -> None:
+def test_warning_repeats_the_family_that_was_typed() -> None:
     with tcp_line("powerdrive@1", "--set", "11.63=20") as line:
         output = ended(0, "read", line, "10.40", "-p", "powerdrive").stderr
         assert f"drivepanel hold {line} -d 1 -p powerdrive." in output
         assert "timeout 11.63 runs" in output
 
 
-def test_run_does_not_end_in_a_trip_without_a_word() -> None:
+def test_run_warns_of_a_pending_trip_at_its_end() -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         done = drivepanel("run", line, "--reference", "10Hz", "--for", "0.5", "--arm", "--json")
         assert done.returncode == 0, done.stderr
@@ -143,7 +143,7 @@ def test_run_does_not_end_in_a_trip_without_a_word() -> None:
 
 
 @pytest.mark.parametrize("command", ["reference", "reset"])
-def test_commands_are_reported(command: str) -> None:
+def test_timeout_is_reported_after_commands_that_write(command: str) -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         more = ["10Hz"] if command == "reference" else []
         done = drivepanel(command, line, *more, "--arm")
@@ -158,7 +158,7 @@ def in_fault(line: str) -> bool:
     return bool(held(line, STATUS_21) & 2)
 
 
-def test_hold_prints_at_once_asks_on_and_tells_what_follows() -> None:
+def test_hold_prints_immediately_keeps_polling_and_warns_at_the_end() -> None:
     with tcp_line("atv21@1", "--set", "F803=2") as line:
         hold = (*DRIVEPANEL, "read", line, "FD01", "--hold", "6")
         with served(hold, ready="Code") as program:
@@ -174,7 +174,7 @@ SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
 
 @pytest.mark.parametrize("number", kept(SIGNALS, signal.SIGTERM), ids=lambda number: number.name)
-def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) -> None:
+def test_hold_ends_on_a_signal_with_a_warning(number: signal.Signals) -> None:
     with tcp_line("atv21@1", "atv71@2") as line:
         hold = (*DRIVEPANEL, "hold", line, "-d", "1", "-d", "2")
         with served(hold, ready="Device 2, Altivar 71: kept alive") as program:
@@ -188,14 +188,14 @@ def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) ->
 @pytest.mark.parametrize(
     "number", kept([signal.SIGTERM, signal.SIGHUP], signal.SIGHUP), ids=lambda number: number.name
 )
-def test_command_ended_by_signal_reports_it_too(atv21: str, number: signal.Signals) -> None:
+def test_command_ended_by_a_signal_warns_too(atv21: str, number: signal.Signals) -> None:
     with served((*DRIVEPANEL, "watch", atv21, "FD01"), ready="FD01") as program:
         status, output = program.end(number)
     assert (status, "F803 runs" in output) == (SIGNALS[number], True)
 
 
 @pytest.mark.parametrize("failure", ["", "The drive refused it."])
-def test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done(
+def test_signal_during_the_warning_keeps_the_result(
     monkeypatch: pytest.MonkeyPatch, failure: str
 ) -> None:
     """It ended with a traceback and status 1, the answer of the command lost."""
@@ -226,7 +226,7 @@ def test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_do
     assert came
 
 
-def test_hold_in_json() -> None:
+def test_hold_prints_json() -> None:
     with tcp_line("atv21@1") as line:
         with served((*DRIVEPANEL, "hold", line, "--json"), ready='"holding"') as program:
             reported = json.loads(program.ready)
@@ -234,7 +234,7 @@ def test_hold_in_json() -> None:
         assert (reported["device"], reported["event"], reported["timeout"]) == (1, "holding", ERR5)
 
 
-def test_hold_tells_of_a_drive_that_is_lost_and_of_one_that_never_was() -> None:
+def test_hold_reports_lost_and_absent_drives() -> None:
     with (
         tcp_line("atv21@1") as line,
         served((*DRIVEPANEL, "hold", line, "-d", "1", "-d", "9"), ready="Device 1") as program,
@@ -244,12 +244,12 @@ def test_hold_tells_of_a_drive_that_is_lost_and_of_one_that_never_was() -> None:
         assert program.process.poll() is None, "the others are held"
 
 
-def test_no_drive_to_hold_exits_with_3() -> None:
+def test_hold_without_a_drive_exits_with_3() -> None:
     with tcp_line("atv21@1") as line:
         assert "protects nobody" not in refused(3, "hold", line, "-d", "9")
 
 
-def test_hold_keeps_a_short_time_out_from_running_out_while_others_are_looked_for() -> None:
+def test_hold_keeps_a_drive_alive_while_it_scans() -> None:
     """An address at which nobody answers takes seconds."""
     with tcp_line("atv21@1", "--set", "F803=2") as line:
         silent = [word for device in range(10, 14) for word in ("-d", str(device))]

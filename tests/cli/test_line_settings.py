@@ -25,13 +25,13 @@ SLOW = UsualSettings(9600, "8N2")
         ("serial:/dev/ttyUSB0,38400,8o1", 38400, "8O1"),
     ],
 )
-def test_profile_named_for_line_applies(text: str, baud: int, format: str) -> None:
+def test_profile_sets_the_line_settings(text: str, baud: int, format: str) -> None:
     link = parse_link(text, SLOW)
     assert isinstance(link, SerialLink)
     assert (link.baud, link.format) == (baud, format)
 
 
-def test_without_a_profile_a_line_is_as_before() -> None:
+def test_line_without_a_profile_has_default_settings() -> None:
     assert parse_link("serial:/dev/ttyUSB0") == SerialLink("/dev/ttyUSB0", 19200, "8E1")
 
 
@@ -59,7 +59,7 @@ def slow_family() -> str:
         ("", ["-p", "atv312"], "19200 baud and 8E1 (the profile's own)"),
     ],
 )
-def test_silence_says_to_check_the_settings(
+def test_no_answer_suggests_to_check_the_settings(
     slow_family: str, settings: str, more: list[str], reported: str
 ) -> None:
     with pty_pair() as (near, _):

@@ -51,7 +51,7 @@ def named(line: str) -> None:
     )
 
 
-def test_a_name_stands_where_a_line_is_typed(line: str) -> None:
+def test_name_replaces_a_line(line: str) -> None:
     named(line)
     assert json.loads(run(0, "read", "pump", "ACC", "--json"))["line"] == line
     assert json.loads(run(0, "identify", "PUMP", "--json"))["profile"] == "atv71"
@@ -59,14 +59,14 @@ def test_a_name_stands_where_a_line_is_typed(line: str) -> None:
     assert (reported["device"], reported["profile"]) == (5, "powerdrive")
 
 
-def test_typed_option_overrides_line_name(line: str) -> None:
+def test_typed_option_overrides_the_named_line(line: str) -> None:
     named(line)
     assert json.loads(run(0, "read", "fan", "ACC", "-d", "1", "--json"))["profile"] == "atv71"
     assert "-p" in refused(2, "read", "pump", "5.01", "-d", "5")
     assert "no parameter '1.99'" in refused(2, "read", "fan", "1.99", "-p", "varmeca")
 
 
-def test_a_drive_of_a_name_may_be_compared_and_restored_to(line: str, tmp_path: Path) -> None:
+def test_named_drive_can_be_compared_and_restored_to(line: str, tmp_path: Path) -> None:
     named(line)
     file = tmp_path / "fan.toml"
     run(0, "backup", "fan", file)
@@ -75,7 +75,7 @@ def test_a_drive_of_a_name_may_be_compared_and_restored_to(line: str, tmp_path: 
     assert "0 to write" in run(0, "restore", "fan", file, "--dry-run")
 
 
-def test_the_environment_says_which_line_is_selected(
+def test_environment_selects_the_line(
     line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert "Missing argument 'LINE'" in refused(2, "identify")
@@ -94,9 +94,7 @@ def test_the_environment_says_which_line_is_selected(
     assert "NMA1" in run(0, "block")
 
 
-def test_a_line_that_is_written_goes_before_the_environment(
-    line: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_typed_line_overrides_the_environment(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DRIVEPANEL_LINE", "tcp:127.0.0.1:1")
     assert "atv71" in run(0, "identify", line)
     assert "Missing argument 'CODE...'" in refused(2, "read", line)
@@ -105,20 +103,20 @@ def test_a_line_that_is_written_goes_before_the_environment(
     assert "Missing argument 'CODE...'" in refused(2, "read", "pump")
 
 
-def test_the_environment_may_hold_a_name(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment_may_have_a_name(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
     named(line)
     monkeypatch.setenv("DRIVEPANEL_LINE", "fan")
     assert json.loads(run(0, "read", "5.01", "--json"))["device"] == 5
 
 
-def test_a_name_that_is_none_is_reported_with_those_there_are(line: str) -> None:
+def test_unknown_name_is_reported_with_the_known_names(line: str) -> None:
     named(line)
     reported = refused(2, "read", "pumb", "ACC")
     assert "'pumb' is not a LINE or a name from" in reported
     assert "pump, fan" in reported
 
 
-def test_a_fault_in_the_settings_is_reported_where_a_name_is_used_and_nowhere_else(
+def test_settings_error_is_reported_only_if_a_name_is_used(
     line: str,
 ) -> None:
     settings(f'[lines]\npump = "{line}"\nfan = 5\n')
@@ -130,7 +128,7 @@ def test_a_fault_in_the_settings_is_reported_where_a_name_is_used_and_nowhere_el
 
 
 @pytest.mark.parametrize("profile", ["", 'profile = "gone"'])
-def test_no_settings_file_keeps_a_stop_from_its_drive(line: str, profile: str) -> None:
+def test_broken_settings_do_not_block_a_stop(line: str, profile: str) -> None:
     settings(f'[lines.fan]\nline = "{line}"\ndevice = 5\n{profile}\n[broken')
     refused(2, "read", "fan", "5.01")
     done = invoked("stop", "fan")
@@ -141,13 +139,13 @@ def test_no_settings_file_keeps_a_stop_from_its_drive(line: str, profile: str) -
     assert "stopped" in run(0, "stop", line)
 
 
-def test_the_profile_of_one_drive_stops_no_other(line: str) -> None:
+def test_profile_of_a_name_applies_to_its_drive_only_in_stop_all(line: str) -> None:
     settings(f'[lines.fan]\nline = "{line}"\ndevice = 1\nprofile = "atv71"\n')
     reported = refused(4, "stop", "fan", "--all", "--addresses", "5")
     assert "Read as Powerdrive, it is at standstill" in reported
 
 
-def test_lines_lists_the_names_and_what_is_remembered(line: str) -> None:
+def test_lines_lists_named_and_remembered_lines(line: str) -> None:
     assert "No line has a name" in run(0, "lines")
     named(line)
     run(0, "identify", "pump")
@@ -166,7 +164,7 @@ def test_lines_lists_the_names_and_what_is_remembered(line: str) -> None:
     assert "ATV71" in text
 
 
-def test_lines_checks_the_settings() -> None:
+def test_lines_reports_settings_errors() -> None:
     settings(
         '[lines]\nstop = "tcp:x"\nbad = "tcp:x:y"\nfan = { line = "tcp:x", profile = "gone" }\n'
         "old = 5\n"
@@ -180,7 +178,7 @@ def test_lines_checks_the_settings() -> None:
     assert len(json.loads(done.stdout)["faults"]) == 4
 
 
-def test_a_list_of_ports_tells_what_each_adapter_is_called_for_good(
+def test_ports_lists_the_lasting_names_of_adapters(
     adapters: Adapters, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tui.bus.transport.ports import PortInfo
@@ -219,7 +217,7 @@ def _memory_file() -> Path:
     return memory_file()
 
 
-def test_reading_a_drive_that_is_another_one_goes_on_with_a_warning(line: str) -> None:
+def test_read_of_a_changed_drive_warns_and_continues(line: str) -> None:
     swapped(line)
     for command in (["read", line, "ACC"], ["identify", line], ["status", line]):
         done = invoked(*command)
@@ -244,7 +242,7 @@ def test_reading_a_drive_that_is_another_one_goes_on_with_a_warning(line: str) -
     ),
     ids=lambda command: command[0],
 )
-def test_nothing_is_written_to_a_drive_that_is_another_one(line: str, command: list[str]) -> None:
+def test_write_to_a_changed_drive_is_refused(line: str, command: list[str]) -> None:
     before = held(line, ACC)
     swapped(line)
     done = drivepanel(command[0], line, *command[1:], "--arm")
@@ -255,7 +253,7 @@ def test_nothing_is_written_to_a_drive_that_is_another_one(line: str, command: l
     assert held(line, ACC) == before
 
 
-def test_a_stop_goes_to_a_drive_that_is_another_one(line: str) -> None:
+def test_stop_is_sent_to_a_changed_drive(line: str) -> None:
     swapped(line)
     assert "stopped" in run(0, "stop", line)
     assert "stopped" in run(0, "stop", line, "--all", "--addresses", "1")
@@ -270,7 +268,7 @@ def test_accepted_line_stays_accepted(line: str) -> None:
     assert (done.exit_code, done.stderr) == (0, "")
 
 
-def test_a_stop_asks_no_file_at_all(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stop_reads_no_file(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def hangs(*_: object) -> None:
         raise AssertionError("a disk that hangs")
 
@@ -286,7 +284,7 @@ def completed(typed: str) -> list[str]:
     return [item.value for item in found]
 
 
-def test_names_are_completed_and_codes_of_their_drive() -> None:
+def test_names_and_codes_of_their_drives_are_completed() -> None:
     assert "pump" not in completed("read p")
     named("tcp:gateway")
     assert completed("read pu") == ["pump"]
@@ -296,7 +294,7 @@ def test_names_are_completed_and_codes_of_their_drive() -> None:
     assert completed("read pu") == []
 
 
-def test_a_name_opens_the_panel_and_a_word_that_is_none_does_not() -> None:
+def test_name_opens_the_panel_but_an_unknown_word_does_not() -> None:
     assert not is_line("pump")
     named("tcp:gateway")
     assert is_line("pump")

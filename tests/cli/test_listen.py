@@ -62,7 +62,7 @@ READ_ETA, WRITE_LFR, NOBODY, NO_WORD = "030c810001", "0621360000", "09030c810001
 CYCLE = tuple(f"02{pdu}" for pdu in (READ_ETA, WRITE_LFR, NO_WORD))
 
 
-def test_a_line_of_text_for_each_exchange_and_a_summary() -> None:
+def test_text_output_has_a_line_per_exchange_and_a_summary() -> None:
     text = run(0, "listen", TWO, "--for", "1")
     lines = text.splitlines()
     assert lines[0].startswith("Listening at /dev/pts/")
@@ -73,7 +73,7 @@ def test_a_line_of_text_for_each_exchange_and_a_summary() -> None:
     assert lines[-1].startswith("Heard ")
 
 
-def test_an_object_for_each_exchange_and_a_summary() -> None:
+def test_json_output_has_an_object_per_exchange_and_a_summary() -> None:
     *exchanges, summary = reported(TWO, "--for", "0.8")
     assert {exchange["event"] for exchange in exchanges} == {"exchange"}
     read = next(
@@ -98,18 +98,18 @@ def test_an_object_for_each_exchange_and_a_summary() -> None:
     assert summary["silences"]["judged"] is False
 
 
-def test_profiles_of_all_drives_and_of_one() -> None:
+def test_profile_options_apply_to_all_drives_or_one() -> None:
     *exchanges, _ = reported(TWO, "--for", "0.5", "-p", "atv31", "-p", "2=atv71")
     taken = {(exchange["device"], exchange["profile"], exchange["how"]) for exchange in exchanges}
     assert taken == {(1, "atv31", "named"), (2, "atv71", "named")}
 
 
-def test_summaries_on_the_way() -> None:
+def test_summaries_are_printed_periodically() -> None:
     found = reported(TWO, "--for", "2.5", "--every", "1")
     assert [row["event"] for row in found].count("summary") == 3
 
 
-def test_a_file_of_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
+def test_capture_file_has_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
     *exchanges, summary = reported(TWO, "--for", "0.8", "--pcap", path)
     found = packets(path)
@@ -122,7 +122,7 @@ def test_a_file_of_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
     ]
 
 
-def test_a_file_of_raw_frames_says_how_it_is_read(tmp_path: Path) -> None:
+def test_capture_file_of_raw_frames_says_how_to_read_it(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
     text = run(0, "listen", TWO, "--for", "0.5", "--pcap", path, "--raw")
     assert all(is_whole(packet) for packet in packets(path))
@@ -130,7 +130,7 @@ def test_a_file_of_raw_frames_says_how_it_is_read(tmp_path: Path) -> None:
     assert f"-r {path}" in text
 
 
-def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
+def test_existing_file_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
     path.write_bytes(b"mine")
     assert "--force" in refused(2, "listen", TWO, "--for", "0.2", "--pcap", path)
@@ -152,15 +152,15 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
         ((TWO, "-p", "atv71", "-p", "atv31"), "one profile"),
     ],
 )
-def test_lines_that_cannot_be_monitored(words: tuple[str, ...], why: str) -> None:
+def test_line_that_cannot_be_monitored_is_refused(words: tuple[str, ...], why: str) -> None:
     assert why in refused(2, "listen", *words, "--for", "0.1")
 
 
-def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_port_exits_with_3(tmp_path: Path) -> None:
     assert "does not exist" in refused(3, "listen", f"serial:{tmp_path}/none", "--for", "0.1")
 
 
-def test_ctrl_c_ends_with_a_whole_file_and_the_summary(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_a_complete_file_and_prints_the_summary(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
     with plc(*CYCLE) as master:
         words = ["listen", master.path, "--pcap", str(path), "-p", "atv71"]
@@ -177,7 +177,7 @@ def test_ctrl_c_ends_with_a_whole_file_and_the_summary(tmp_path: Path) -> None:
     assert f"{len(found)} packets written to {path}" in err
 
 
-def test_a_kill_leaves_a_whole_file(tmp_path: Path) -> None:
+def test_kill_leaves_a_readable_file(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
     with plc(*CYCLE) as master:
         words = ["listen", master.path, "--pcap", str(path)]
@@ -188,7 +188,7 @@ def test_a_kill_leaves_a_whole_file(tmp_path: Path) -> None:
     assert len(packets(path)) > 30
 
 
-def test_silence_and_refusals_of_a_plc_cycle() -> None:
+def test_unanswered_and_refused_requests_are_reported() -> None:
     with plc(*CYCLE, NOBODY) as master:
         master.start()
         *exchanges, summary = reported(master.path, "--for", "2")
@@ -220,7 +220,7 @@ def test_text_from_the_wire_does_not_control_terminal() -> None:
     assert not {"\x1b", "\x07"} & set(text + found)
 
 
-def test_the_name_of_a_line_names_the_profile_of_its_drive() -> None:
+def test_named_line_sets_the_profile_of_its_drive() -> None:
     path = settings_file()
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(
@@ -235,7 +235,7 @@ def test_the_name_of_a_line_names_the_profile_of_its_drive() -> None:
     }
 
 
-def test_a_port_that_goes_away_ends_with_what_was_heard(tmp_path: Path) -> None:
+def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     path = tmp_path / "frames.pcapng"
     with plc(*CYCLE) as master:
         words = ["listen", master.path, "--pcap", str(path)]
@@ -250,7 +250,7 @@ def test_a_port_that_goes_away_ends_with_what_was_heard(tmp_path: Path) -> None:
     assert len(packets(path)) > 30
 
 
-def test_nobody_talks() -> None:
+def test_silent_line_reports_that_nothing_was_received() -> None:
     ours, theirs = os.openpty()
     try:
         text = run(0, "listen", os.ttyname(theirs), "--for", "0.3")

@@ -17,7 +17,7 @@ async def unforeseen() -> None:
     raise ZeroDivisionError("nobody thought of this")
 
 
-def test_work_that_dies_leaves_its_traceback_in_the_log() -> None:
+def test_failed_task_leaves_its_traceback_in_the_log() -> None:
     start_logging(0)
     opened = open_line("sim:atv71")
     try:
@@ -49,14 +49,14 @@ def test_every_module_logs_by_its_own_name() -> None:
     assert {call for calls in named.values() for call in calls} == {"__name__"}
 
 
-def test_the_handler_hangs_above_every_module() -> None:
+def test_log_handler_covers_every_module() -> None:
     start_logging(0)
     logging.getLogger("tui.anything.at.all").warning("heard")
     stop_logging()
     assert "WARNING heard" in log_file().read_text()
 
 
-def test_a_disk_that_hangs_holds_up_nobody_who_logs() -> None:
+def test_hung_disk_does_not_block_logging() -> None:
     """A stop logs what it does: in the thread of the keys, and in that of the line."""
     log_file().parent.mkdir(parents=True, exist_ok=True)
     os.mkfifo(log_file())  # to open it hangs until somebody reads it
@@ -75,7 +75,7 @@ def test_a_disk_that_hangs_holds_up_nobody_who_logs() -> None:
     assert not held_up
 
 
-def test_a_line_of_the_log_commands_no_terminal() -> None:
+def test_log_line_does_not_control_terminal() -> None:
     start_logging(0)
     logging.getLogger("tui.anything").warning("drive \x1b]0;x\x07\x9b2J\nsays")
     stop_logging()

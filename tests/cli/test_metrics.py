@@ -34,7 +34,7 @@ def samples(*lines: LineReport) -> set[str]:
     return {line for line in text_of(*lines).splitlines() if not line.startswith("#")}
 
 
-def test_values_stand_in_base_units_with_the_unit_in_the_name() -> None:
+def test_values_are_in_base_units_named_in_the_metric() -> None:
     seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=499, THD=50))))
     who = f'{WHERE},code="RFR",quantity="output_frequency"'
     assert f"drivepanel_value_hertz{{{who}}} 49.9" in seen
@@ -64,7 +64,7 @@ def test_bad_reading_has_no_value(why: str) -> None:
     assert f'drivepanel_value_age_seconds{{{WHERE},code="ETA"}} 0.5' in seen
 
 
-def test_a_fault_is_reported_by_its_code_and_its_name_is_escaped() -> None:
+def test_fault_has_its_code_and_escaped_name() -> None:
     seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x88, LFT=18))))
     reported = f'drivepanel_drive_fault_info{{{WHERE},fault="ObF",name="Over\\"braking\\\\"}} 1'
     assert reported in seen
@@ -73,7 +73,7 @@ def test_a_fault_is_reported_by_its_code_and_its_name_is_escaped() -> None:
     assert "fault_info" not in past
 
 
-def test_the_last_minute_of_line_and_drive_is_a_ratio() -> None:
+def test_last_minute_of_line_and_drive_is_a_ratio() -> None:
     drive = drive_of(cycle(small_drive(), ETA=0x27))
     own = DeviceCounters(minute=LastMinute(good=30, lost=8, silent=2))
     line = LastMinute(good=90, lost=8, damaged=2, foreign=5, strays=4)
@@ -97,7 +97,7 @@ def test_line_quality_and_turnarounds_add_up() -> None:
     assert f"drivepanel_drive_turnaround_seconds_count{{{WHERE}}} 7" in seen
 
 
-def test_uncertain_value_is_not_a_number_and_taught_scale_is_marked() -> None:
+def test_uncertain_value_is_nan_and_learned_scale_is_marked() -> None:
     seen = cycle(small_drive(), RFR=499, THD=50)
     changed = {"RFR": {"unsure": True}, "THD": {"taught": True}}
     readings = {
@@ -119,26 +119,26 @@ def test_result_of_the_last_requests_is_one_of_five(contact: Contact) -> None:
     assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen  # no cycle was read
 
 
-def test_drive_that_was_not_polled_for_long_is_not_silent() -> None:
+def test_drive_not_polled_recently_is_not_reported_as_silent() -> None:
     good = cycle(small_drive(), ETA=0x27)
     assert drive_of(good, now=NOW + 60).contact == "not_polled"
     assert drive_of(failed(good, "No answer."), now=NOW + 60).contact == "silent"
 
 
-def test_cycle_time_is_published_with_the_wished_one() -> None:
+def test_cycle_time_is_published_with_the_configured_one() -> None:
     slow = replace(cycle(small_drive(), ETA=0x27), period=5.8, wished=1.0)
     seen = samples(line_of(drive_of(slow)))
     assert f"drivepanel_drive_cycle_seconds{{{WHERE}}} 5.8" in seen
     assert f"drivepanel_drive_cycle_wished_seconds{{{WHERE}}} 1" in seen
 
 
-def test_a_drive_that_was_never_found_is_down_and_nothing_else() -> None:
+def test_drive_never_found_is_down_without_values() -> None:
     seen = samples(line_of(DriveStatus(2, error="Nobody answers.")))
     assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen
     assert not [text for text in seen if "value" in text or "info{line" in text]
 
 
-def test_every_line_has_the_form_and_every_metric_its_type_once() -> None:
+def test_every_line_is_valid_and_every_metric_has_one_type() -> None:
     drive = drive_of(cycle(small_drive(), ETA=0x88, RFR=1, THD=2, LFT=18))
     text = text_of(line_of(drive, counters=counted([1] * 10)), line_of(drive, name='a"b\\c\nd'))
     assert text.endswith("\n")
@@ -152,14 +152,14 @@ def test_every_line_has_the_form_and_every_metric_its_type_once() -> None:
     assert len(types) == len(set(types))
 
 
-def test_every_metric_has_a_type_and_a_sentence() -> None:
+def test_every_metric_has_a_type_and_a_description() -> None:
     for name, head in METRICS.items():
         assert head.kind in ("gauge", "counter", "histogram"), name
         assert (head.kind == "counter") is name.endswith("_total"), name
         assert re.fullmatch(r"[A-Z1].* .*\.", head.help), name
 
 
-def test_every_unit_of_every_profile_makes_a_name() -> None:
+def test_every_unit_of_every_profile_has_a_metric_name() -> None:
     units = {p.unit for listing in library.listings() for p in library.load(listing.id).parameters}
     for unit in units:
         name, factor = value_metric(unit)
@@ -194,7 +194,7 @@ async def requested(port: int, request: bytes) -> bytes:
         writer.close()
 
 
-async def test_metrics_are_reported_and_nothing_else(served: int) -> None:
+async def test_server_answers_metrics_requests_only(served: int) -> None:
     answer = await requested(served, b"GET /metrics HTTP/1.1\r\nHost: LOCALHOST:1\r\n\r\n")
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4;")
@@ -209,7 +209,7 @@ async def test_metrics_are_reported_and_nothing_else(served: int) -> None:
     assert (await requested(served, b"\x16\x03\r\n\r\n")).startswith(b"HTTP/1.1 405")
 
 
-async def test_an_error_that_nobody_foresaw_ends_no_service() -> None:
+async def test_unforeseen_error_does_not_end_the_service() -> None:
     wrong = ["once"]
 
     def reported() -> str:
@@ -224,12 +224,12 @@ async def test_an_error_that_nobody_foresaw_ends_no_service() -> None:
     await server.close()
 
 
-async def test_a_client_that_asks_too_much_is_let_go(served: int) -> None:
+async def test_client_with_too_long_a_request_is_disconnected(served: int) -> None:
     assert await requested(served, b"GET /" + b"x" * 2 * LONGEST_REQUEST) == b""
     assert (await requested(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
 
 
-async def test_idle_connections_keep_nobody_out(served: int) -> None:
+async def test_idle_connections_do_not_block_others(served: int) -> None:
     idle = [await asyncio.open_connection("127.0.0.1", served) for _ in range(MOST_SCRAPES)]
     assert (await requested(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
     assert await idle[0][0].read() == b"", "the oldest one has made room"
@@ -251,7 +251,7 @@ async def test_idle_connections_keep_nobody_out(served: int) -> None:
         (b"127.0.0.1\r\nHost: evil.example", 421),
     ],
 )
-async def test_metrics_are_for_who_asks_by_a_name_of_this_server(
+async def test_request_with_another_host_name_is_refused(
     served: int, host: bytes, status: int
 ) -> None:
     """A web page in a browser of this network could read them under a name of its own."""

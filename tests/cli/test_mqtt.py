@@ -33,7 +33,7 @@ BROKER = Broker("broker", 1883, False, None, None, "plant")
 # Topics and messages
 
 
-def test_a_cycle_of_a_drive_is_one_message() -> None:
+def test_each_cycle_of_a_drive_is_one_message() -> None:
     seen = drive_of(cycle(small_drive(), ETA=0x88, RFR=499, LFT=18))
     ((topic, text),) = drive_messages("plant/hall", [line_of(seen)]).items()
     reported = json.loads(text)
@@ -58,7 +58,7 @@ def test_bad_reading_is_marked() -> None:
     )
 
 
-def test_a_line_is_reported_with_what_it_counted() -> None:
+def test_line_message_has_its_counts() -> None:
     ((topic, text),) = line_messages("plant", [line_of()]).items()
     assert topic == "plant/pump/line"
     reported = json.loads(text)
@@ -70,7 +70,7 @@ def test_a_line_is_reported_with_what_it_counted() -> None:
     assert reported["last_minute"]["share"] is None
 
 
-def test_a_line_is_one_level_of_a_topic() -> None:
+def test_line_is_one_level_of_a_topic() -> None:
     assert level("serial:/dev/ttyUSB0,19200,8E1") == "serial:_dev_ttyUSB0,19200,8E1"
     assert level("a+b#c d\x00") == "a_b_c_d"
     assert level("/") == "_"
@@ -81,7 +81,7 @@ def test_a_line_is_one_level_of_a_topic() -> None:
 # Which broker, and whose password
 
 
-def test_a_url_says_which_broker() -> None:
+def test_url_selects_the_broker() -> None:
     assert broker_of("mqtt://h/plant/hall2/", None) == Broker(
         "h", 1883, False, None, None, "plant/hall2"
     )
@@ -109,7 +109,7 @@ def test_invalid_broker_is_refused(url: str, reported: str) -> None:
     assert reported in refused(2, "publish", "sim:atv71", "--mqtt", url)
 
 
-def test_the_password_comes_out_of_a_file_or_the_environment(
+def test_password_is_read_from_a_file_or_the_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "password"
@@ -127,7 +127,7 @@ def test_the_password_comes_out_of_a_file_or_the_environment(
         broker_of("mqtt://me@h", file)
 
 
-def test_without_the_package_it_is_reported_what_to_install(
+def test_missing_package_is_reported_with_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "aiomqtt", None)
@@ -138,7 +138,7 @@ def test_without_the_package_it_is_reported_what_to_install(
         need_mqtt()
 
 
-def test_runs_of_one_root_have_one_id_at_the_broker() -> None:
+def test_client_id_depends_on_the_topic_root() -> None:
     assert client_id("plant") == client_id("plant") != client_id("plant/hall")
 
 
@@ -190,7 +190,7 @@ def clients(monkeypatch: pytest.MonkeyPatch) -> type[FakeClient]:
     return Own
 
 
-async def test_everything_is_retained_anew_after_a_lost_connection(
+async def test_everything_is_retained_again_after_a_lost_connection(
     clients: type[FakeClient], capsys: pytest.CaptureFixture[str]
 ) -> None:
     clients.refuses = 2
@@ -222,7 +222,7 @@ async def test_everything_is_retained_anew_after_a_lost_connection(
     assert "Errno" not in output
 
 
-async def test_an_error_that_nobody_foresaw_ends_no_publishing(
+async def test_unforeseen_error_does_not_end_publishing(
     clients: type[FakeClient],
 ) -> None:
     wrong = [True]

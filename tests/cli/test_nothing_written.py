@@ -166,7 +166,7 @@ def test_nothing_is_restored_or_loaded_unarmed(tmp_path: Path) -> None:
         assert served.writes == []
 
 
-def test_a_fault_holds_the_reference_back_too() -> None:
+def test_fault_blocks_the_reference_too() -> None:
     with counted("atv71") as served:
         served.drive.provoke("OCF", persists=True)
         done = drivepanel("run", served.line, *RUN[1:], "--reference", "20Hz")
@@ -174,7 +174,7 @@ def test_a_fault_holds_the_reference_back_too() -> None:
         assert "reset it first" in done.stderr
 
 
-def test_a_start_that_cannot_be_recorded_writes_no_reference(
+def test_start_that_cannot_be_recorded_writes_no_reference(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
@@ -186,7 +186,7 @@ def test_a_start_that_cannot_be_recorded_writes_no_reference(
 
 
 @pytest.mark.parametrize("command", [RUN, ("reference", "--arm")], ids=["run", "reference"])
-def test_a_unit_that_the_reference_has_not_gives_status_2(command: tuple[str, ...]) -> None:
+def test_unknown_unit_of_the_reference_exits_with_2(command: tuple[str, ...]) -> None:
     installed_mixer(PERCENT)
     word = ("--reference", "20Hz") if command == RUN else ("20Hz",)
     with counted(MIXER) as served:
@@ -195,7 +195,7 @@ def test_a_unit_that_the_reference_has_not_gives_status_2(command: tuple[str, ..
         assert "REF takes its reference in %. Type it like 40%." in done.stderr
 
 
-def test_an_interlock_that_ends_during_the_start_gives_status_4() -> None:
+def test_interlock_lost_during_the_start_exits_with_4() -> None:
     """The key is turned between the reference and the run word: the drive does not follow."""
     installed_mixer(SCALE_BY)
 
@@ -211,7 +211,7 @@ def test_an_interlock_that_ends_during_the_start_gives_status_4() -> None:
         assert served.writes[-1] == (COMMAND, 0), "it is stopped"
 
 
-def test_a_scale_that_changes_during_the_start_gives_status_6() -> None:
+def test_scale_changed_during_the_start_exits_with_6() -> None:
     installed_mixer(SCALE_BY)
 
     def change(drive: SimulatedDrive, register: int) -> None:
@@ -226,7 +226,7 @@ def test_a_scale_that_changes_during_the_start_gives_status_6() -> None:
         assert served.drive.motor.frequency == 0
 
 
-def test_a_run_checks_first_and_takes_the_control_then() -> None:
+def test_run_checks_the_reference_before_taking_control() -> None:
     """What the reference would be refused for is known before the terminals lose the motor."""
     with counted("powerdrive") as served:
         done = drivepanel("run", served.line, *RUN[1:], "-p", "powerdrive", "--take-control")

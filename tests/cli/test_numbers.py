@@ -37,7 +37,7 @@ def numeric_options() -> Iterator[tuple[str, click.Parameter]]:
 OPTIONS = dict(numeric_options())
 
 
-def test_every_command_is_searched() -> None:
+def test_number_options_of_all_commands_are_found() -> None:
     assert {"run --for", "watch --every", "serve --fresh", "simulate --run"} <= OPTIONS.keys()
 
 
@@ -58,14 +58,14 @@ def test_option_refuses_all_but_finite_numbers_in_range(name: str) -> None:
 
 
 @pytest.mark.parametrize("seconds", ["nan", "inf", "1e400", "0", "-1"])
-def test_run_for_no_finite_time_is_status_2(seconds: str) -> None:
+def test_run_for_an_infinite_time_exits_with_2(seconds: str) -> None:
     with tcp_line("atv71@1") as line:
         message = refused(2, "run", line, "--reference", "20Hz", "--arm", "--for", seconds)
         assert "--for" in message
 
 
 @pytest.mark.parametrize("rate", ["nan", "inf", "2", "-0.1", "x"])
-def test_simulate_refuses_a_share_that_is_none(rate: str) -> None:
+def test_simulate_refuses_an_invalid_share(rate: str) -> None:
     assert "KIND=VALUE" in refused(
         2, "simulate", "atv71", "--tcp", "127.0.0.1:0", "--line-fault", f"late={rate}"
     )

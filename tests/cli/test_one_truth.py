@@ -46,7 +46,7 @@ def test_status_and_run_use_the_same_words(family: str, sets: dict[str, int], wh
         ("atv31", {"LAC": 2, "CHCF": 2, "Fr1": 1, "Cd1": 1, "Cd2": 10, "CCS": 99}),
     ],
 )
-def test_an_idle_drive_set_up_for_the_line_is_commanded_by_it(
+def test_idle_drive_set_up_for_modbus_is_commanded_by_modbus(
     family: str, sets: dict[str, int]
 ) -> None:
     words = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]

@@ -49,7 +49,7 @@ def panel(monkeypatch: pytest.MonkeyPatch) -> type[FakePanel]:
         (("./read", "-d", "3"), "./read", 3, False),
     ],
 )
-def test_the_panel_opens_on_what_was_typed(
+def test_panel_opens_on_the_typed_line(
     panel: type[FakePanel],
     arguments: tuple[str, ...],
     start: str | None,
@@ -63,7 +63,7 @@ def test_the_panel_opens_on_what_was_typed(
     assert given["open_line"] is open_line
 
 
-def test_without_arguments_nothing_is_taken_apart(
+def test_start_without_arguments_parses_nothing(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.cli.alone.terminal_trouble", str)
@@ -75,7 +75,7 @@ def test_without_arguments_nothing_is_taken_apart(
     assert (panel.given["start"], panel.given["device"]) == (None, None)
 
 
-def test_without_arguments_an_error_is_reported_as_by_every_command(
+def test_error_without_arguments_is_reported_as_by_every_command(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def fail(panel: FakePanel) -> None:
@@ -90,7 +90,7 @@ def test_without_arguments_an_error_is_reported_as_by_every_command(
     assert capfd.readouterr().err.startswith("drivepanel: /dev/ttyUSB0 is in use")
 
 
-def test_without_arguments_and_without_a_terminal_it_says_so(
+def test_start_without_a_terminal_is_refused(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.argv", ["drivepanel"])
@@ -100,7 +100,7 @@ def test_without_arguments_and_without_a_terminal_it_says_so(
     assert "needs a terminal" in capfd.readouterr().err
 
 
-def test_the_demo_opens_a_line_of_its_own(panel: type[FakePanel]) -> None:
+def test_demo_opens_its_own_line(panel: type[FakePanel]) -> None:
     assert CliRunner().invoke(main, ["demo"]).exit_code == 0
     opened = panel.given["open_line"]("demo", read_only=False, wait=4.0)
     try:
@@ -111,7 +111,7 @@ def test_the_demo_opens_a_line_of_its_own(panel: type[FakePanel]) -> None:
         opened.close()
 
 
-def test_a_line_chosen_in_the_demo_is_that_line(
+def test_line_typed_for_the_demo_is_used(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     requested: list[tuple[str, dict[str, Any]]] = []
@@ -123,7 +123,7 @@ def test_a_line_chosen_in_the_demo_is_that_line(
     assert requested == [("/dev/ttyUSB0", {"read_only": True, "wait": 4.0, "program": ""})]
 
 
-def test_a_panel_that_had_to_stop_is_no_success(
+def test_panel_that_ended_by_an_error_exits_with_1(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(panel, "ends_with", 1)
@@ -131,9 +131,7 @@ def test_a_panel_that_had_to_stop_is_no_success(
 
 
 @pytest.mark.parametrize("command", [(), ("demo",), ("tcp:10.0.0.5",)])
-def test_the_mouse_is_reported_only_where_that_is_requested(
-    panel: type[FakePanel], command: tuple[str, ...]
-) -> None:
+def test_mouse_is_enabled_only_on_request(panel: type[FakePanel], command: tuple[str, ...]) -> None:
     for options, mouse in (((), False), (("--mouse",), True)):
         result = CliRunner().invoke(main, [*command, *options])
         assert result.exit_code == 0, result.output

@@ -19,13 +19,13 @@ def line_to(link: Link) -> Any:
     return SimpleNamespace(link=link)
 
 
-def test_it_is_longer_on_a_slow_line() -> None:
+def test_patience_is_longer_on_a_slow_line() -> None:
     waits = [patience(line_to(SerialLink("x", baud, "8E1")), 3.0) for baud in (19200, 9600, 1200)]
     assert [round(wait, 1) for wait in waits] == [3.7, 4.4, 14.0]
     assert patience(line_to(TcpLink("host")), 3.0) == 3.0
 
 
-async def test_a_time_out_that_is_learnt_late_fails_no_status(
+async def test_timeout_learned_late_does_not_fail_status(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Beside a panel at 1200 baud status ended with "TTO is set and could not be learnt"."""

@@ -77,7 +77,7 @@ async def bench(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bench]:
     opened.close()
 
 
-async def test_a_drive_that_is_away_keeps_no_other_from_being_read(
+async def test_absent_drive_does_not_delay_others(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert bench.sight(HERE).error == "Device 1 was not asked yet."
@@ -95,7 +95,7 @@ async def test_a_drive_that_is_away_keeps_no_other_from_being_read(
     assert output.count("It is tried on.") == 2
 
 
-async def test_drive_never_polled_comes_before_one_that_is_away(
+async def test_drive_never_polled_is_polled_before_an_absent_one(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drives, "FIND_AGAIN", 60.0)
@@ -103,7 +103,7 @@ async def test_drive_never_polled_comes_before_one_that_is_away(
     assert not bench.good(AWAY)
 
 
-async def test_line_that_is_full_is_reported_once_until_it_is_not(
+async def test_full_line_is_reported_once(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(drives, "RATE_LOOK_INTERVAL", 0.01)
@@ -125,7 +125,7 @@ async def test_line_that_is_full_is_reported_once_until_it_is_not(
     ]
 
 
-async def test_a_drive_that_was_long_silent_is_requested_again_who_it_is(
+async def test_drive_silent_for_long_is_identified_again(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drives, "SILENT_FOR_LONG", 0.5)

@@ -17,7 +17,7 @@ from .commands import ended, refused, tcp_line
 ON_THE_RUN = ("prove", "sim:atv312", "--arm", "--turning")
 
 
-def test_on_the_run_without_a_terminal_takes_a_yes() -> None:
+def test_running_motor_without_a_terminal_requires_yes() -> None:
     output = refused(5, *ON_THE_RUN)
     assert "a hoist falls" in output
     assert "--yes says that this is meant" in output
@@ -26,7 +26,7 @@ def test_on_the_run_without_a_terminal_takes_a_yes() -> None:
     assert "Sent by this command: CMD = 16#0007" in error, "its stop"
 
 
-def test_the_time_out_of_each_port_counts() -> None:
+def test_timeout_of_each_port_is_tested() -> None:
     output = refused(1, "prove", "sim:powerdrive", "-p", "powerdrive", "--arm")
     assert "15.07 is Off and 11.63 is Off. The drive does not react to a" in output
     with tcp_line("powerdrive@1", "--set", "11.63=5", "--any-settings") as line:
@@ -43,7 +43,7 @@ def figures(result: ProofResult) -> dict[str, Any]:
     return {name: value for name, value in found.items() if name not in head}
 
 
-def test_result_in_figures() -> None:
+def test_result_is_reported_in_figures() -> None:
     assert figures(replace(AS_SET, changed="ttO is 2 s.")) == {
         "configured_ms": 2000,
         "not_before_ms": 1880,

@@ -66,7 +66,7 @@ def events(text: str, kind: str) -> list[dict[str, Any]]:
     return [document for document in documents(text) if document.get("event") == kind]
 
 
-def test_answering_drive_is_reported_with_certainty() -> None:
+def test_answering_drive_is_reported_as_certain() -> None:
     with drives(*MOTORS) as peer:
         text = ended(0, "scan", peer.path, "--addresses", "1-9", "--json").stdout
     first, second, third = events(text, "hit")
@@ -85,7 +85,7 @@ def test_answering_drive_is_reported_with_certainty() -> None:
     assert end["settings"] == [{"baud": 19200, "format": "8E1"}]
 
 
-def test_it_writes_nothing_and_asks_an_empty_address_once() -> None:
+def test_scan_writes_nothing_and_polls_empty_addresses_once() -> None:
     with drives(*MOTORS) as peer:
         ended(0, "scan", peer.path, "--addresses", "1-12")
     assert {request[1] for request in peer.requests} <= READS
@@ -93,7 +93,7 @@ def test_it_writes_nothing_and_asks_an_empty_address_once() -> None:
     assert [request[0] for request in peer.requests if request[0] in empty] == sorted(empty)
 
 
-def test_a_person_reads_which_drive_is_where() -> None:
+def test_text_output_lists_drives_by_address() -> None:
     with drives(*MOTORS) as peer:
         text = ended(0, "scan", peer.path, "--addresses", "1-9").stdout
     assert text.splitlines() == [
@@ -103,7 +103,7 @@ def test_a_person_reads_which_drive_is_where() -> None:
     ]
 
 
-def test_silent_addresses_are_no_hits() -> None:
+def test_silent_addresses_are_not_hits() -> None:
     with PtyPeer(silent) as peer:
         done = invoked("scan", peer.path, "--addresses", "1-5", "--json")
     assert done.exit_code == 3
@@ -124,7 +124,7 @@ def test_drive_with_line_timeout_is_named_before_first_request() -> None:
 
 
 @pytest.mark.parametrize("options", [(), ("--all-settings", "--yes")], ids=["one", "all"])
-def test_another_master_ends_it_before_anything_is_sent(options: tuple[str, ...]) -> None:
+def test_another_master_ends_the_scan_before_anything_is_sent(options: tuple[str, ...]) -> None:
     over = threading.Event()
     with PtyPeer(silent) as peer:
 
@@ -149,7 +149,7 @@ def test_another_master_ends_it_before_anything_is_sent(options: tuple[str, ...]
     assert "Nothing was sent." in done.stderr
 
 
-def test_a_master_that_begins_later_ends_it_too_and_what_was_found_stays() -> None:
+def test_later_master_ends_the_scan_and_keeps_the_hits() -> None:
     simulation = Simulation([DriveSpec("atv71", 2)], any_settings=True)
 
     def script(request: bytes, _count: int) -> Sequence[Step]:
@@ -179,7 +179,7 @@ def test_two_drives_at_one_address_are_reported_as_unclear() -> None:
     assert reported["device"] == 3
 
 
-def test_damaged_identification_is_unclear_and_no_family_is_likely() -> None:
+def test_damaged_identification_is_unclear_without_a_family() -> None:
     """An Altivar that answers the read by which others are found; its name comes damaged."""
 
     def script(request: bytes, _count: int) -> Sequence[Step]:
@@ -200,7 +200,7 @@ def test_damaged_identification_is_unclear_and_no_family_is_likely() -> None:
 
 
 @pytest.mark.parametrize(("code", "text"), [(10, "0A, it has no way"), (11, "0B, the drive did")])
-def test_refusals_of_a_gateway_are_reported(code: int, text: str) -> None:
+def test_gateway_exceptions_are_reported(code: int, text: str) -> None:
     def script(request: bytes, _count: int) -> Sequence[Step]:
         return [tcp_reply(request, bytes([request[7] | 0x80, code]))]
 
@@ -232,13 +232,13 @@ def test_echo_of_the_adapter_is_reported() -> None:
     assert "The adapter repeats what it sends" in done.stderr
 
 
-def test_line_that_is_well_has_no_remarks() -> None:
+def test_healthy_line_has_no_remarks() -> None:
     with tcp_line("atv71@2") as line:
         (end,) = events(ended(0, "scan", line, "--addresses", "1-2", "--json").stdout, "ended")
     assert end["remarks"] == []
 
 
-def test_over_a_network_there_is_no_setting() -> None:
+def test_network_line_has_no_setting() -> None:
     with tcp_line("atv71@2") as line:
         (hit,) = events(ended(0, "scan", line, "--addresses", "1-2", "--json").stdout, "hit")
         assert (hit["baud"], hit["format"]) == (None, None)
@@ -249,7 +249,7 @@ SLOW = DriveSpec("atv71", 4, sets={"TBR": 28})
 """At 9600 baud."""
 
 
-def test_other_settings_are_tried_and_what_hears_two_is_reported_once() -> None:
+def test_other_settings_find_drives_and_report_each_once() -> None:
     with line_of(DriveSpec("atv71", 1), SLOW) as line:
         text = ended(0, "scan", line, "--addresses", "1,4", "--all-settings", "--json").stdout
     hits = events(text, "hit")
@@ -280,7 +280,7 @@ def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyP
     assert [item["baud"] for item in end["settings"]] == [19200, 9600, 600, 300]
 
 
-def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() -> None:
+def test_without_a_terminal_a_drive_with_a_timeout_blocks_other_settings() -> None:
     with line_of(DriveSpec("atv21", 1), SLOW) as line:
         requested = "scan", line, "--addresses", "1,4", "--all-settings", "--json"
         held = ended(0, *requested)
@@ -292,7 +292,7 @@ def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() 
         assert [event["device"] for event in events(text, "hit")] == [1, 4]
 
 
-def test_a_line_that_others_use_is_not_taken_for_other_settings() -> None:
+def test_shared_line_is_not_scanned_at_other_settings() -> None:
     with line_of(DriveSpec("atv71", 1)) as line:
         watch = [*DRIVEPANEL, "watch", line, "RFR", "--json"]
         with served(watch, ready="RFR"):
@@ -303,7 +303,7 @@ def test_a_line_that_others_use_is_not_taken_for_other_settings() -> None:
             assert "Altivar 71" in ended(0, "scan", line, "--addresses", "1-2").stdout
 
 
-def test_ctrl_c_keeps_what_was_found() -> None:
+def test_ctrl_c_keeps_the_hits() -> None:
     with line_of(DriveSpec("atv71", 1)) as line:
         scan = [*DRIVEPANEL, "scan", line, "--all-settings", "--json"]
         with served(scan, ready='"hit"') as program:
@@ -342,7 +342,7 @@ def seen(near: int, wanted: str) -> None:
             text += os.read(near, 4096).decode()
 
 
-def test_drives_are_held_while_the_person_decides() -> None:
+def test_drives_are_kept_alive_during_the_question() -> None:
     simulation = Simulation([DriveSpec("atv21", 1, sets={"F803": 2})], timing=LineTiming())
     with simulation:
         line, drive = simulation.serve_pty(), simulation.drive(1)

@@ -27,7 +27,7 @@ def test_progress_is_drawn_on_a_terminal_only(
     assert any(part.isspace() for part in cleared) is is_terminal
 
 
-def test_progress_in_words() -> None:
+def test_progress_is_described_in_words() -> None:
     assert PROGRESS.text.startswith("19200")
     assert "12 of 31" in PROGRESS.text
     assert "2 found, 1 more settings, 3 s left" in PROGRESS.text

@@ -41,11 +41,11 @@ from .commands import refused
         (["tcp:10.0.0.1", "sim:atv71", "--metrics", ":1", "-d", "1", "-p", "atv71"], "which line"),
     ],
 )
-def test_senseless_options_exit_with_usage(typed: list[str], reported: str) -> None:
+def test_conflicting_options_exit_with_2(typed: list[str], reported: str) -> None:
     assert reported in refused(2, "serve", *typed)
 
 
-def test_a_port_that_is_taken_is_reported() -> None:
+def test_port_in_use_is_reported() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port: int = taken.getsockname()[1]
         place = f"127.0.0.1:{port}"
@@ -55,7 +55,7 @@ def test_a_port_that_is_taken_is_reported() -> None:
         assert f"No metrics can be served at {place}: Address already in use." in reported
 
 
-def test_a_line_without_a_keeper_is_reported(
+def test_line_without_a_keeper_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = FakeLine()
@@ -67,7 +67,7 @@ def test_a_line_without_a_keeper_is_reported(
     assert "drivepanel: This program holds the line itself." in capsys.readouterr().err
 
 
-def test_a_place_without_a_host_is_loopback() -> None:
+def test_address_without_a_host_is_loopback() -> None:
     assert host_port("502") == ("127.0.0.1", 502)
     assert host_port(":502") == ("127.0.0.1", 502)
     assert host_port("[::1]:502") == ("::1", 502)
@@ -103,7 +103,7 @@ def settings(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("settings")
-def test_a_name_brings_its_drive_and_the_profiles_of_its_line() -> None:
+def test_name_includes_its_drive_and_the_profiles_of_its_line() -> None:
     both = {2: "powerdrive", 5: "varmeca"}
     (pump,) = served_lines(["pump"])
     assert (pump.name, pump.devices, pump.profiles) == ("pump", (2,), both)
@@ -120,7 +120,7 @@ def test_a_name_brings_its_drive_and_the_profiles_of_its_line() -> None:
 
 
 @pytest.mark.usefixtures("settings")
-def test_drives_are_read_by_their_profiles() -> None:
+def test_drives_are_read_with_their_profiles() -> None:
     (pump,) = served_lines(["pump@1,2"])
     assert [(drive.device, drive.profile_id) for drive in read_drives(pump, ())] == [
         (1, None),
@@ -132,7 +132,7 @@ def test_drives_are_read_by_their_profiles() -> None:
 
 
 @pytest.mark.usefixtures("settings")
-def test_drives_of_d_are_ids_of_the_gateway() -> None:
+def test_device_options_are_ids_of_the_gateway() -> None:
     lines = served_lines(["bare", "belt"])
     wish = GatewayWish("", 0, {101: (1, 3)}, GatewayRules())
     found = with_named(lines, wish, (101,), "varmeca")

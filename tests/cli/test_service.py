@@ -32,7 +32,7 @@ def service(systemd: socket.socket, **more: str) -> Service:
     return Service({"NOTIFY_SOCKET": systemd.getsockname(), **more})
 
 
-def test_ready_and_stopping_are_reported(systemd: socket.socket) -> None:
+def test_service_reports_ready_and_stopping(systemd: socket.socket) -> None:
     item = service(systemd)
     item.ready("sim:atv71\nMAINPID=1")
     assert systemd.recv(500) == b"READY=1\nSTATUS=sim:atv71 MAINPID=1"
@@ -40,7 +40,7 @@ def test_ready_and_stopping_are_reported(systemd: socket.socket) -> None:
     assert systemd.recv(500).startswith(b"STOPPING=1\n")
 
 
-def test_an_abstract_address_is_reported_too() -> None:
+def test_abstract_socket_address_works() -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
         name = f"drivepanel-test-{os.getpid()}"
         end.bind(f"\0{name}")
@@ -49,7 +49,7 @@ def test_an_abstract_address_is_reported_too() -> None:
         assert end.recv(500) == b"READY=1\nSTATUS=here"
 
 
-def test_nothing_is_reported_to_nobody(tmp_path: Path) -> None:
+def test_service_without_a_socket_reports_nothing(tmp_path: Path) -> None:
     Service({}).ready("here")
     Service({"NOTIFY_SOCKET": str(tmp_path / "gone")}).ready("here")
     assert Service({}).watchdog is None
@@ -59,7 +59,7 @@ def test_nothing_is_reported_to_nobody(tmp_path: Path) -> None:
     assert Service({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": mine}).watchdog == 3.0
 
 
-async def test_signs_of_life_end_where_the_line_stands_still(systemd: socket.socket) -> None:
+async def test_watchdog_messages_end_if_the_line_hangs(systemd: socket.socket) -> None:
     alive = True
     item = service(systemd, WATCHDOG_USEC="60000")
     task = asyncio.create_task(item.watch(lambda: alive))
@@ -77,7 +77,7 @@ async def test_signs_of_life_end_where_the_line_stands_still(systemd: socket.soc
     task.cancel()
 
 
-def test_the_unit_says_what_the_program_does() -> None:
+def test_unit_matches_the_program() -> None:
     unit = ConfigParser(strict=False, interpolation=None, delimiters=("=",))
     unit.optionxform = str  # type: ignore[assignment, method-assign]
     unit.read(UNITS / "drivepanel.service", "utf-8")
@@ -91,7 +91,7 @@ def test_the_unit_says_what_the_program_does() -> None:
     assert served["RuntimeDirectoryPreserve"] == "yes"
 
 
-def test_the_unit_lets_the_socket_be_handed_to_its_group() -> None:
+def test_unit_allows_the_socket_to_belong_to_its_group() -> None:
     """A call that systemd does not let through killed the program before it was ready."""
     lines = (UNITS / "drivepanel.service").read_text("utf-8").splitlines()
     filters = [line.partition("=")[2] for line in lines if line.startswith("SystemCallFilter=")]
@@ -100,9 +100,7 @@ def test_the_unit_lets_the_socket_be_handed_to_its_group() -> None:
     assert "SystemCallErrorNumber=EPERM" in lines
 
 
-def test_systemd_finds_no_fault_in_the_unit(
-    peer: Callable[[str, str], str], tmp_path: Path
-) -> None:
+def test_systemd_accepts_the_unit(peer: Callable[[str, str], str], tmp_path: Path) -> None:
     """With a program that is there, and without the manual page, which is not."""
     text = (UNITS / "drivepanel.service").read_text("utf-8")
     text = text.replace("/usr/bin/drivepanel", "/bin/true").replace("Documentation=man", "#")
@@ -117,7 +115,7 @@ def test_systemd_finds_no_fault_in_the_unit(
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_systemd_understands_the_unit_and_finds_it_tight(peer: Callable[[str, str], str]) -> None:
+def test_systemd_rates_the_unit_as_secure(peer: Callable[[str, str], str]) -> None:
     analyze = peer("systemd-analyze", "systemd")
     unit = str(UNITS / "drivepanel.service")
     done = subprocess.run(

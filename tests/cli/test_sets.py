@@ -38,7 +38,7 @@ def line() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "varmeca"))
-def test_a_drive_equals_its_own_backup(family: str, tmp_path: Path) -> None:
+def test_drive_equals_its_own_backup(family: str, tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     drive = (f"sim:{family}@3", "-d", "3", "-p", family)
     assert "settings of" in run(0, "backup", drive[0], file, *drive[1:])
@@ -46,7 +46,7 @@ def test_a_drive_equals_its_own_backup(family: str, tmp_path: Path) -> None:
     assert "0 to write" in run(0, "restore", drive[0], file, "--dry-run", *drive[1:])
 
 
-def test_back_up_write_compare_restore(line: str, tmp_path: Path) -> None:
+def test_changed_setting_is_restored_from_a_backup(line: str, tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     run(0, "backup", line, file, "-d", "2")
     written = run(0, "write", line, "ACC=5,5 s", "hsp=40", "-d", "2", "--arm", "--save")
@@ -69,19 +69,19 @@ def test_back_up_write_compare_restore(line: str, tmp_path: Path) -> None:
     run(0, "compare", file, line, "-d", "2")
 
 
-def test_two_drives_of_a_line(tmp_path: Path) -> None:
+def test_two_drives_of_a_line_are_compared(tmp_path: Path) -> None:
     with tcp_line("atv31@1", "atv31@2", "--set", "2:ACC=99") as line:
         reported = run(1, "compare", line, line, "-d", "1", "-d", "2")
         assert {row.split()[1] for row in reported.splitlines()[1:]} == {"ACC", "Add"}
 
 
-def test_the_factory_settings(line: str) -> None:
+def test_drive_is_compared_with_factory_settings(line: str) -> None:
     reported = run(1, "compare", "factory", line, "-d", "2")
     assert "LAC" in reported
     assert "ACC" in run(1, "compare", "factory", line, "-d", "2", "--all")
 
 
-def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
+def test_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     sets = {f"SP{n}": 100 + n for n in range(2, 9)} | {"ACC": 77, "dEC": 66, "AC2": 55}
     settings = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
@@ -106,7 +106,7 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
         assert "did not come" not in run(0, "restore", line, file, "--arm")
 
 
-def test_restore_that_cannot_compare_again_says_why_exits_with_3(
+def test_restore_without_a_final_comparison_exits_with_3(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It told "1 written, 0 not" and status 4, as if the drive had refused something."""
@@ -124,7 +124,7 @@ def test_restore_that_cannot_compare_again_says_why_exits_with_3(
     assert "Not all of it was seen again: The gateway is gone." in output
 
 
-def test_130_a_restore_ended_by_ctrl_c_tells_what_was_written(tmp_path: Path) -> None:
+def test_restore_ended_by_ctrl_c_reports_its_writes_and_exits_with_130(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     settings = [part for n in range(2, 9) for part in ("--set", f"SP{n}={100 + n}")]
     with tcp_line("atv312", *settings) as line:
@@ -153,7 +153,7 @@ def _unbuffered() -> dict[str, str]:
     return {**os.environ, "PYTHONUNBUFFERED": "1"}
 
 
-def test_two_backups_around_a_run_are_the_same_but_for_their_time(tmp_path: Path) -> None:
+def test_backups_before_and_after_a_run_differ_in_time_only(tmp_path: Path) -> None:
     with tcp_line("atv71@2", "--set", "DEC=1") as line:
         run(0, "backup", line, tmp_path / "a", "-d", "2")
         run(0, "backup", line, tmp_path / "all-a", "-d", "2", "--all")
@@ -168,7 +168,7 @@ def test_two_backups_around_a_run_are_the_same_but_for_their_time(tmp_path: Path
     assert [text for text, two in zip(a, b, strict=True) if text != two and "time" not in text]
 
 
-def test_a_backup_on_standard_output(line: str, tmp_path: Path) -> None:
+def test_backup_is_written_to_standard_output(line: str, tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     file.write_text(run(0, "backup", line, "-", "-d", "2"), encoding="utf-8")
     assert not Path("-").exists()
@@ -206,7 +206,7 @@ ROUNDED = [("LSP=0.04", "LSP: 0.04 would be held as 0.0 Hz"), ("ACC=3.55s", "3.5
 
 
 @pytest.mark.parametrize(("wanted", "text"), ROUNDED)
-def test_value_changed_by_rounding_exits_with_5(line: str, wanted: str, text: str) -> None:
+def test_value_changed_much_by_rounding_exits_with_5(line: str, wanted: str, text: str) -> None:
     drive = (line, "-d", "2")
     for how in ("--arm", "--dry-run"):
         output = refused(5, "write", *drive, wanted, how)
@@ -228,7 +228,7 @@ def test_repeated_code_exits_with_2(line: str) -> None:
     assert re.search(r"ACC .* 3\.0 +s ", run(0, "read", line, "ACC", "-d", "2"))
 
 
-def test_a_set_does_not_round_in_silence(line: str, tmp_path: Path) -> None:
+def test_rounding_of_a_set_is_reported(line: str, tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     run(0, "backup", line, file, "-d", "2")
     text = file.read_text("utf-8")
@@ -308,11 +308,11 @@ WRITES_REFUSED_HERE = [
 
 
 @pytest.mark.parametrize(("arguments", "text"), WRITES_REFUSED_HERE)
-def test_refusal_exits_with_5(arguments: tuple[str, ...], text: str) -> None:
+def test_refused_write_exits_with_5(arguments: tuple[str, ...], text: str) -> None:
     assert text in refused(5, "write", "sim:atv71", *arguments)
 
 
-def test_a_setting_written_before_a_refused_one_gives_status_6() -> None:
+def test_setting_written_before_a_refused_one_exits_with_6() -> None:
     error = ended(6, "write", "sim:atv71", "LSP=60", "HSP=40", "--arm").stderr
     assert "would be above HSP" in error
     assert error.endswith("drivepanel: Sent by this command: HSP = 40.0 Hz.\n")
@@ -323,7 +323,7 @@ def test_unarmed_restore_writes_nothing_exits_with_5(tmp_path: Path) -> None:
     assert "Not armed" in refused(5, "restore", "sim:atv21", tmp_path / "x.toml")
 
 
-def test_running_motor_is_not_fully_restored_exits_with_6() -> None:
+def test_restore_to_a_running_motor_exits_with_6() -> None:
     with tcp_line("atv312", "--run", "30") as line:
         output = refused(6, "write", line, "ACC=4", "FrS=60", "--arm")
         assert "motor stopped only" in output
@@ -331,11 +331,11 @@ def test_running_motor_is_not_fully_restored_exits_with_6() -> None:
         assert re.search(r"ACC .* 4\.0 +s ", run(0, "read", line, "ACC"))
 
 
-def test_an_unverified_one_is_written_when_confirmed() -> None:
+def test_unverified_parameter_is_written_if_confirmed() -> None:
     assert "F111" in run(0, "write", "sim:atv21", "F111=Forced local", "--arm", "--confirm", "f111")
 
 
-def test_a_dry_run_of_write_sends_nothing(line: str) -> None:
+def test_dry_run_of_write_sends_nothing(line: str) -> None:
     assert "write  ACC: 3.0 s -> 9.0 s" in run(0, "write", line, "ACC=9", "-d", "2", "--dry-run")
     assert "3.0" in run(0, "read", line, "ACC", "-d", "2")
 
@@ -349,14 +349,14 @@ PAST_LIMITS = [
 
 
 @pytest.mark.parametrize(("wanted", "text"), PAST_LIMITS)
-def test_value_beyond_another_parameters_limit_exits_with_5(
+def test_value_beyond_the_limit_of_another_parameter_exits_with_5(
     wanted: tuple[str, ...], text: str
 ) -> None:
     assert text in run(5, "write", "sim:atv71", *wanted, "--dry-run")
     assert text in refused(5, "write", "sim:atv71", *wanted, "--arm")
 
 
-def test_a_limit_is_raised_before_what_it_limits() -> None:
+def test_limit_is_raised_before_the_value_it_limits() -> None:
     assert "HSP: 50.0 Hz -> 70.0 Hz" in run(0, "write", "sim:atv71", "HSP=70", "TFR=80", "--arm")
 
 
@@ -369,7 +369,7 @@ def test_drive_is_found_at_its_new_address() -> None:
             assert time.monotonic() < end
 
 
-def test_a_set_of_another_family_is_carried_over_by_quantity(line: str, tmp_path: Path) -> None:
+def test_set_of_another_family_is_converted_by_quantity(line: str, tmp_path: Path) -> None:
     with tcp_line("atv71", "--set", "ACC=88") as other:
         run(0, "backup", other, tmp_path / "71.toml")
     reported = run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--dry-run")
@@ -379,7 +379,7 @@ def test_a_set_of_another_family_is_carried_over_by_quantity(line: str, tmp_path
     assert re.search(r"ACC .* 8\.8 +s ", run(0, "read", line, "ACC", "-d", "2"))
 
 
-def test_a_report(line: str, tmp_path: Path) -> None:
+def test_report_has_identity_and_changed_settings(line: str, tmp_path: Path) -> None:
     file = tmp_path / "pump.md"
     run(0, "write", line, "ACC=9", "-d", "2", "--arm")
     run(0, "report", line, file, "-d", "2")
@@ -391,7 +391,7 @@ def test_a_report(line: str, tmp_path: Path) -> None:
     run(0, "report", line, file, "-d", "2", "--force")
 
 
-def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
+def test_one_set_is_restored_to_several_drives(tmp_path: Path) -> None:
     file = tmp_path / "model.toml"
     with tcp_line("atv312@1,atv312@2,atv21@3") as line:
         run(0, "write", line, "ACC=7", "HSP=40", "-d", "1", "--arm")
@@ -421,7 +421,7 @@ def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
         (["TTO"], ["ACC"], False, ["TTO", "--save"]),
     ],
 )
-def test_work_left_after_a_write_is_reported(
+def test_steps_left_after_a_write_are_reported(
     after_reset: list[str], unsaved: list[str], saved: bool, parts: list[str]
 ) -> None:
     messages = Messages(as_json=True)

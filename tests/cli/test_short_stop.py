@@ -82,9 +82,7 @@ def clicked(words: list[str]) -> dict[str, Any] | None:
 @example(["--", "-d", "2"], True, False)
 @example(["-p", "-v", "-d", "2"], True, False)
 @example(["-p", "-d", "-d", "2"], True, False)
-def test_short_stop_taken_equals_what_the_command_takes(
-    words: list[str], with_line: bool, first: bool
-) -> None:
+def test_short_stop_parses_like_the_command(words: list[str], with_line: bool, first: bool) -> None:
     typed = [LINE] if with_line else []
     words = ["stop", *typed, *words] if first else ["stop", *words, *typed]
     taken = parse_stop(words)
@@ -112,7 +110,9 @@ def test_short_stop_taken_equals_what_the_command_takes(
         (("--arm", "--accept-line", "-patv71", "--profile=atv71"), (1,)),
     ],
 )
-def test_short_stop_usual_forms_are_taken(words: tuple[str, ...], devices: tuple[int, ...]) -> None:
+def test_short_stop_handles_the_usual_forms(
+    words: tuple[str, ...], devices: tuple[int, ...]
+) -> None:
     assert parse_stop(["stop", LINE, *words]) == (LINE, devices)
     assert parse_stop(["-v", "stop", *words, LINE]) == (LINE, devices)
 
@@ -124,11 +124,11 @@ def test_short_stop_usual_forms_are_taken(words: tuple[str, ...], devices: tuple
         "--all -d 2", "-d 0", "-d 248", "-d 1,2", "-d", "-p", "--share-group g", "another", "--",
     ],
 )  # fmt: skip
-def test_short_stop_other_forms_are_left_to_the_command(words: str) -> None:
+def test_short_stop_leaves_other_forms_to_the_command(words: str) -> None:
     assert parse_stop(["stop", LINE, *words.split()]) is None
 
 
-def test_short_stop_without_line_takes_that_of_the_environment(
+def test_short_stop_without_a_line_uses_the_environment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert parse_stop(["stop", "-d", "2"]) is None
@@ -157,7 +157,7 @@ profile = "atv71"
 @pytest.mark.parametrize("broken", ["", "\n[lines.more\n", "\n[other]\n"])
 @pytest.mark.parametrize("words", ["", "-d 3", "--all", "-p atv31 -d 5 -d 6"])
 @pytest.mark.parametrize("name", ["pump", "PUMP", "fan-2", "more", "factory", "x", "5", "_"])
-def test_short_stop_of_a_named_line_equals_what_the_command_takes(
+def test_short_stop_of_a_named_line_parses_like_the_command(
     name: str, words: str, broken: str, own_folders: Path
 ) -> None:
     (own_folders / "config").mkdir()
@@ -177,7 +177,7 @@ def test_short_stop_of_a_named_line_equals_what_the_command_takes(
 
 
 @pytest.mark.parametrize("words", [[], ["run", LINE, "stop"], ["status", "stop"], [LINE], ["-v"]])
-def test_short_stop_of_other_commands_is_none(words: list[str]) -> None:
+def test_short_stop_ignores_other_commands(words: list[str]) -> None:
     assert parse_stop(words) is None
 
 
@@ -234,7 +234,7 @@ def hosts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @example("tcp:both")
 @example("rtu-tcp:PUMP:00502")
 @pytest.mark.usefixtures("hosts")
-def test_short_stop_line_taken_is_the_line_of_the_command(text: str) -> None:
+def test_short_stop_line_is_the_line_of_the_command(text: str) -> None:
     keys, real = line_keys(text)
     if not keys:
         return
@@ -257,12 +257,12 @@ def test_short_stop_line_taken_is_the_line_of_the_command(text: str) -> None:
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("hosts")
-def test_short_stop_usual_lines_are_taken(text: str) -> None:
+def test_short_stop_handles_the_usual_lines(text: str) -> None:
     assert line_key(text) in line_keys(text)[0]
 
 
 @pytest.mark.usefixtures("hosts")
-def test_short_stop_lines_in_other_spellings_are_left_to_the_command() -> None:
+def test_short_stop_leaves_other_spellings_to_the_command() -> None:
     texts = ("sim:atv71", "pump", "tcp:[::1]", "tcp:six", "tcp:127.1", "tcp:short", "null", "COM3")
     assert [text for text in texts if line_keys(text)[0]] == []
 
@@ -318,12 +318,12 @@ def test_short_stop_finds_the_socket_of_the_holder(link: SerialLink | TcpLink | 
         assert holder_address("tcp:10.0.0.99") == ""
 
 
-def test_short_stop_uses_no_socket_of_a_port_that_leads_elsewhere_now(tmp_path: Path) -> None:
+def test_short_stop_ignores_the_socket_of_a_changed_port(tmp_path: Path) -> None:
     with held(place_of("/dev/null"), "serial:/dev/zero,19200,8E1"):
         assert holder_address("/dev/null") == ""
 
 
-def test_short_stop_uses_no_socket_that_is_not_of_this_user(
+def test_short_stop_ignores_sockets_of_other_users(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with held(place_of("/dev/null"), "serial:/dev/null,19200,8E1") as listening:
@@ -364,7 +364,7 @@ def test_short_stop_finds_the_holder_for_a_group(
     ],
     ids=str,
 )  # fmt: skip
-def test_short_stop_knows_the_state_folder(
+def test_short_stop_finds_the_state_folder(
     environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("DRIVEPANEL_STATE", "XDG_STATE_HOME"):
@@ -375,7 +375,7 @@ def test_short_stop_knows_the_state_folder(
 
 
 @given(some.text(max_size=60))
-def test_short_stop_knows_the_name_of_a_lock(key: str) -> None:
+def test_short_stop_finds_the_lock_by_its_name(key: str) -> None:
     with suppress(UnicodeEncodeError):
         assert short_stop._lock_name(key) == SharePlace(key, Path("x"), ()).lock_path.name
 
@@ -383,7 +383,7 @@ def test_short_stop_knows_the_name_of_a_lock(key: str) -> None:
 # The shot
 
 
-def test_short_stop_is_heard_by_the_holder() -> None:
+def test_short_stop_reaches_the_holder() -> None:
     with Simulation([DriveSpec("atv71", 1)]) as simulation:
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         with closing(open_line(line, wait=10, program="panel")) as opened:
@@ -438,7 +438,7 @@ def test_short_stop_failure_is_silent(
     assert capfd.readouterr() == ("", "")
 
 
-def test_short_stop_imports_nothing_that_takes_long() -> None:
+def test_short_stop_imports_no_slow_module() -> None:
     script = (
         "import sys; before = set(sys.modules)\n"
         "from tui.__main__ import main\n"
@@ -453,7 +453,7 @@ def test_short_stop_imports_nothing_that_takes_long() -> None:
     assert set(done.stdout.split()) <= allowed | {"_sha2", "_sha256"}
 
 
-def test_short_stop_waits_for_no_pipe_in_the_place_of_a_lock(tmp_path: Path) -> None:
+def test_short_stop_does_not_block_on_a_pipe_instead_of_a_lock(tmp_path: Path) -> None:
     pipe = tmp_path / "line.lock"
     os.mkfifo(pipe)
     assert short_stop._content(str(pipe)) == ""

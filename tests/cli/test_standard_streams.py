@@ -17,7 +17,7 @@ def pipe_without_reader() -> int:
     return writing
 
 
-def test_reader_that_went_away_is_reported_on_a_pipe_that_is_to_report_it() -> None:
+def test_lost_reader_is_reported_only_if_pipes_are_to_report_it() -> None:
     number = pipe_without_reader()
     with pytest.raises(BrokenPipeError):
         ForgivingFile(number, pipes=True).write(b"text")
@@ -27,7 +27,7 @@ def test_reader_that_went_away_is_reported_on_a_pipe_that_is_to_report_it() -> N
     os.close(number)
 
 
-def test_only_standard_output_reports_that_its_reader_went_away(
+def test_only_standard_output_reports_a_lost_reader(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for name in ("stdout", "stderr"):

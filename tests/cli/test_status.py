@@ -113,7 +113,7 @@ def test_refusal_by_drivepanel_exits_with_5(refusal: type[Exception]) -> None:
     assert result.stderr == "drivepanel: ACC: 9999 is above 999.9 s.\n"
 
 
-def test_an_unforeseen_error_goes_to_the_log() -> None:
+def test_unforeseen_error_is_logged() -> None:
     @click.command()
     @reported
     def command() -> None:
@@ -129,7 +129,7 @@ def test_an_unforeseen_error_goes_to_the_log() -> None:
     assert "Traceback" in log_file().read_text()
 
 
-def test_a_log_that_cannot_be_written_stops_nothing(
+def test_unwritable_log_does_not_stop_commands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -153,7 +153,7 @@ def expect(status: int, *arguments: str) -> None:
     assert lines[0].startswith("drivepanel: ")
 
 
-def test_a_time_out_that_the_drive_does_not_tell_is_not_called_none() -> None:
+def test_unreadable_timeout_is_not_reported_as_off() -> None:
     """A Powerdrive is silent at the words of a port that it does not have."""
     both = ("powerdrive@1", "--protect", "15.07,11.63", "--any-settings")
     with tcp_line(*both) as line:

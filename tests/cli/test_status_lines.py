@@ -32,7 +32,7 @@ def listed(text: str) -> list[dict[str, Any]]:
     return found
 
 
-def test_drives_are_reported_with_their_lines_in_order(named: tuple[str, str]) -> None:
+def test_drives_are_listed_with_their_lines_in_order(named: tuple[str, str]) -> None:
     pump, fan = named
     reported = listed(run(0, "status", "pump@2,1", "fan", "--json"))
     drives = [(pump, 2, "atv312"), (pump, 1, "atv71"), (fan, 5, "atv71")]
@@ -43,7 +43,7 @@ def test_drives_are_reported_with_their_lines_in_order(named: tuple[str, str]) -
     ]  # fmt: skip
 
 
-def test_all_drives_of_all_lines_stand_in_a_line_each(named: tuple[str, str]) -> None:
+def test_each_drive_of_all_lines_has_one_row(named: tuple[str, str]) -> None:
     # the profile of the settings file is that of drive 5, and of no other on its line
     rows = run(0, "status", "pump@1", "fan", "--all", "--addresses", "1-5").splitlines()
     assert [row.split()[:2] for row in rows] == [["pump", "1"], ["fan", "1"], ["fan", "5"]]
@@ -52,9 +52,7 @@ def test_all_drives_of_all_lines_stand_in_a_line_each(named: tuple[str, str]) ->
 
 
 @pytest.mark.parametrize("every", [(), ("--all", "--addresses", "5")])
-def test_a_line_that_is_not_there_hides_no_other(
-    named: tuple[str, str], every: tuple[str, ...]
-) -> None:
+def test_missing_line_does_not_hide_others(named: tuple[str, str], every: tuple[str, ...]) -> None:
     done = ended(3, "status", NOBODY, "fan", *every, "--json")
     missing, found = listed(done.stdout)
     assert (missing["line"], missing["status"]) == (NOBODY, 3)
@@ -63,7 +61,7 @@ def test_a_line_that_is_not_there_hides_no_other(
     assert f"drivepanel: {NOBODY}: " in done.stderr
 
 
-def test_a_drive_that_is_not_there_hides_no_other(named: tuple[str, str]) -> None:
+def test_absent_drive_does_not_hide_others(named: tuple[str, str]) -> None:
     done = ended(3, "status", "pump@9,1", "fan", "--json")
     assert [row.get("profile") for row in listed(done.stdout)] == [None, "atv71", "atv71"]
     assert "drivepanel: pump: Device 9 did not answer" in done.stderr
@@ -72,10 +70,10 @@ def test_a_drive_that_is_not_there_hides_no_other(named: tuple[str, str]) -> Non
     ).stderr  # fmt: skip
 
 
-def test_drives_of_several_lines_are_still_polled(named: tuple[str, str]) -> None:
+def test_drives_of_several_lines_stay_polled(named: tuple[str, str]) -> None:
     assert run(0, "status", "pump", "fan", "--hold", "0.2").count("State ") == 2
 
 
-def test_invalid_line_opens_nothing_exits_with_2(named: tuple[str, str]) -> None:
+def test_invalid_line_opens_no_line_and_exits_with_2(named: tuple[str, str]) -> None:
     assert "'nonsense' is not a LINE" in refused(2, "status", "pump", "nonsense")
     assert "1 to 247" in refused(2, "status", "pump@300", "fan")

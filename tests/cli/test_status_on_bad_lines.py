@@ -52,7 +52,7 @@ def lose(
     ],
     ids=["no answer", "hangs"],
 )
-def test_status_shows_what_is_known_if_a_setting_is_not_read(
+def test_status_shows_known_values_if_a_setting_is_not_read(
     seconds: float, status: int, watch: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drive_status, "STATUS_WITHIN", 2.0)
@@ -72,7 +72,7 @@ def test_status_shows_what_is_known_if_a_setting_is_not_read(
     assert document["values"]["output_frequency"]["value"] == 0
 
 
-def test_status_does_not_list_a_timeout_as_unread_that_it_shows(
+def test_status_does_not_list_a_shown_timeout_as_unread(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The drive told it as it was identified; every later read of it hangs."""
@@ -84,7 +84,7 @@ def test_status_does_not_list_a_timeout_as_unread_that_it_shows(
     assert document["unread"] == []
 
 
-def test_status_shows_no_timeout_that_is_learnt_after_its_words_were_read(
+def test_status_omits_a_timeout_learned_after_its_words_were_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def learnt_meanwhile(session: DriveSession, motion: str) -> None:
@@ -100,5 +100,5 @@ def test_status_shows_no_timeout_that_is_learnt_after_its_words_were_read(
     assert document["watch"] is None
 
 
-def test_status_reads_within_ten_seconds() -> None:
+def test_status_ends_within_ten_seconds() -> None:
     assert drive_status.STATUS_WITHIN + drive_status.FINDING_WITHIN < 10 - 2

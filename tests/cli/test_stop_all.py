@@ -25,7 +25,7 @@ from .printed import documents
 NAMELESS = DriveIdentity(1, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 
 
-def test_a_drive_that_another_program_leaves_alone_is_stopped_too() -> None:
+def test_drive_whose_polling_is_paused_is_stopped_too() -> None:
     """As in a proof of its communication loss, perhaps with its motor turning."""
     with tcp_line("atv71@1", "atv312@2") as line:
         opened = open_line(line, wait=5, program="prove")
@@ -56,7 +56,7 @@ def with_drive(damaged: float) -> FakeLine:
     return line
 
 
-async def test_damaged_replies_are_requested_with_more_patience() -> None:
+async def test_damaged_replies_are_requested_again_with_a_longer_wait() -> None:
     for patience in (Priority.BACKGROUND, Priority.PATIENT):
         assert await stop_of(with_drive(2), patience) == "Altivar 71"
     with pytest.raises(LineError):  # the next round is the patient one
@@ -89,7 +89,7 @@ def test_stop_of_a_guessed_family_reports_not_stopped(way: tuple[str, ...]) -> N
 
 @pytest.mark.parametrize("guessed", [False, True])
 @pytest.mark.parametrize("way", WAYS[:2])
-def test_a_start_on_record_names_the_family_unless_it_was_a_guess(
+def test_recorded_start_sets_the_family_unless_it_was_a_guess(
     way: tuple[str, ...], guessed: bool
 ) -> None:
     with tcp_line("powerdrive@1") as line:
@@ -101,7 +101,7 @@ def test_a_start_on_record_names_the_family_unless_it_was_a_guess(
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_the_profile_named_goes_before_another_that_claims_the_reference(
+def test_named_profile_overrides_a_profile_with_the_same_reference(
     way: tuple[str, ...],
 ) -> None:
     """One of the folder that knows the very model has no say."""

@@ -31,7 +31,7 @@ def line() -> Iterator[str]:
         ("report", "report.txt"),
     ],
 )
-def test_values_of_swapped_bytes_are_not_shown(
+def test_values_with_swapped_bytes_are_not_shown(
     line: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -50,13 +50,13 @@ def test_values_of_swapped_bytes_are_not_shown(
         ("reset",),
     ],
 )
-def test_commands_and_settings_are_refused(line: str, words: tuple[str, ...]) -> None:
+def test_swapped_bytes_refuse_commands_and_settings(line: str, words: tuple[str, ...]) -> None:
     command, *rest = words
     assert TEXT in ended(3, command, line, *rest, "-d", "2", "--arm").stderr
     assert "The journal is empty" in ended(0, "journal").stdout
 
 
-def test_run_is_refused(line: str) -> None:
+def test_swapped_bytes_refuse_a_run(line: str) -> None:
     words = ("run", line, "-d", "2", "--reference", "30Hz", "--arm")
     done = subprocess.run(
         [sys.executable, "-m", "tui", *words], capture_output=True, text=True, timeout=60
@@ -66,7 +66,7 @@ def test_run_is_refused(line: str) -> None:
     assert "The journal is empty" in ended(0, "journal").stdout
 
 
-def test_stop_is_sent_and_not_reported_as_done(line: str) -> None:
+def test_stop_with_swapped_bytes_is_sent_but_not_reported_as_done(line: str) -> None:
     done = invoked("stop", line, "-d", "2")
     assert done.exit_code not in (0, 5)
     assert "NOT STOPPED" in done.output
@@ -75,7 +75,7 @@ def test_stop_is_sent_and_not_reported_as_done(line: str) -> None:
     assert "CMD" in text
 
 
-def test_json_of_watch_tells_it_with_the_quality_of_the_values(line: str) -> None:
+def test_watch_json_marks_values_with_swapped_bytes(line: str) -> None:
     done = invoked("watch", line, "-d", "2", "--json", "--count", "2")
     rows = [json.loads(row) for row in done.stdout.splitlines()]
     cycles = [item for item in rows if "values" in item]

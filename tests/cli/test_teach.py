@@ -34,7 +34,7 @@ def preset_taught(line: str) -> None:
     assert "1 count is 1 rpm" in teach(line, "1.21", "600")
 
 
-def test_two_looks_teach_and_every_reading_has_the_unit_and_the_mark(line: str) -> None:
+def test_two_readings_teach_the_scale_and_mark_values(line: str) -> None:
     assert teach(line) == "Nothing is taught.\n"
     assert "Look again at another value" in teach(line, "1.21", "900 rpm")
     assert "taught" not in run(0, "read", line, *DRIVE, "1.21")
@@ -57,7 +57,7 @@ def test_two_looks_teach_and_every_reading_has_the_unit_and_the_mark(line: str) 
     assert values["1.21"]["taught"] is True
 
 
-def test_a_csv_file_says_that_its_column_was_taught(line: str, tmp_path: Path) -> None:
+def test_csv_column_with_a_learned_scale_is_marked(line: str, tmp_path: Path) -> None:
     preset_taught(line)
     file = tmp_path / "watch.csv"
     run(0, "watch", line, *DRIVE, "1.21", "--count", "1", "--every", "0.1", "--csv", file)
@@ -66,7 +66,7 @@ def test_a_csv_file_says_that_its_column_was_taught(line: str, tmp_path: Path) -
     assert "600" in row
 
 
-def test_lesson_result_in_json(line: str) -> None:
+def test_teach_result_is_printed_as_json(line: str) -> None:
     first = json.loads(teach(line, "1.21", "90.0", "Hz", "--json"))
     assert (first["lesson"], first["taught"]) == ("first", None)
     put(line, PRESET, 600)
@@ -78,14 +78,14 @@ def test_lesson_result_in_json(line: str) -> None:
     assert known["reference"] is None
 
 
-def test_a_number_below_zero_is_a_value_and_no_option(line: str) -> None:
+def test_negative_number_is_a_value_not_an_option(line: str) -> None:
     put(line, PRESET, 0x10000 - 900)
     assert "raw 64636 at -90.0 Hz" in teach(line, "1.21", "-90.0", "Hz")
     put(line, PRESET, 300)
     assert "It has a sign." in teach(line, "1.21", "30.0")
 
 
-def test_disagreeing_look_ends_lesson_with_1(line: str) -> None:
+def test_disagreeing_reading_exits_with_1(line: str) -> None:
     preset_taught(line)
     teach(line, "1.21", "--reference")
     output = teach(line, "1.21", "61.5", status=1)
@@ -94,7 +94,7 @@ def test_disagreeing_look_ends_lesson_with_1(line: str) -> None:
     assert "No available manual" in refused(5, "reference", line, *DRIVE, "600rpm", "--arm")
 
 
-def test_forgetting(line: str) -> None:
+def test_forget_removes_the_learned_scale(line: str) -> None:
     preset_taught(line)
     assert "shown raw again" in teach(line, "1.21", "--forget")
     assert "was not taught" in teach(line, "1.21", "--forget")
@@ -113,13 +113,13 @@ def test_forgetting(line: str) -> None:
         (5, ("1.21", "--reference"), "not taught yet"),
     ],
 )
-def test_refused_lessons(line: str, status: int, arguments: tuple[str, ...], why: str) -> None:
+def test_invalid_teach_arguments_are_refused(
+    line: str, status: int, arguments: tuple[str, ...], why: str
+) -> None:
     assert why in refused(status, "teach", line, *DRIVE, *arguments)
 
 
-def test_a_damaged_file_is_reported_by_every_command_and_hinders_none(
-    line: str, own_folders: Path
-) -> None:
+def test_damaged_scale_file_is_reported_and_blocks_no_command(line: str, own_folders: Path) -> None:
     preset_taught(line)
     (kept,) = (own_folders / "state" / "taught").glob("*.json")
     kept.write_text("{", "utf-8")
@@ -134,7 +134,7 @@ def test_a_damaged_file_is_reported_by_every_command_and_hinders_none(
 # Running by it
 
 
-def test_a_reference_goes_to_the_taught_preset_once_it_is_confirmed(line: str) -> None:
+def test_reference_is_written_to_the_confirmed_preset(line: str) -> None:
     assert "teach 1.21" in refused(5, "reference", line, *DRIVE, "20", "--arm")
     preset_taught(line)
     output = refused(5, "reference", line, *DRIVE, "700rpm", "--arm")
@@ -153,7 +153,7 @@ def test_a_reference_goes_to_the_taught_preset_once_it_is_confirmed(line: str) -
     assert held(line, PRESET) == 700
 
 
-def test_taking_the_control_running_at_a_taught_reference_and_giving_it_back(line: str) -> None:
+def test_run_takes_control_uses_the_learned_reference_and_gives_it_back(line: str) -> None:
     output = motor(5, line, *DRIVE, "--arm", "--for", "1")
     assert "run --take-control takes the control first." in output
     assert held(line, COMMAND_WORD) == 0
@@ -181,7 +181,7 @@ def test_taking_the_control_running_at_a_taught_reference_and_giving_it_back(lin
     assert held(line, IN_FORCE) == 0
 
 
-def test_each_run_command_chooses_the_confirmed_preset(line: str, own_folders: Path) -> None:
+def test_each_run_command_selects_the_confirmed_preset(line: str, own_folders: Path) -> None:
     preset_taught(line)
     teach(line, "1.21", "--reference")
     motor(0, line, *DRIVE, "--arm", "--take-control", "--for", "0.5")

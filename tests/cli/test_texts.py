@@ -41,7 +41,7 @@ def line() -> Iterator[str]:
     simulation.stop()
 
 
-def test_a_drives_name(line: str) -> None:
+def test_drive_name_does_not_control_terminal(line: str) -> None:
     printed = run(0, "identify", line)
     assert tame(printed)
     assert f"Name       {SHOWN}\n" in printed
@@ -96,7 +96,7 @@ READING = {
 
 
 @pytest.mark.parametrize("name", kept(READING, "status", "read json", "watch"))
-def test_nothing_that_a_drive_or_a_profile_says_commands_a_terminal(
+def test_texts_of_drives_and_profiles_do_not_control_terminal(
     name: str, line: str, evil: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On the terminal, in every file that is written, the journal and the log among them."""
@@ -116,9 +116,7 @@ def test_nothing_that_a_drive_or_a_profile_says_commands_a_terminal(
             assert tmp_path / argument in written
 
 
-def test_a_backup_of_names_that_command_is_read_as_it_was(
-    line: str, evil: str, tmp_path: Path
-) -> None:
+def test_backup_with_control_characters_is_read_back(line: str, evil: str, tmp_path: Path) -> None:
     path = tmp_path / "set.toml"
     run(0, "backup", line, path, "-p", evil)
     values = read_set(path)
@@ -126,12 +124,12 @@ def test_a_backup_of_names_that_command_is_read_as_it_was(
     assert values.head.family.startswith(NAME)
 
 
-def test_a_name_in_a_command_line() -> None:
+def test_typed_name_does_not_control_terminal() -> None:
     for text, status in ((f"sim:{NAME}", 2), ("/dev/\x1b[2J", 3), ("sim:\udcff", 2)):
         assert tame(refused(status, "read", text, "ACC"))
 
 
-def test_a_name_of_a_file(tmp_path: Path) -> None:
+def test_file_name_does_not_control_terminal(tmp_path: Path) -> None:
     bad = tmp_path / "\x1b[31m[red].toml"
     bad.write_text("format = 1\n[drive\n", "utf-8")
     output = refused(2, "compare", bad, "factory")
@@ -139,7 +137,9 @@ def test_a_name_of_a_file(tmp_path: Path) -> None:
     assert "␛[31m[red].toml" in output
 
 
-def test_a_profile_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_own_profile_does_not_control_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
     (tmp_path / "profiles").mkdir()
     name = json.dumps(f"[/] {NAME}").replace("\x7f", "\\u007f")
@@ -153,7 +153,7 @@ def test_a_profile_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert f"[/] {SHOWN}"[:8] in done.output
 
 
-def test_json_keeps_every_character_and_gives_a_terminal_none_of_the_bad_ones() -> None:
+def test_json_escapes_control_characters_and_keeps_all() -> None:
     bad = "\x1b\x7f\x9b\u202e\u2028\udcff\U000e0001 é →"
     text = json_text(CheckDocument(file=bad, faults=[bad]), compact=False)
     assert tame(text)
@@ -161,6 +161,6 @@ def test_json_keeps_every_character_and_gives_a_terminal_none_of_the_bad_ones() 
     assert json.loads(text) == {"schema": 1, "command": "profiles", "file": bad, "faults": [bad]}
 
 
-def test_terminal_without_signs_shows_question_mark() -> None:
+def test_terminal_without_symbols_shows_question_mark() -> None:
     assert printable("a\x1b[2J → \n", "ascii") == "a?[2J ? \n"
     assert printable("a\x1b[2J →", "utf-8") == "a␛[2J →"

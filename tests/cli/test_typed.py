@@ -22,7 +22,7 @@ def session_of(line: FakeLine, device: int = 1) -> DriveSession:
     return DriveSession(line, device, library.load("atv71"))
 
 
-def test_stop_refuses_earlier_input_and_accepts_later() -> None:
+def test_stop_refuses_input_typed_before_it_only() -> None:
     line = FakeLine({1: {}, 2: {}})
     with click.Context(main) as typed:
         note_typed(typed)
@@ -38,7 +38,7 @@ def test_stop_refuses_earlier_input_and_accepts_later() -> None:
         permit_of(session).check()
 
 
-def test_a_command_is_typed_with_its_process_where_that_has_no_other_task() -> None:
+def test_command_was_typed_when_its_process_began() -> None:
     with click.Context(main, obj=ONE_COMMAND) as context:
         note_typed(context)
         typed = typed_at(context)
@@ -48,5 +48,5 @@ def test_a_command_is_typed_with_its_process_where_that_has_no_other_task() -> N
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/stat"), reason="no /proc")
-def test_a_process_began_when_the_system_says() -> None:
+def test_process_start_time_is_that_of_the_system() -> None:
     assert time.monotonic() - 3600 * 24 < process_began() < time.monotonic() - 0.2

@@ -16,29 +16,29 @@ SIM = ("sim:atv71@2", "-d", "2")
 @pytest.mark.parametrize(
     ("typed", "intended"), [("sttaus", "status"), ("Reed", "read"), ("wirte", "write")]
 )
-def test_a_misspelt_command_is_reported_and_opens_no_panel(typed: str, intended: str) -> None:
+def test_misspelled_command_is_reported_and_opens_no_panel(typed: str, intended: str) -> None:
     for words in ((typed, *SIM), ("--read-only", typed), (typed,)):
         output = refused(2, *words)
         assert f"{typed}: no such command, did you mean {intended}?" in output
 
 
-def test_a_word_like_no_command_is_reported_too() -> None:
+def test_unknown_word_is_reported() -> None:
     assert "xyzzy: no such command, and no LINE." in refused(2, "xyzzy")
 
 
 @pytest.mark.parametrize("line", ["tcp:10.0.0.5", "COM3", "com3,9600", "/dev/ttyX", "sim:atv71"])
-def test_a_line_is_still_one(line: str) -> None:
+def test_line_argument_opens_the_panel(line: str) -> None:
     assert "The panel needs a terminal" in refused(2, line)
 
 
 @pytest.mark.parametrize("place", range(4))
-def test_v_may_stand_anywhere(place: int) -> None:
+def test_verbose_option_is_accepted_anywhere(place: int) -> None:
     words = ["read", *SIM, "ACC"]
     words.insert(place, "-v")
     assert "3.0" in run(0, *words)
 
 
-def test_v_behind_two_dashes_is_a_word_like_any_other() -> None:
+def test_verbose_option_after_two_dashes_is_an_argument() -> None:
     assert "'-v'" in refused(2, "read", *SIM, "--", "-v")
 
 
@@ -54,7 +54,7 @@ ERRORS = {
 
 
 @pytest.mark.parametrize(("words", "command", "status"), ERRORS.values(), ids=ERRORS.keys())
-def test_an_error_is_one_object_on_standard_output_too(
+def test_json_error_is_one_object_on_standard_output(
     words: tuple[str, ...], command: str, status: int
 ) -> None:
     done = ended(status, command, *words, "--json")
@@ -64,17 +64,17 @@ def test_an_error_is_one_object_on_standard_output_too(
     assert done.stderr == f"drivepanel: {reported['error']}\n"
 
 
-def test_without_json_standard_output_stays_empty() -> None:
+def test_error_without_json_prints_nothing_on_standard_output() -> None:
     assert ended(2, "read", *SIM, "NOSUCH").stdout == ""
 
 
-def test_the_statuses_stand_in_the_help() -> None:
+def test_help_lists_the_exit_statuses() -> None:
     reported = invoked("--help").stdout
     for status in ("0  done", "1  a difference", "70  internal error", "130  ended by Ctrl-C"):
         assert status in reported
 
 
-def test_an_end_by_ctrl_c_is_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_is_not_reported_as_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 

@@ -28,7 +28,7 @@ def cycles(*arguments: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in reported.splitlines()]
 
 
-def test_nothing_is_good_once_the_server_is_gone() -> None:
+def test_no_value_is_good_after_the_server_exits() -> None:
     with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
         line = f"tcp:127.0.0.1:{port_of(simulation.ready)},timeout=0.2"
         watch = ("watch", line, "-d", "2", "ETA", "RFR", "--every", "0.1", "--json")
@@ -65,7 +65,7 @@ def test_drive_lost_at_the_end_exits_with_3() -> None:
             assert any(way in output for way in ways), output
 
 
-def test_every_value_has_its_own_time_and_is_read_in_its_cycle() -> None:
+def test_every_value_has_its_time_within_its_cycle() -> None:
     # not SHORT: on a busy machine a value is truly old by the end of so short a cycle
     reported = cycles(*LINE, "--every", "0.5", "--count", "3")
     assert len(reported) == 3
@@ -77,12 +77,12 @@ def test_every_value_has_its_own_time_and_is_read_in_its_cycle() -> None:
             assert read <= datetime.fromisoformat(now["time"])
 
 
-def test_no_state_where_its_words_are_not_watched() -> None:
+def test_state_is_null_if_its_words_are_not_watched() -> None:
     (reported,) = cycles(*LINE, "RFR", *SHORT, "1")
     assert (reported["state"], reported["direction"], reported["error"]) == (None, None, None)
 
 
-def test_several_drives() -> None:
+def test_several_drives_are_watched() -> None:
     line = ("sim:atv71@1,atv312@2", "-d", "1", "-d", "2", "-d", "1")
     reported = cycles(*line, "ETA", *SHORT, "2")
     assert sorted((row["device"], row["profile"]) for row in reported) == [
@@ -93,7 +93,7 @@ def test_several_drives() -> None:
     assert "device 2" in text
 
 
-def test_several_drives_in_one_file(tmp_path: Path) -> None:
+def test_several_drives_are_written_to_one_file(tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     line = ("sim:atv71@1,atv312@2", "-d", "1", "-d", "2")
     run(0, "watch", *line, "RFR", "ETA", *SHORT, "1", "--csv", file)
@@ -106,7 +106,7 @@ def test_several_drives_in_one_file(tmp_path: Path) -> None:
 # Files
 
 
-def test_a_file_is_replaced_or_continued_only_as_requested(tmp_path: Path) -> None:
+def test_existing_file_is_replaced_or_appended_only_on_request(tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     watch = ("watch", *LINE, "ETA", *SHORT, "1", "--csv", file)
     run(0, *watch)
@@ -130,7 +130,7 @@ def test_conflicting_options_exit_with_2(options: tuple[str, ...]) -> None:
     assert not Path("x.csv").exists()
 
 
-def test_other_columns_are_not_appended(tmp_path: Path) -> None:
+def test_file_with_other_columns_is_not_appended(tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     file.write_text("time,other\n", encoding="utf-8")
     watch = ("watch", *LINE, "ETA", *SHORT, "1", "--csv", file)
@@ -138,7 +138,7 @@ def test_other_columns_are_not_appended(tmp_path: Path) -> None:
     assert file.read_text("utf-8") == "time,other\n"
 
 
-def test_a_row_that_a_crash_has_cut_stays_alone(tmp_path: Path) -> None:
+def test_row_cut_by_a_crash_does_not_damage_the_next(tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     file.write_text("time,a\r\n1,2\r\n3", encoding="utf-8", newline="")
     more = CsvFile(file, ["time", "a"], append=True)
@@ -163,7 +163,7 @@ def test_rotation_by_size_loses_no_row(tmp_path: Path) -> None:
     assert sorted(rows) == [f"{number:06d},{'x' * 10}" for number in range(40)]
 
 
-def test_rotation_by_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_is_rotated_daily(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Today(date):
         now = date(2026, 11, 22)
 
@@ -182,7 +182,7 @@ def test_rotation_by_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert (tmp_path / "run.csv").read_text("utf-8").split() == ["time", "three"]
 
 
-def test_a_full_disk_is_reported() -> None:
+def test_full_disk_is_reported() -> None:
     with pytest.raises(Failure, match="cannot be written: No space left"):
         CsvFile(Path("/dev/full"), ["time"], force=True)
 
@@ -195,18 +195,18 @@ def test_a_full_disk_is_reported() -> None:
     [("write", "ACC=5", "--arm"), ("run", "--arm"), ("reference", "5", "--arm"),
      ("reset", "--arm"), ("backup", "x.toml"), ("report", "x.md"), ("teach",), ("block",)],
 )  # fmt: skip
-def test_one_drive_command_takes_one_exits_with_2(command: tuple[str, ...]) -> None:
+def test_several_drives_for_a_one_drive_command_exit_with_2(command: tuple[str, ...]) -> None:
     name, *more = command
     output = refused(2, name, "sim:atv71@1,atv71@2", *more, "-d", "1", "-d", "2")
     assert "this command is for one drive" in output
 
 
-def test_the_panel_takes_one_drive() -> None:
+def test_panel_with_several_drives_exits_with_2() -> None:
     assert "for one drive" in refused(2, "sim:atv71@1,atv71@2", "-d", "1", "-d", "2")
 
 
 @pytest.mark.parametrize("command", [("read", "ETA"), ("status",), ("identify",)])
-def test_several_drives_one_of_which_is_not_there(command: tuple[str, ...]) -> None:
+def test_absent_drive_of_several_is_reported(command: tuple[str, ...]) -> None:
     name, *more = command
     line = ("sim:atv71@1,atv312@2", "-d", "2", "-d", "9", "-d", "1")
     done = ended(3, name, line[0], *more, *line[1:], "--json")

@@ -56,7 +56,7 @@ def sockets() -> list[str]:
 # Where a value is from
 
 
-def test_every_output_tells_the_line_of_a_value(named: tuple[str, str], tmp_path: Path) -> None:
+def test_every_output_names_the_line_of_a_value(named: tuple[str, str], tmp_path: Path) -> None:
     pump, fan = named
     file = tmp_path / "run.csv"
     watched = ("watch", "pump@1,2", "fan", "ETA", *SHORT, "1")
@@ -75,7 +75,7 @@ def test_every_output_tells_the_line_of_a_value(named: tuple[str, str], tmp_path
         assert text.count(who) == 1
 
 
-def test_drives_of_one_address_on_two_lines_are_two(named: tuple[str, str]) -> None:
+def test_same_address_on_two_lines_is_two_drives(named: tuple[str, str]) -> None:
     reported = objects(run(0, "watch", "pump@1", "fan@1", "ETA", *SHORT, "2", "--json"))
     assert sorted(row["line"] for row in reported) == sorted(2 * named)
     assert {row["device"] for row in reported} == {1}
@@ -93,7 +93,7 @@ def test_simulated_lines_are_watched_with_all_their_drives() -> None:
 # What one line costs the others
 
 
-def test_a_line_that_is_not_there_is_reported_and_costs_the_others_nothing(
+def test_missing_line_is_reported_and_does_not_affect_others(
     named: tuple[str, str],
 ) -> None:
     done = ended(3, "watch", NOBODY, "fan", "ETA", *SHORT, "2", "--json")
@@ -103,14 +103,14 @@ def test_a_line_that_is_not_there_is_reported_and_costs_the_others_nothing(
     assert [(cycle["line"], cycle["error"]) for cycle in cycles] == 2 * [(named[1], None)]
 
 
-def test_a_drive_that_is_not_there_is_reported_with_its_line(named: tuple[str, str]) -> None:
+def test_absent_drive_is_reported_with_its_line(named: tuple[str, str]) -> None:
     done = ended(3, "watch", "pump@1,9", "fan", "ETA", *SHORT, "1")
     assert "drivepanel: pump: Device 9 did not answer" in done.stderr
     assert "pump  device 1" in done.stdout
     assert "fan  device 5" in done.stdout
 
 
-def test_a_line_that_is_lost_does_not_stop_the_others_and_ctrl_c_ends_all() -> None:
+def test_lost_line_does_not_stop_others_and_ctrl_c_ends_all() -> None:
     with simulated("atv71@1", "--tcp", "127.0.0.1:0") as first, tcp_line("atv71@5") as fan:
         settings(f"tcp:127.0.0.1:{port_of(first.ready)},timeout=0.2", fan)
         command = ("watch", "pump", "fan", "ETA", "--every", "0.1", "--json")
@@ -169,14 +169,14 @@ def drives(wishes: list[LineWish]) -> list[tuple[str, list[int], list[str | None
         (("tcp:[::1]:502,timeout=2@4",), [("tcp:[::1]:502,timeout=2", [4], [None])]),
     ],
 )  # fmt: skip
-def test_the_drives_that_are_selected(
+def test_drives_are_selected_by_line_and_address(
     words: tuple[str, ...], intended: list[tuple[str, list[int], list[str | None]]]
 ) -> None:
     settings("tcp:10.0.0.1", "tcp:10.0.0.2")
     assert drives(wished(*words)) == intended
 
 
-def test_the_line_of_the_environment_gives_way_to_one_with_an_address(
+def test_line_with_an_address_overrides_the_environment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     settings("tcp:10.0.0.1", "tcp:10.0.0.2")
@@ -195,7 +195,7 @@ def test_lines_come_before_codes() -> None:
         further_lines(["ETA", "tcp:10.0.0.3"])
 
 
-def test_a_file_in_the_folder_does_not_make_a_line_of_a_code(
+def test_file_named_like_a_code_is_not_a_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -203,7 +203,7 @@ def test_a_file_in_the_folder_does_not_make_a_line_of_a_code(
     assert further_lines(["ETA"]) == ((), ("ETA",))
 
 
-def test_an_at_within_a_port_or_a_simulated_line_names_no_address(tmp_path: Path) -> None:
+def test_at_sign_in_a_port_or_simulated_line_is_not_an_address(tmp_path: Path) -> None:
     port = tmp_path / "tty@1"
     port.touch()
     for line in (str(port), f"{port},9600", "sim:atv71@2", "tcp:host", "pump@x"):
@@ -211,7 +211,7 @@ def test_an_at_within_a_port_or_a_simulated_line_names_no_address(tmp_path: Path
     assert split_addresses(f"{port}@4") == (str(port), "4")
 
 
-def test_impossible_line_opens_nothing_exits_with_2(named: tuple[str, str]) -> None:
+def test_impossible_line_opens_no_line_and_exits_with_2(named: tuple[str, str]) -> None:
     assert "1 to 247" in refused(2, "watch", "pump@300", "fan", *SHORT, "1")
     refused(2, "watch", "pump", "tcp:host:port", *SHORT, "1")
     assert "no parameter 'NOSUCH'" in refused(2, "watch", "pump", "fan", "NOSUCH", *SHORT, "1")

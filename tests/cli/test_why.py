@@ -23,7 +23,7 @@ from .commands import ended, run, tcp_line
 posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
 
 
-def test_a_drive_that_answers() -> None:
+def test_drive_that_answers_is_reported_as_healthy() -> None:
     with tcp_line("atv71@2") as line:
         text = run(0, "why", line, "-d", "2")
         assert re.match(r"Address 2 answers: (1[45]\d) of \1 requests", text)
@@ -34,7 +34,7 @@ def test_a_drive_that_answers() -> None:
     assert reported["timeout"]["seconds"] == 10.0
 
 
-def test_a_family_that_does_not_say_who_it_is() -> None:
+def test_family_without_identification_is_diagnosed_by_its_profile() -> None:
     with tcp_line("powerdrive@2") as line:
         assert "Address 2 answers" in run(0, "why", line, "-d", "2")
         reported = json.loads(run(0, "why", line, "-d", "2", "-p", "powerdrive", "--json"))
@@ -42,7 +42,7 @@ def test_a_family_that_does_not_say_who_it_is() -> None:
 
 
 @posix
-def test_nobody_answers_and_the_family_says_what_to_look_at() -> None:
+def test_silent_drive_gets_the_checks_of_its_family() -> None:
     with PtyPeer(silent) as peer:
         text = run(3, "why", peer.path, "-d", "2", "-p", "atv71")
         assert {request[1] for request in peer.requests} <= {3, 43}
@@ -55,7 +55,7 @@ def test_nobody_answers_and_the_family_says_what_to_look_at() -> None:
 
 
 @posix
-def test_a_drive_that_was_here_before_needs_no_profile() -> None:
+def test_remembered_drive_needs_no_profile() -> None:
     with PtyPeer(silent) as peer:
         KnownLine(FakeLine({2: {}}, link=SerialLink(peer.path))).note(None, 2, "atv71")
         reported = json.loads(run(3, "why", peer.path, "-d", "2", "--json"))
@@ -64,7 +64,7 @@ def test_a_drive_that_was_here_before_needs_no_profile() -> None:
         assert reported["profile"] is None
 
 
-def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_port_is_the_cause(tmp_path: Path) -> None:
     path = tmp_path / "ttyUSB7"
     reported = json.loads(run(3, "why", f"serial:{path}", "--json"))
     assert (reported["rung"], reported["text"]) == ("no-port", f"There is no port {path}.")
@@ -72,7 +72,7 @@ def test_a_port_that_is_not_there(tmp_path: Path) -> None:
 
 
 @posix
-def test_an_adapter_with_another_number(adapters: Adapters) -> None:
+def test_renumbered_adapter_is_the_cause(adapters: Adapters) -> None:
     with PtyPeer(honest) as peer:
         pty = Path(peer.path).resolve()
         port = adapters.plug("ttyUSB0", "1.1", serial="A5", leads_to=pty)
@@ -85,7 +85,7 @@ def test_an_adapter_with_another_number(adapters: Adapters) -> None:
 
 
 @posix
-def test_a_gateway() -> None:
+def test_gateway_exception_is_reported() -> None:
     def script(request: bytes, _count: int) -> list[bytes | float]:
         return [tcp_reply(request, bytes([request[7] | 0x80, 11]))]
 
@@ -106,7 +106,7 @@ def test_pending_timeout_is_reported() -> None:
 
 
 @posix
-def test_beside_a_program_that_owns_the_line(tmp_path: Path) -> None:
+def test_why_works_beside_a_program_that_owns_the_line(tmp_path: Path) -> None:
     """Its frames are told with a delay; it has the port, and that is no trouble."""
 
     def script(request: bytes, count: int) -> Sequence[bytes | float]:

@@ -49,7 +49,7 @@ def test_lines_break_at_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert " ".join(" ".join(lines).split()) == f"Timeout {LONG}"
 
 
-def test_a_word_longer_than_the_terminal_is_reported_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_word_longer_than_the_terminal_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
     say("/tmp/" + "x" * 100)
     assert out.getvalue().replace("\n", "") == "/tmp/" + "x" * 100
@@ -61,7 +61,7 @@ def test_fitting_text_is_unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
     assert out.getvalue() == "  a   b\n\nc\n"
 
 
-def test_a_file_gets_whole_lines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_output_to_a_file_is_not_wrapped(capsys: pytest.CaptureFixture[str]) -> None:
     say(LONG * 5)
     assert capsys.readouterr().out == f"{LONG * 5}\n"
 
@@ -77,7 +77,7 @@ def readings(*codes: str) -> dict[str, Reading]:
 
 @pytest.mark.parametrize("width", [40, 50, 60, 80, 120])
 @pytest.mark.parametrize("cut", [True, False])
-def test_a_table_loses_columns_and_no_digit(width: int, cut: bool) -> None:
+def test_narrow_table_loses_columns_but_no_digit(width: int, cut: bool) -> None:
     out = io.StringIO()
     table = readings_table(readings("RFR", "ETA", "ACC"), width=width, cut=cut)
     Console(file=out, width=width).print(table)
@@ -90,7 +90,7 @@ def test_a_table_loses_columns_and_no_digit(width: int, cut: bool) -> None:
     assert ("Wire address" in out.getvalue()) == (width >= 60)
 
 
-def test_no_color_is_plain_text(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_color_disables_colors(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.delenv("NO_COLOR", raising=False)

@@ -12,14 +12,14 @@ FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "va
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_page_of_a_family(family: str) -> None:
+def test_wiring_page_of_a_family_has_its_sections(family: str) -> None:
     text = run(0, "profiles", family, "--wiring")
     for part in ("Warnings", "Before it is opened", "Pins: ", "Addresses", "Command words"):
         assert f"\n{part}" in text
     assert max(map(len, text.splitlines())) <= 100
 
 
-def test_the_page_for_programs() -> None:
+def test_wiring_page_is_printed_as_json() -> None:
     reported = json.loads(run(0, "profiles", "atv71", "--wiring", "--json"))
     assert (reported["id"], reported["name"]) == ("atv71", "Altivar 71")
     titles = [section["title"] for section in reported["sections"]]
@@ -29,7 +29,7 @@ def test_the_page_for_programs() -> None:
     assert rows["16#000F"] == "Enable operation, forward"
 
 
-def test_a_page_needs_its_family() -> None:
+def test_wiring_page_without_a_family_is_refused() -> None:
     assert "name its ID" in run_usage("profiles", "--wiring")
     assert "There is no profile" in refused(2, "profiles", "nosuch", "--wiring")
 
@@ -44,7 +44,7 @@ def run_usage(*arguments: str) -> str:
     ("code", "text"),
     [(6, "ATV21HU15M3X, 200 V, 1.5 kW"), (999, "code 999, in no list at hand")],
 )
-def test_the_model_is_what_the_drive_says_of_itself(code: int, text: str) -> None:
+def test_model_is_read_from_the_drive(code: int, text: str) -> None:
     with tcp_line("atv21@3", "--set", f"FB05={code}", "--set", "FB72=0") as line:
         reported = json.loads(run(0, "identify", line, "-d", "3", "--json"))
         assert (reported["model"]["code"], reported["model"]["text"]) == (code, text)
@@ -52,13 +52,13 @@ def test_the_model_is_what_the_drive_says_of_itself(code: int, text: str) -> Non
         assert f"Model      {text}" in run(0, "identify", line, "-d", "3")
 
 
-def test_a_drive_whose_model_cannot_be_read_is_identified_all_the_same() -> None:
+def test_drive_with_an_unreadable_model_is_still_identified() -> None:
     with tcp_line("atv21@3", "--protect", "FB05", "--protect", "FB72") as line:
         reported = json.loads(run(0, "identify", line, "-d", "3", "--json"))
     assert reported["profile"] == "atv21"
     assert reported["model"] is None
 
 
-def test_a_family_without_such_a_word_has_no_model() -> None:
+def test_family_without_a_model_word_has_no_model() -> None:
     with tcp_line("atv312@3") as line:
         assert json.loads(run(0, "identify", line, "-d", "3", "--json"))["model"] is None

@@ -169,7 +169,7 @@ DEFECTS = (
         "            raise OrderRefused(refusal)\n        at_rest",
         "        at_rest",
         "A start in fault writes the reference before it checks the state.",
-        ("tests/cli/test_nothing_written.py::test_a_fault_holds_the_reference_back_too",),
+        ("tests/cli/test_nothing_written.py::test_fault_blocks_the_reference_too",),
     ),
     Defect(
         "status-5-after-writing",
@@ -177,7 +177,7 @@ DEFECTS = (
         "if error.exit_code not in NOTHING_SENT or",
         "if error.exit_code in NOTHING_SENT or",
         'Status 5 means "nothing was written", but the reference was.',
-        ("tests/cli/test_sets.py::test_a_setting_written_before_a_refused_one_gives_status_6",),
+        ("tests/cli/test_sets.py::test_setting_written_before_a_refused_one_exits_with_6",),
     ),
     Defect(
         "reference-scale-fixed",
@@ -405,7 +405,7 @@ DEFECTS = (
         "if turning and not yes:",
         "if False:",
         "A hoist load falls after one command, without a question.",
-        ("tests/cli/test_prove.py::test_on_the_run_without_a_terminal_takes_a_yes",),
+        ("tests/cli/test_prove.py::test_running_motor_without_a_terminal_requires_yes",),
     ),
     Defect(
         "timeout-of-one-port-alone",
@@ -413,7 +413,7 @@ DEFECTS = (
         "reported = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)",
         "reported = (await self._reader.read([rules.timeout])).values()",
         "A drive that monitors its other port is reported as ignoring a dead line.",
-        ("tests/cli/test_prove.py::test_the_time_out_of_each_port_counts",),
+        ("tests/cli/test_prove.py::test_timeout_of_each_port_is_tested",),
     ),
     Defect(
         "unfed-until-its-timeout-is-learnt",

@@ -72,7 +72,7 @@ DEFECTS = (
         "    if not found.well:\n        raise click.exceptions.Exit(LINE_TROUBLE)\n",
         "",
         "A script continues with a drive that does not answer.",
-        (f"{COMMAND}::test_a_port_that_is_not_there",),
+        (f"{COMMAND}::test_missing_port_is_the_cause",),
     ),
     Defect(
         "another-speed-for-the-same-one",

@@ -18,7 +18,7 @@ DEFECTS = (
         "if text := (await listen_first(line, LISTEN)).text:",
         "if (text := (await listen_first(line, LISTEN)).text) and False:",
         "The controller of a running plant loses its answers during a search for drives.",
-        (f"{SCAN}::test_another_master_ends_it_before_anything_is_sent",),
+        (f"{SCAN}::test_another_master_ends_the_scan_before_anything_is_sent",),
     ),
     Defect(
         "busy-master-not-heard",
@@ -114,7 +114,7 @@ DEFECTS = (
         "        if not (self.yes or may_ask()):\n",
         "        if False:\n",
         "A script lets a motor coast because polling of its drive stops.",
-        (f"{SCAN}::test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act",),
+        (f"{SCAN}::test_without_a_terminal_a_drive_with_a_timeout_blocks_other_settings",),
     ),
     Defect(
         "found-drives-not-held",
@@ -122,7 +122,7 @@ DEFECTS = (
         "        fleet.take(session, guessed=result.identity.profile is None)\n",
         "",
         "A drive trips while the person reads the question about it.",
-        (f"{SCAN}::test_drives_are_held_while_the_person_decides",),
+        (f"{SCAN}::test_drives_are_kept_alive_during_the_question",),
     ),
     Defect(
         "shared-line-scanned-at-other-settings",
@@ -130,7 +130,7 @@ DEFECTS = (
         "    if others := line.facts.others:\n",
         "    if (others := line.facts.others) and False:\n",
         "Another panel on the line loses its drives, which trip.",
-        (f"{SCAN}::test_a_line_that_others_use_is_not_taken_for_other_settings",),
+        (f"{SCAN}::test_shared_line_is_not_scanned_at_other_settings",),
     ),
     Defect(
         "hits-lost-at-ctrl-c",
@@ -138,7 +138,7 @@ DEFECTS = (
         "    except KeyboardInterrupt:\n",
         "    except ZeroDivisionError:\n",
         "A long search that is canceled does not show its results.",
-        (f"{SCAN}::test_ctrl_c_keeps_what_was_found",),
+        (f"{SCAN}::test_ctrl_c_keeps_the_hits",),
     ),
     Defect(
         "unknown-drive-left-alone",

@@ -91,7 +91,7 @@ DEFECTS = (
         "    if session.contradiction:\n",
         "    if False:\n",
         "A setting of one family is written to a drive of another.",
-        (f"{IDENTITY}::test_another_drive_is_reported_and_not_written_exits_with_5",),
+        (f"{IDENTITY}::test_write_to_a_drive_of_another_family_exits_with_5",),
     ),
     Defect(
         "first-word-of-one-family-only",
@@ -142,7 +142,7 @@ DEFECTS = (
         "        finally:\n            try:",
         "        else:\n            try:",
         "A failed command leaves a timeout running and does not report it.",
-        (f"{LEFT}::test_it_is_reported_where_the_command_failed",),
+        (f"{LEFT}::test_warning_is_shown_if_the_command_fails",),
     ),
     Defect(
         "signal-takes-what-was-done",
@@ -150,10 +150,7 @@ DEFECTS = (
         "                if not came:\n                    raise\n",
         "                raise\n",
         "A late SIGTERM gives a successful command a traceback and status 1.",
-        (
-            f"{LEFT}"
-            "::test_a_signal_that_comes_while_it_is_reported_takes_nothing_from_what_was_done",
-        ),
+        (f"{LEFT}::test_signal_during_the_warning_keeps_the_result",),
     ),
     Defect(
         "silent-address-of-a-stop-counts-as-stopped",

@@ -58,7 +58,7 @@ DEFECTS = (
         "A motor cannot be stopped because the adapter was changed.",
         (
             f"{KNOWN}::test_the_real_line_holds_too",
-            f"{COMMANDS}::test_a_stop_goes_to_a_drive_that_is_another_one",
+            f"{COMMANDS}::test_stop_is_sent_to_a_changed_drive",
         ),
     ),
     Defect(
@@ -91,7 +91,7 @@ DEFECTS = (
         'usual |= {"device": (named.device,), "devices": (named.device,)}',
         'usual |= {"devices": (named.device,)}',
         "A command with a drive's name goes to the drive at address 1.",
-        (f"{COMMANDS}::test_a_name_stands_where_a_line_is_typed",),
+        (f"{COMMANDS}::test_name_replaces_a_line",),
     ),
     Defect(
         "named-profile-for-every-drive",
@@ -99,7 +99,7 @@ DEFECTS = (
         '    if ctx.params.get("every"):\n        return None\n',
         "",
         "A stop of all sends one family's stop word to drives of other families.",
-        (f"{COMMANDS}::test_the_profile_of_one_drive_stops_no_other",),
+        (f"{COMMANDS}::test_profile_of_a_name_applies_to_its_drive_only_in_stop_all",),
     ),
     Defect(
         "broken-settings-keep-a-stop-back",
@@ -123,6 +123,6 @@ DEFECTS = (
         "if isinstance(opts, MutableMapping) and self._is_left_out(ctx, opts):",
         "if False:",
         "With DRIVEPANEL_LINE, a code is taken for the line, and the command is refused.",
-        (f"{COMMANDS}::test_the_environment_says_which_line_is_selected",),
+        (f"{COMMANDS}::test_environment_selects_the_line",),
     ),
 )

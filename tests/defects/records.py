@@ -105,10 +105,7 @@ DEFECTS = (
         "[return-value]\n\n    def handleError(",
         "[return-value]\n\n    def handle_error(",
         "On a full disk, a successful stop prints six tracebacks.",
-        (
-            "tests/cli/test_journal_trouble.py"
-            "::test_a_full_disk_is_reported_in_a_sentence_and_nothing_else_fails",
-        ),
+        ("tests/cli/test_journal_trouble.py::test_full_disk_is_reported_and_fails_nothing_else",),
     ),
     Defect(
         "lost-output-fails-a-stop",
@@ -221,7 +218,7 @@ DEFECTS = (
         "number: plain(value.decode",
         "number: str(value.decode",
         "A drive's name that a script takes from JSON sets the terminal's title.",
-        ("tests/cli/test_texts.py::test_a_drives_name",),
+        ("tests/cli/test_texts.py::test_drive_name_does_not_control_terminal",),
     ),
     Defect(
         "report-commands-the-terminal",

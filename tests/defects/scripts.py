@@ -15,7 +15,7 @@ DEFECTS = (
         "    return is_known_name(text, doubtful=True)",
         "    return True",
         "A misspelt command opens the panel, and a script hangs.",
-        ("tests/cli/test_usage.py::test_a_misspelt_command_is_reported_and_opens_no_panel",),
+        ("tests/cli/test_usage.py::test_misspelled_command_is_reported_and_opens_no_panel",),
     ),
     Defect(
         "ctrl-c-counts-as-a-difference",
@@ -23,7 +23,7 @@ DEFECTS = (
         "INTERRUPTED = 130",
         "INTERRUPTED = 1",
         "A canceled comparison counts as a difference between two drives.",
-        ("tests/cli/test_usage.py::test_an_end_by_ctrl_c_is_no_difference",),
+        ("tests/cli/test_usage.py::test_ctrl_c_is_not_reported_as_a_difference",),
     ),
     Defect(
         "error-not-told-in-json",
@@ -31,7 +31,7 @@ DEFECTS = (
         "        if as_json:",
         "        if not as_json:",
         "A script that reads JSON gets no error for a drive that did not answer.",
-        ("tests/cli/test_usage.py::test_an_error_is_one_object_on_standard_output_too",),
+        ("tests/cli/test_usage.py::test_json_error_is_one_object_on_standard_output",),
     ),
     Defect(
         "last-of-several-addresses-taken",
@@ -39,7 +39,7 @@ DEFECTS = (
         "    if len(given) > 1:",
         "    if not given:",
         "A write for one of two drives goes to the first one named.",
-        ("tests/cli/test_watch.py::test_one_drive_command_takes_one_exits_with_2",),
+        ("tests/cli/test_watch.py::test_several_drives_for_a_one_drive_command_exit_with_2",),
     ),
     Defect(
         "old-values-called-good",
@@ -47,7 +47,7 @@ DEFECTS = (
         "elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):",
         "elif reading.quality is Quality.GOOD and not snapshot.cycle:",
         "A recorder continues with values of a drive that no longer answers.",
-        ("tests/cli/test_watch.py::test_nothing_is_good_once_the_server_is_gone",),
+        ("tests/cli/test_watch.py::test_no_value_is_good_after_the_server_exits",),
     ),
     Defect(
         "time-of-the-cycle-for-every-value",
@@ -55,7 +55,7 @@ DEFECTS = (
         "read_at = snapshot.wall - (snapshot.time - reading.time)",
         "read_at = snapshot.wall",
         "A value that was read an hour ago has the current time.",
-        ("tests/cli/test_watch.py::test_nothing_is_good_once_the_server_is_gone",),
+        ("tests/cli/test_watch.py::test_no_value_is_good_after_the_server_exits",),
     ),
     Defect(
         "rows-of-two-lines-alike",
@@ -63,7 +63,7 @@ DEFECTS = (
         "        line = [drive.line_name] if self.lines else []",
         "        line = [drive.session.profile.name] if self.lines else []",
         "The rows of drive 1 on two lines look the same.",
-        ("tests/cli/test_watch_lines.py::test_every_output_tells_the_line_of_a_value",),
+        ("tests/cli/test_watch_lines.py::test_every_output_names_the_line_of_a_value",),
     ),
     Defect(
         "one-missing-line-ends-all",
@@ -73,7 +73,7 @@ DEFECTS = (
         "A gateway that is off keeps a recorder from all other lines.",
         (
             "tests/cli/test_watch_lines.py"
-            "::test_a_line_that_is_not_there_is_reported_and_costs_the_others_nothing",
+            "::test_missing_line_is_reported_and_does_not_affect_others",
         ),
     ),
     Defect(
@@ -82,7 +82,7 @@ DEFECTS = (
         "(not own or set(devices) == set(own)):",
         "(own or not set(devices) == set(own)):",
         "Another drive beside the named one is polled with the wrong scales.",
-        ("tests/cli/test_watch_lines.py::test_the_drives_that_are_selected",),
+        ("tests/cli/test_watch_lines.py::test_drives_are_selected_by_line_and_address",),
     ),
     Defect(
         "csv-file-overwritten",
@@ -90,7 +90,7 @@ DEFECTS = (
         "    if path.exists() and not (append or force):",
         "    if path.exists() and append and force:",
         "The same command in the morning overwrites the record of the night.",
-        ("tests/cli/test_watch.py::test_a_file_is_replaced_or_continued_only_as_requested",),
+        ("tests/cli/test_watch.py::test_existing_file_is_replaced_or_appended_only_on_request",),
     ),
     Defect(
         "row-behind-a-cut-one",
@@ -98,7 +98,7 @@ DEFECTS = (
         "            if not whole:  # a row that a crash has cut",
         "            if not file:  # a row that a crash has cut",
         "The first row after a crash is appended to half a row.",
-        ("tests/cli/test_watch.py::test_a_row_that_a_crash_has_cut_stays_alone",),
+        ("tests/cli/test_watch.py::test_row_cut_by_a_crash_does_not_damage_the_next",),
     ),
     Defect(
         "rounded-to-nothing",
@@ -122,7 +122,7 @@ DEFECTS = (
         "        if conversion.lossy:",
         "        if not conversion.rounded:",
         "A value edited in a backup is restored as another one.",
-        ("tests/cli/test_sets.py::test_a_set_does_not_round_in_silence",),
+        ("tests/cli/test_sets.py::test_rounding_of_a_set_is_reported",),
     ),
     Defect(
         "code-given-twice-taken",
@@ -138,7 +138,7 @@ DEFECTS = (
         "codes = setting_codes(session.profile) if settings_only else []",
         "codes = list[str]()",
         "Two backups around a run differ although no setting changed.",
-        ("tests/cli/test_sets.py::test_two_backups_around_a_run_are_the_same_but_for_their_time",),
+        ("tests/cli/test_sets.py::test_backups_before_and_after_a_run_differ_in_time_only",),
     ),
     Defect(
         "part-of-a-backup-counts-as-whole",
@@ -162,7 +162,7 @@ DEFECTS = (
         "    schema: Literal[1] = 1\n",
         "",
         "A script does not know which fields a document guarantees.",
-        ("tests/cli/test_json.py::test_read",),
+        ("tests/cli/test_json.py::test_read_prints_values_as_json",),
     ),
     Defect(
         "bash-breaks-a-line-at-its-colon",

@@ -524,7 +524,7 @@ DEFECTS = (
         "isinstance(cause, LineError | NotTaken)",
         "isinstance(cause, NotTaken)",
         "A script takes a lost line for a refusal, and does not retry.",
-        (f"{BLOCK}::test_a_line_that_is_lost_meanwhile_is_no_refusal",),
+        (f"{BLOCK}::test_line_lost_during_a_write_is_not_a_refusal",),
     ),
     Defect(
         "no-patience-with-a-slow-line",
@@ -548,7 +548,7 @@ DEFECTS = (
         "stopped = unseen = str(error)",
         "stopped = str(error)",
         "A restore whose line is lost at the end reports 0 failures, and status 4.",
-        ("tests/cli/test_sets.py::test_restore_that_cannot_compare_again_says_why_exits_with_3",),
+        ("tests/cli/test_sets.py::test_restore_without_a_final_comparison_exits_with_3",),
     ),
     Defect(
         "motor-of-another-user-unguarded",
