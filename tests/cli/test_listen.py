@@ -67,8 +67,8 @@ def test_text_output_has_a_line_per_exchange_and_a_summary() -> None:
     lines = text.splitlines()
     assert lines[0].startswith("Listening at /dev/pts/")
     assert "Device 1: Altivar 71 (reported by the drive)" in lines
-    assert any(line[12:] == "   1 read   RFR 0.0 Hz" for line in lines)
-    assert any(line[12:] == "   2 write  LFr ← 0.0 Hz" for line in lines)
+    assert any(line[12:] == "    1 read   RFR 0.0 Hz" for line in lines)
+    assert any(line[12:] == "    2 write  LFr ← 0.0 Hz" for line in lines)
     assert text.count("commanded by the master") == 2
     assert lines[-1].startswith("Heard ")
 

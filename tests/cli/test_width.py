@@ -10,7 +10,8 @@ import pytest
 from rich.console import Console
 
 from tui.cli.shared.output import console, readings_table
-from tui.cli.shared.say import Messages, say, say_row
+from tui.cli.shared.rows import say_row, titled
+from tui.cli.shared.say import Messages, say
 from tui.cli.shared.sets import complain_absent
 from tui.drive.profile import library
 from tui.drive.values import decode
@@ -41,7 +42,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 def test_lines_break_at_words(monkeypatch: pytest.MonkeyPatch) -> None:
     out = terminal(monkeypatch)
-    say_row("Timeout", LONG, 18)
+    say_row(titled(16), ("Timeout", LONG))
     lines = out.getvalue().splitlines()
     assert len(lines) > 2
     assert all(len(line) <= 40 for line in lines)

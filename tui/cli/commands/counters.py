@@ -23,7 +23,8 @@ from ..shared.options import (
 )
 from ..shared.output import drive_fields, last_minute_field, print_json
 from ..shared.registration import WRITING, command
-from ..shared.say import say, say_row
+from ..shared.rows import say_row, titled
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.bus.api import DeviceCounters
@@ -38,8 +39,7 @@ FRAMES_SENT = 20
 """Frames sent for counting (default)."""
 MOST_FRAMES = 10_000
 COUNTER_LOOKS = 3
-COUNTER_TITLES = 18
-"""Width of the column of titles, with its gap."""
+COUNTER_TITLES = titled(16)
 
 
 @command("Compare frame counts with the drive's own counters.", statuses=(DIFFERENT, *WRITING))
@@ -98,7 +98,7 @@ def counters(
             print_json(counters_document(fields, found, frames, answered, reset=reset_drive))
         else:
             for title, text in _rows(found):
-                say_row(title, text, COUNTER_TITLES)
+                say_row(COUNTER_TITLES, (title, text))
             for difference in found.differences:
                 say(difference.text)
             if found.agree and not found.trouble:

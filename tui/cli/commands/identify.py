@@ -6,8 +6,6 @@ import asyncio
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tui.drive.plain import plain
-
 from ..shared.drives import on_each_drive
 from ..shared.errors import DONE, REFUSED_HERE, Failure
 from ..shared.line_argument import mind_the_drive
@@ -21,7 +19,7 @@ from ..shared.options import (
 )
 from ..shared.pending_timeouts import look_after
 from ..shared.registration import ON_LINE, command
-from ..shared.say import say_row
+from ..shared.rows import say_row, titled
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
@@ -31,8 +29,7 @@ if TYPE_CHECKING:
     from ..documents.drive_documents import IdentityDocument
     from ..documents.parts import ModelField
 
-IDENTITY_TITLES = 11
-"""Width of the column of titles, with its gap."""
+IDENTITY_TITLES = titled(9)
 
 
 @command("Show a drive's vendor, model and version.", statuses=ON_LINE)
@@ -118,7 +115,7 @@ def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
         ("Profile", found.profile or _choices(found)),
         *_model_row(found, words),
     ):
-        say_row(title, plain(text) or "-----", IDENTITY_TITLES)
+        say_row(IDENTITY_TITLES, (title, text or "-----"))
 
 
 async def _model_words(session: DriveSession | None) -> Mapping[str, int]:

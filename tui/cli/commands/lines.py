@@ -11,6 +11,7 @@ from ..shared.errors import USAGE
 from ..shared.left_behind import LeftBehind, left_on_lines
 from ..shared.options import json_option
 from ..shared.registration import command
+from ..shared.rows import Column, say_row
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from tui.session.connect.named_lines import NamedLine
 
     from ..documents.other_documents import KnownLineField, LeftOnLineDocument, OpenLineDocument
+
+NAMED_COLUMNS = (Column("name", width=11), Column("line"), Column("device"), Column("profile"))
+DRIVE_COLUMNS = (Column("device", width=5, right=True), Column("drive"))
 
 
 @command("List named and remembered lines.")
@@ -65,13 +69,12 @@ def lines(as_json: bool) -> None:
         if not named and not faults:
             say(f"No line has a name. Lines are named in {settings.path}.")
         for line in named:
-            profile = f"  {line.profile}" if line.profile else ""
-            drive = "" if line.device is None else f"  device {line.device}"
-            say(f"{line.name:<12} {line.line}{drive}{profile}")
+            drive = "" if line.device is None else f"device {line.device}"
+            say_row(NAMED_COLUMNS, (line.name, line.line, drive, line.profile or ""))
         for key, mark in memory.lines.items():
             say(f"Remembered: {key}{f' ({mark.adapter})' if mark.adapter else ''}")
             for device, drive_mark in mark.drives.items():
-                say(f"  {device:>3} {drive_mark.text}")
+                say_row(DRIVE_COLUMNS, (str(device), drive_mark.text))
         for owner, look in held:
             minute = look.minute if look is not None else None
             good = "" if minute is None or not minute.replies else (

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from ..shared.options import json_option
 from ..shared.registration import command
+from ..shared.rows import say_row, titled
 from ..shared.say import say
+
+PORT = titled(19)
 
 
 @command("List the serial ports of this computer.")
@@ -38,12 +41,10 @@ def ports(as_json: bool) -> None:
     if not found:
         say("No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT.")
     for port, by in found:
-        used = f"  in use by {by}" if by else ""
-        say(f"{port.path:<20} {port.description}{used}", indent=21)
+        used = (f"in use by {by}",) if by else ()
+        say_row(PORT, (port.path, "  ".join((port.description, *used))))
         name = names[port.path]
         if name.lasting and name.path != port.path:
-            say(f"{'':<20} always {name.path}", indent=21)
+            say_row(PORT, ("", f"always {name.path}"))
         if name.shared:
-            say(
-                f"{'':<20} without a serial number of its own: known by its socket alone", indent=21
-            )
+            say_row(PORT, ("", "without a serial number of its own: known by its socket alone"))

@@ -12,11 +12,23 @@ from tui.drive.plain import plain
 from ..shared.completion import complete_profile
 from ..shared.options import json_option
 from ..shared.registration import command
+from ..shared.rows import GAP, Column, row_text, table_of
 from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.drive.profile.library import Listing
     from tui.drive.profile.profile import Profile
+
+PARAMETER_COLUMNS = (
+    Column("Code"),
+    Column("Name", readable=16),
+    Column("Number"),
+    Column("Wire address"),
+    Column("Unit"),
+    Column("Raw range"),
+    Column("Access", readable=8),
+    Column("Group", readable=16),
+)
 
 
 @command("List, show or check drive profiles.")
@@ -176,12 +188,12 @@ def _list(as_json: bool) -> None:
         )
         return
     rows = [(item.id, item.vendor, item.name) for item in found]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    widths = [max(map(len, texts)) for texts in zip(*rows, strict=True)]
+    columns = (*(Column(width=width) for width in widths), Column(width=15, right=True), Column())
     for listing, row in zip(found, rows, strict=True):
         remark = _remark(listing)
-        cells = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
-        more = f"  ({remark})" if remark else ""
-        say(f"{cells}  {listing.parameters:>4} parameters{more}", indent=widths[0] + 2)
+        cells = (*row, f"{listing.parameters} parameters", f"({remark})" if remark else "")
+        say(row_text(columns, cells), indent=widths[0] + GAP)
 
 
 def _remark(listing: Listing) -> str:
@@ -235,8 +247,6 @@ def _show(profile: Profile, as_json: bool) -> None:
 
         print_json(ProfileShown(**msgspec.to_builtins(profile.data)))
         return
-    from rich.table import Table
-
     from tui.drive.profile.profile import is_verified, notations
     from tui.drive.values import raw_range
 
@@ -254,20 +264,11 @@ def _show(profile: Profile, as_json: bool) -> None:
         ]
         most = f", at most {' and '.join(limits)}, past that {past}" if limits else ""
         screen.print(f"  function {function.code:>2}  {function.name}{most}", highlight=False)
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for title in ("Code", "Name", "Number", "Wire address", "Unit", "Raw range", "Access", "Group"):
-        table.add_column(title)
+    rows = []
     for parameter in profile.parameters:
         code, number, wire = notations(parameter)
         low, high = raw_range(parameter)
-        table.add_row(
-            code + ("" if is_verified(parameter) else " ?"),
-            parameter.name,
-            number,
-            wire,
-            parameter.unit,
-            f"{low}..{high}",
-            parameter.access,
-            parameter.group,
-        )
-    screen.print(table)
+        mark = "" if is_verified(parameter) else " ?"
+        head = (f"{code}{mark}", parameter.name, number, wire, parameter.unit, f"{low}..{high}")
+        rows.append((*head, parameter.access, parameter.group))
+    screen.print(table_of(PARAMETER_COLUMNS, rows))

@@ -13,8 +13,9 @@ from tui.drive.plain import plain
 
 from ..shared.completion import complete_line
 from ..shared.drive_status import (
+    LINE_COLUMNS,
     Status,
-    drive_in_a_line,
+    drive_cells,
     status_document,
     status_of_drive,
     status_table,
@@ -33,7 +34,8 @@ from ..shared.options import (
 )
 from ..shared.output import print_json
 from ..shared.registration import ON_LINE, command
-from ..shared.say import say, say_row
+from ..shared.rows import Column, row_text, say_row, titled
+from ..shared.say import say
 from ..shared.several_lines import FirstOfLines, LineWish, connected, lines_wished, on_lines
 from ..shared.silence import silence_hint
 from ..shared.watch_outputs import LabelsNeeded
@@ -123,8 +125,7 @@ def _on_one_line(wish: LineWish, wanted: StatusWish, *, read_only: bool) -> None
 
 
 LEFT_INDENT = 5
-STATUS_TITLES = 18
-"""Width of the column of titles, with its gap."""
+STATUS_TITLES = titled(16)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,12 +156,12 @@ class LineField:
 def say_status(status: Status) -> None:
     """Show a person everything about one drive."""
     for title, text in status_table(status):
-        say_row(title, plain(text) or "-----", STATUS_TITLES)
+        say_row(STATUS_TITLES, (title, text or "-----"))
 
 
-def say_in_a_line(status: Status, before: str = "") -> None:
+def say_in_a_line(status: Status, name: str = "", width: int = 0) -> None:
     """Show a person one drive in a line, and in another one a motor that was left running."""
-    say(f"{before}{plain(drive_in_a_line(status))}")
+    say(row_text((Column(width=width), *LINE_COLUMNS), (name, *drive_cells(status))))
     if status.left:
         text = plain(status.left.sentence(status.session.line_text))
         say(f"{'':{LEFT_INDENT}}{text}", indent=LEFT_INDENT)
@@ -193,7 +194,7 @@ async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: St
 
 def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:
     if wanted.every:
-        say_in_a_line(status, f"{plain(name):<{width}}  ")
+        say_in_a_line(status, name, width)
     else:
         several = LabelsNeeded(lines=True, drives=True)
         say(f"{several.named(name, status.session.device)}:")

@@ -18,6 +18,7 @@ from ..shared.options import (
     on_line,
 )
 from ..shared.registration import ON_LINE, command
+from ..shared.rows import say_row, titled
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -178,7 +179,8 @@ def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
         what = scale.text if scale is not None else "not known yet"
         seen = ", ".join(look.text for look in teacher.looks(code))
         takes = ", takes the reference" if code == teacher.reference else ""
-        say(f"{code:<8} {teacher.family[code].name}: {what}{takes} ({seen})")
+        text = f"{teacher.family[code].name}: {what}{takes} ({seen})"
+        say_row(titled(7), (code, text))
     if not rows:
         say(f"{f'Of {only} nothing' if only else 'Nothing'} is taught.")
 

@@ -45,7 +45,7 @@ from ..shared.watch_outputs import (
     LabelsNeeded,
     Output,
     WatchedDrive,
-    csv_titles,
+    csv_columns,
     csv_units,
     text_output,
 )
@@ -80,7 +80,7 @@ class CsvOptions:
         if self.path is None:
             return None
         units = csv_units(watched)
-        titles = csv_titles(watched, units, several)
+        titles = [column.title for column in csv_columns(watched, units, several)]
         self.file = CsvFile(
             self.path, titles, append=self.append, force=self.force, rotate=self.rotate
         )

@@ -12,6 +12,7 @@ from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
 from tui.session.connect.search import LEFT_ALONE
 
+from ..shared.rows import Column, say_row
 from ..shared.say import say, say_over
 
 if TYPE_CHECKING:
@@ -20,9 +21,7 @@ if TYPE_CHECKING:
     from ..documents.document import Document
     from ..documents.drive_documents import Certainty, ScanEndDocument, ScanHitDocument
 
-SETTING_WIDTH = 10
-INDENT = 3 + 2 + SETTING_WIDTH + 2
-"""Column of the text of a hit."""
+HIT_COLUMNS = (Column("device", width=3, right=True), Column("setting", width=10), Column("drive"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +109,7 @@ class ScanTelling:
             return
         self._clear()
         where = str(hit.setting) if hit.setting else ""
-        head = f"{hit.identity.device:>3}  {where:<{SETTING_WIDTH}}  "
-        say(head + hit_text(hit), indent=INDENT)
+        say_row(HIT_COLUMNS, (str(hit.identity.device), where, hit_text(hit)))
         sys.stdout.flush()
 
     def unclear(self, setting: LineSetting | None, result: ScanResult) -> None:

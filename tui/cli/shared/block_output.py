@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .rows import Column, table_of
 from .say import say
 
 if TYPE_CHECKING:
@@ -15,9 +16,18 @@ if TYPE_CHECKING:
 
     from ..documents.setting_documents import BlockField, NeighborReadField, SlotField
 
-HEADINGS = ("Slot", "Mapped to", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
-COLUMNS_LEFT_OUT = ("Wire address", "Number", "Name")
-"""Columns that a narrow terminal goes without, in this order."""
+BLOCK_COLUMNS = (
+    Column("Slot", readable=100),
+    Column("Mapped to"),
+    Column("Name", omitted=3),
+    Column("Number", omitted=2),
+    Column("Wire address", omitted=1),
+    Column("Brings"),
+    Column("Direct"),
+    Column(),
+    Column(),
+)
+"""Columns of a table of slots."""
 AFTER_RESET = (
     "The mapping in force since the last reset cannot be read."
     " Comparison with direct reads shows it."
@@ -116,32 +126,12 @@ def _slot_field(slot: Slot) -> SlotField:
 
 
 def _table(session: DriveSession, view: BlockView, width: int) -> Table:
-    """The slots of a block; those that bring nothing in one row, columns as they fit."""
-    from rich.table import Table
-    from rich.text import Text
-
-    title = f"{view.block.name}, 16#{view.block.address:04X}"
+    """Return the slots of a block; those that bring nothing in one row."""
     rows = [_cells(session, view, slot) for slot in _in_use(view)]
     if unused := _unused(view):
-        rows.append((unused, "unused", *[""] * (len(HEADINGS) - 2)))
-    widths = [max(len(cell) for cell in column) for column in zip(HEADINGS, *rows, strict=True)]
-    shown = list(range(len(HEADINGS)))
-    for heading in COLUMNS_LEFT_OUT:
-        if sum(widths[at] + 2 for at in shown) <= width + 2:
-            break
-        shown.remove(HEADINGS.index(heading))
-    table = Table(
-        title=Text(title, style="bold"),
-        title_justify="left",
-        box=None,
-        padding=(0, 2, 0, 0),
-        header_style="dim",
-    )
-    for at in shown:
-        table.add_column(HEADINGS[at], no_wrap=at != 0, overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(row[at]) for at in shown))
-    return table
+        rows.append((unused, "unused", *[""] * (len(BLOCK_COLUMNS) - 2)))
+    title = f"{view.block.name}, 16#{view.block.address:04X}"
+    return table_of(BLOCK_COLUMNS, rows, title, width=width)
 
 
 def _in_use(view: BlockView) -> list[Slot]:

@@ -15,6 +15,7 @@ from .control import control_field, control_row
 from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
+from .rows import Column
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -45,6 +46,13 @@ SHOWN_QUANTITIES: dict[Quantity, str] = {
 """Quantities that show how a motor turns, with their names here."""
 LINE_FIGURES = ("Output frequency", "Current")
 """Quantities in the one line of a drive."""
+LINE_COLUMNS = (
+    Column("Device", width=3, right=True),
+    Column("Model", width=18, most=18),
+    Column("State", width=18, most=18),
+    *(Column(name, width=9, right=True) for name in LINE_FIGURES),
+    Column("Fault"),
+)
 CHANNEL_NAMES: dict[Quantity, str] = {
     "command_channel": "Commanded by",
     "reference_channel": "Reference from",
@@ -290,16 +298,13 @@ def _time_out_text(status: Status) -> str:
     return watch_text(status.watch)
 
 
-def drive_in_a_line(status: Status) -> str:
-    """A drive in one line: address, model, state, figures, and the fault if it is in one."""
+def drive_cells(status: Status) -> tuple[str, ...]:
+    """Return the cells of a drive for LINE_COLUMNS."""
     session, state = status.session, status.state
     shown = shown_values(session.profile, status.readings)
-    figures = "  ".join(f"{shown.get(name, NOT_AVAILABLE):>9}" for name in LINE_FIGURES)
+    figures = (shown.get(name, NOT_AVAILABLE) for name in LINE_FIGURES)
     name = session.known_identity.reference or session.profile.name
-    fault = fault_text(state)
-    return (
-        f"{session.device:>3}  {name:<18.18}  {state.headline:<18.18}  {figures}  {fault}".rstrip()
-    )
+    return (str(session.device), name, state.headline, *figures, fault_text(state))
 
 
 def watch_field(watch: TimeoutWatch | None) -> OldTimeoutField | None:

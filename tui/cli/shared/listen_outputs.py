@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol, TypedDict, overload
 
 from .output import iso_time, print_json
+from .rows import Column, row_text
 from .say import say
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
         ShorterField,
     )
 
-FURTHER = 24
+FURTHER = 25
 """Indent of continuation lines."""
 
 
@@ -57,7 +58,8 @@ class HeardLines:
         if reported.family is not None and self._taken.get(device) != reported.family.profile.id:
             self._taken[device] = reported.family.profile.id
             say(f"Device {device}: {family_text(reported.family)}")
-        say(f"{iso_time(wall)[11:23]} {exchange_text(reported, self._families)}", indent=FURTHER)
+        cells = (iso_time(wall)[11:23], exchange_text(reported, self._families))
+        say(row_text((Column(), Column()), cells), indent=FURTHER)
 
     def summary(self, summary: ListeningSummary, wall: float) -> None:
         """Print a summary, apart from the lines around it."""

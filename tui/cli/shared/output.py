@@ -8,11 +8,13 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from tui.drive.plain import escaped_json, plain
+
+from .rows import Column, table_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,24 +29,17 @@ if TYPE_CHECKING:
     from ..documents.document import Document, DocumentPart, DriveFields
     from ..documents.parts import QualityText, ValueField
 
-COLUMNS = {
-    "Code": False,
-    "Name": False,
-    "Value": True,
-    "Unit": False,
-    "Raw": True,
-    "Number": False,
-    "Wire address": False,
-    "": False,
-}
-"""Headings of a table of readings, and whether the column is aligned to the right."""
-
-NAME_COLUMN = tuple(COLUMNS).index("Name")
-LEFT_OUT = tuple(tuple(COLUMNS).index(title) for title in ("Number", "Wire address", "Raw"))
-"""Columns that a narrow terminal goes without, in this order."""
-LEAST_NAME, READABLE_NAME = 4, 16
-"""Characters that are left to a name, and for which other columns go."""
-GAP = 2
+READING_COLUMNS = (
+    Column("Code"),
+    Column("Name", readable=16),
+    Column("Value", right=True),
+    Column("Unit"),
+    Column("Raw", right=True, omitted=3),
+    Column("Number", omitted=1),
+    Column("Wire address", omitted=2),
+    Column(),
+)
+"""Columns of a table of readings, with the three notations of each address."""
 
 PIPE_WIDTH = 200
 """Width of a table that goes to a file or another program, in characters."""
@@ -166,51 +161,10 @@ def readings_table(
     width: int | None = None,
     cut: bool = True,
 ) -> Table:
-    """A table of readings with the three notations of each address.
-
-    With a `width` in characters columns of notations are left out where they do not fit; names
-    are cut so that every row is one line, or broken at words.
-    """
-    from rich.cells import cell_len
-    from rich.table import Table
-    from rich.text import Text
-
+    """Return a table of readings; those that are not good are dimmed."""
     rows = [_cells(reading) for reading in readings.values()]
-    widths = [max(map(cell_len, column)) for column in zip(tuple(COLUMNS), *rows, strict=True)]
-    shown = list(range(len(COLUMNS)))
-    name_width = None
-    if width is not None:
-        shown = _fitting(widths, width)
-        others = sum(widths[at] for at in shown) - widths[NAME_COLUMN] + GAP * (len(shown) - 1)
-        name_width = max(LEAST_NAME, min(widths[NAME_COLUMN], width - others))
-    table = Table(box=None, padding=(0, GAP, 0, 0), header_style="dim", title_justify="left")
-    table.title = Text(title, style="bold") if title else None
-    headings = list(COLUMNS.items())
-    for index in shown:
-        heading, right = headings[index]
-        justify: Literal["left", "right"] = "right" if right else "left"
-        if index == NAME_COLUMN:
-            no_wrap = cut and width is not None
-            table.add_column(heading, no_wrap=no_wrap, max_width=name_width, overflow="fold")
-        else:
-            # a number that lost a digit would be another one
-            table.add_column(heading, justify=justify, no_wrap=True, min_width=widths[index])
-    for cells, reading in zip(rows, readings.values(), strict=True):
-        style = "" if reading.quality == "good" else "dim"
-        table.add_row(*(Text(cells[index]) for index in shown), style=style)
-    return table
-
-
-def _fitting(widths: Sequence[int], width: int) -> list[int]:
-    """Columns that fit next to a readable name; notations are omitted first."""
-    shown = list(range(len(widths)))
-    for column in LEFT_OUT:
-        name = min(widths[NAME_COLUMN], READABLE_NAME)
-        needed = sum(widths[at] for at in shown if at != NAME_COLUMN) + GAP * (len(shown) - 1)
-        if needed + name <= width:
-            break
-        shown.remove(column)
-    return shown
+    dim = [at for at, reading in enumerate(readings.values()) if reading.quality != "good"]
+    return table_of(READING_COLUMNS, rows, title, width=width, cut=cut, dim=dim)
 
 
 def _cells(reading: Reading) -> tuple[str, ...]:

@@ -41,11 +41,6 @@ def _laid_out(text: str, *, err: bool, indent: int = 0, to_copy: bool = False) -
     return "\n".join(_broken(line, width, indent) for line in reported.split("\n"))
 
 
-def say_row(title: str, text: str, width: int) -> None:
-    """Print a title and its text in two columns; the first is so wide, with its gap."""
-    say(f"{title:<{width - 1}} {text}", indent=width)
-
-
 def _broken(line: str, width: int, indent: int) -> str:
     """A line broken at its last words that fit; one that fits, or goes to a file, as it is."""
     if len(line) <= width // 2 or width <= 2 * indent:

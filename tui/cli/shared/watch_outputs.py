@@ -17,6 +17,7 @@ from .output import (
     readings_table,
     value_field,
 )
+from .rows import Column, row_text
 from .say import say
 
 if TYPE_CHECKING:
@@ -58,16 +59,19 @@ class LabelsNeeded:
         """The same for a drive named by its line, as typed, and its address."""
         line = line_name if self.lines else ""
         drive = f"device {device}" if self.drives else ""
-        return "  ".join(part for part in (line, drive) if part)
+        return row_text((Column(), Column()), (line, drive))
 
     def cells(self, drive: WatchedDrive) -> list[str]:
-        """The same for the columns of titles()."""
+        """The same for the columns()."""
         line = [drive.line_name] if self.lines else []
         return [*line, *([str(drive.session.device)] if self.drives else [])]
 
-    def titles(self) -> list[str]:
+    def columns(self) -> list[Column]:
         """The columns that identify it."""
-        return [*(["line"] if self.lines else []), *(["device"] if self.drives else [])]
+        return [Column(name) for name, is_needed in self._names() if is_needed]
+
+    def _names(self) -> tuple[tuple[str, bool], ...]:
+        return ("line", self.lines), ("device", self.drives)
 
 
 class Output(Protocol):
@@ -150,13 +154,10 @@ class LineOutput:
         """Print one cycle as a line; a value that is not good is in brackets."""
         from tui.session.reading import with_text
 
-        values = "  ".join(
-            _shown(code, read) for code, read in with_text(snapshot.readings).items()
-        )
-        who = self._several.who(drive)
-        late, state = late_text(snapshot), snapshot.state.headline
-        parts = (_clock(snapshot), who, state, values, snapshot.error, late)
-        say("  ".join(part for part in parts if part))
+        values = [_shown(code, read) for code, read in with_text(snapshot.readings).items()]
+        head = (_clock(snapshot), self._several.who(drive), snapshot.state.headline)
+        cells = (*head, *values, snapshot.error, late_text(snapshot))
+        say(row_text((Column(),) * len(cells), cells))
 
 
 class TableOutput:
@@ -182,7 +183,7 @@ class TableOutput:
                 _clock(latest)[:8], self._several.who(drive), latest.state.headline, latest.error,
                 late_text(latest),
             )  # fmt: skip
-            title = "  ".join(part for part in parts if part)
+            title = row_text((Column(),) * len(parts), parts)
             readings, width = with_text(latest.readings), self._live.console.width
             tables.append(readings_table(readings, title, width=width))
         self._live.update(Group(*tables), refresh=True)
@@ -223,14 +224,15 @@ def csv_units(watched: Sequence[WatchedDrive]) -> dict[str, str]:
     return units
 
 
-def csv_titles(
+def csv_columns(
     watched: Sequence[WatchedDrive], units: Mapping[str, str], several: LabelsNeeded
-) -> list[str]:
-    """The titles of the columns; a taught scale is marked."""
+) -> list[Column]:
+    """Return the columns of the file; a learned scale is marked."""
     taught = {code for drive in watched for code in drive.session.profile.taught}
     marked = {c: f"{u}, taught" if c in taught and u else u for c, u in units.items()}
-    titles = [f"{code} [{unit}]" if unit else code for code, unit in marked.items()]
-    return ["time", *several.titles(), *titles, "error", "state", "direction"]
+    values = [Column(code, unit) for code, unit in marked.items()]
+    state = map(Column, ("error", "state", "direction"))
+    return [Column("time"), *several.columns(), *values, *state]
 
 
 @contextmanager
