@@ -58,7 +58,7 @@ def test_block_is_set_shown_verified_saved_loaded_and_reset(line: str, tmp_path:
     assert "write  NMA1: ETA -> RFRD" in dry
     assert slots(run(0, line, "--json", *drive))["NMA1"]["code"] == "ETA"
     done = run(0, line, "set", "NMA3=LCR", "nma1=w8604", "NMA2=3201", "--arm", *drive)
-    assert "Written and read back: NMA1, NMA2, NMA3." in done
+    assert "Wrote NMA1, NMA2, NMA3, all verified." in done
     assert "Lost at power-off until saved" in done
     found = slots(run(0, line, "verify", "--json", *drive))
     assert [found[s]["code"] for s in ("NMA1", "NMA2", "NMA3", "NMA4")] == [
@@ -70,7 +70,7 @@ def test_block_is_set_shown_verified_saved_loaded_and_reset(line: str, tmp_path:
     assert 'NMA3 = "LCR"  # W3204' in file.read_text()
     refused(2, line, "save", file, *drive)
     assert "NMA1, NMA2, NMA3" in run(0, line, "factory", "--arm", *drive)
-    assert "Nothing was to be changed" in run(0, line, "factory", "--arm", *drive)
+    assert "Nothing to change" in run(0, line, "factory", "--arm", *drive)
     assert "NMA1, NMA2, NMA3" in run(0, line, "load", file, "--arm", *drive)
     assert slots(run(0, line, "--json", *drive))["NMA3"]["code"] == "LCR"
 
@@ -122,7 +122,7 @@ def test_drive_that_does_not_answer_exits_with_3() -> None:
 def test_running_motor_keeps_its_assignment() -> None:
     with tcp_line("atv71@2", "--run", "30") as line:
         output = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
-        assert "motor stopped only" in output
+        assert "only with the motor stopped" in output
         assert "Nothing was written" in output
 
 
@@ -142,7 +142,7 @@ def test_line_lost_during_a_write_is_not_a_refusal(
 ) -> None:
     fail_write(monkeypatch, "NMA4", LineLost("The owner ended."))
     output = refused(3, line, "set", "NMA3=LCR", "NMA4=OTR", "--arm", "-d", "2")
-    assert "NMA4 was not taken: The owner ended. Written before: NMA3." in output
+    assert "NMA4 was not accepted: The owner ended. Already written: NMA3." in output
 
 
 def fail_write(monkeypatch: pytest.MonkeyPatch, code: str, error: BaseException) -> None:
@@ -160,7 +160,7 @@ def fail_write(monkeypatch: pytest.MonkeyPatch, code: str, error: BaseException)
 def test_indirect_block_takes_effect_after_a_reset() -> None:
     with tcp_line("atv21@1") as line:
         done = run(0, line, "set", "F875=FD01", "F876=FD00", "--arm", "-p", "atv21")
-        assert "In force after the drive's next reset" in done
+        assert "Takes effect after the drive's next reset" in done
         found = slots(run(1, line, "verify", "--json", "-p", "atv21"))
         assert found["F875"]["force"] == "pending"
         assert found["F875"]["verdict"] in ("differs", "no value")

@@ -141,7 +141,7 @@ def test_reference_is_written_to_the_confirmed_preset(line: str) -> None:
     assert "1.21 --reference" in output
     assert held(line, PRESET) == 600
     confirmed = teach(line, "1.21", "--reference")
-    assert "1.21 takes the reference, in rpm." in confirmed
+    assert "1.21 now takes the reference, in rpm." in confirmed
     assert "bit 8 of 6.42" in confirmed
     error = refused(2, "reference", line, *DRIVE, "20Hz", "--arm")
     assert "1.21 takes its reference in rpm. Type it like 900rpm." in error

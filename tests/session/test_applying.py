@@ -84,7 +84,7 @@ async def test_edits_that_depend_on_a_refused_one_are_held_back() -> None:
             "LSP": EditOutcome.DONE,
             "ACC": EditOutcome.DONE,
         }
-        assert "TFR, which it builds on, was not written" in text(applied, "HSP")
+        assert "it depends on TFR, which was not written" in text(applied, "HSP")
         assert {edit.code for edit in applied.left} == {"TFR", "HSP"}
         assert made.drive.raw("HSP") == 500
 
@@ -119,7 +119,7 @@ async def test_a_change_by_somebody_else_is_not_overwritten() -> None:
         made.drive.set("ACC", 90)
         applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": EditOutcome.CHANGED, "DEC": EditOutcome.DONE}
-        assert "was 3.0 s and is now 9.0 s" in text(applied, "ACC")
+        assert "from 3.0 s to 9.0 s" in text(applied, "ACC")
         assert made.drive.raw("ACC") == 90
         (left,) = applied.left
         assert (left.old, left.new) == (90, 50)
@@ -134,7 +134,7 @@ async def test_a_scale_that_somebody_else_changes_is_seen() -> None:
         made.drive.set("INR", 0)
         applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": EditOutcome.CHANGED}
-        assert "INR was changed" in text(applied, "ACC")
+        assert "INR, which sets its scale, has changed" in text(applied, "ACC")
         assert made.writes() == []
         (left,) = applied.left
         assert left.new == 500
@@ -208,7 +208,7 @@ async def test_a_silent_refusal_is_found_by_reading() -> None:
         made.drive.busy = True
         applied = await made.write(edits)
         assert outcomes(applied) == {"15.07": EditOutcome.NOT_TAKEN}
-        assert "refuses by silence" in text(applied, "15.07")
+        assert "does not answer what it refuses" in text(applied, "15.07")
         assert "15.07" in applied.left
 
 
@@ -382,7 +382,7 @@ async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> N
         reported = await factory_reset(
             made.session, made.journal, made.permit(), confirmed=confirmed
         )
-        assert "recalled in working memory" in reported
+        assert "restored in working memory" in reported
         factory = made.profile["SP2"].factory
         assert (made.drive.raw("ACC"), made.drive.raw("SP2")) == (30, factory)
         assert made.drive.raw("LAC") == 0
@@ -410,7 +410,7 @@ async def test_an_altivar_71_recalls_the_groups_that_were_chosen() -> None:
 async def test_neither_is_ordered_while_the_motor_runs(family: str) -> None:
     with bench(family, run_hz=20.0, sets={} if family == "atv312" else {"FRY": 1}) as made:
         for order in (save_to_eeprom, factory_reset):
-            with pytest.raises(MemoryRefused, match="motor stopped"):
+            with pytest.raises(MemoryRefused, match="Stop the motor first"):
                 await order(made.session, made.journal, made.permit())
         assert made.writes() == []
 

@@ -89,7 +89,7 @@ async def test_a_refused_edit_stays_staged_and_says_why() -> None:
         editor.staging.stage("HSP", "70")
         editor.apply()
         output = await written(made, editor)
-        assert output == "Nothing written; 1 still staged: HSP"
+        assert output == "Nothing written. 1 still staged: HSP."
         assert "TFR" in editor.staging.results["HSP"].text
         assert editor.staging.edits.get("HSP") is not None
         assert made.drive.raw("HSP") == 500
@@ -109,7 +109,7 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         editor.staging.stage("TFR", "65")
         editor.staging.stage("ACC", "4")
         editor.apply()
-        assert "Nothing written; 2 still staged" in await written(made, editor)
+        assert "Nothing written. 2 still staged" in await written(made, editor)
         # a person is asked before the rest is written
         assert editor.applied is not None
         assert editor.applied.waits == ("ACC",)
@@ -169,7 +169,7 @@ async def test_nothing_is_staged_while_something_is_written() -> None:
         editor.staging.stage("ACC", "7.5")
         editor.apply()
         if editor.busy:
-            with pytest.raises(ValueRefused, match="wait"):
+            with pytest.raises(ValueRefused, match="Wait"):
                 editor.staging.stage("DEC", "5")
         await written(made, editor)
         editor.staging.stage("DEC", "5")
@@ -188,7 +188,7 @@ async def test_save_to_eeprom_and_factory_settings() -> None:
         assert editor.unsaved == set()
         made.session.work.outcome = None
         editor.factory()
-        assert "factory settings are recalled" in await written(made, editor)
+        assert "factory settings are restored" in await written(made, editor)
 
 
 async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:

@@ -311,7 +311,8 @@ async def test_moved_slot_is_taken_out_first() -> None:
             (first, 0), (first + 1, 0), (first, 8604), (first + 1, 3201), (first + 2, 3204),
         ]  # fmt: skip
         assert [here.drive.raw(slot) for slot in plan.block.slots] == list(plan.raws)
-        assert await write(here, plan) == "Nothing was to be changed."
+        nothing = "Nothing to change: the drive already holds this assignment."
+        assert await write(here, plan) == nothing
         here.journal.flush()
         kept = [json.loads(x) for x in here.journal.path.read_text().splitlines()]
         assert [(e["code"], e["new_raw"], e["read_back"]) for e in kept][:2] == [
@@ -324,7 +325,7 @@ async def test_moved_slot_is_taken_out_first() -> None:
 async def test_nothing_is_written_while_the_motor_turns(family: str) -> None:
     with bench(family, run_hz=20.0) as here:
         plan = plan_of(here, "read", ["LCR" if family == "atv71" else "FE03"])
-        with pytest.raises(AssignmentRefused, match=r"motor stopped only.*Nothing was written"):
+        with pytest.raises(AssignmentRefused, match=r"with the motor stopped.*Nothing was written"):
             await write(here, plan)
         assert here.writes() == []
 
@@ -338,7 +339,7 @@ async def test_nothing_is_written_once_the_drive_is_disarmed_or_stopped(
     with bench("atv71") as here:
         here.after_writes(2, lambda: ended(here))
         plan = plan_of(here, "read", ["RFRD", "ETA", "LCR"])
-        with pytest.raises(AssignmentRefused, match=rf"{says}.*Written before: NMA1, NMA2"):
+        with pytest.raises(AssignmentRefused, match=rf"{says}.*Already written: NMA1, NMA2"):
             await write(here, plan)
         assert len(here.writes()) == 2
 
@@ -348,7 +349,7 @@ async def test_foreign_slot_change_is_not_overwritten() -> None:
         seen = await Mapper(here.session).slots(block(here, "read"))
         here.drive.set("NMA4", 9001)
         with pytest.raises(
-            AssignmentRefused, match=r"NMA4 was changed in the meantime.*unused is now ACC"
+            AssignmentRefused, match=r"Another program changed NMA4 from unused to ACC"
         ):
             await write(here, plan_of(here, "read", ["LCR"]), expected=seen)
         assert here.writes() == []
@@ -365,7 +366,7 @@ async def test_somebody_else_between_two_slots() -> None:
             return done
 
         here.session.line.write = disturbed  # type: ignore[method-assign]
-        with pytest.raises(AssignmentRefused, match="NMA4 was changed in the meantime"):
+        with pytest.raises(AssignmentRefused, match="Another program changed NMA4"):
             await write(here, plan)
         assert here.drive.raw("NMA4") == 9001
 
@@ -382,9 +383,11 @@ async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
         sent = here.lose_answer("NMA3", error, taken=taken)
         plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
         if taken:
-            assert "Written and read back: NMA3, NMA4." in await write(here, plan)
+            assert "Wrote NMA3, NMA4, all verified." in await write(here, plan)
         else:
-            with pytest.raises(AssignmentRefused, match=r"NMA3 was not taken.*Nothing") as reported:
+            with pytest.raises(
+                AssignmentRefused, match=r"NMA3 was not accept.*Nothing"
+            ) as reported:
                 await write(here, plan)
             assert reported.value.__cause__ is error
         assert sent == [3204]
@@ -404,7 +407,7 @@ async def test_writes_before_line_loss_are_reported() -> None:
                 raise
 
         here.session.line.write = then_lost  # type: ignore[method-assign]
-        says = r"NMA4 was sent: .*ended.*Written before: NMA3"
+        says = r"NMA4 was sent, and may.*ended.*Already written: NMA3"
         with pytest.raises(AssignmentRefused, match=says):
             await write(here, plan)
 

@@ -106,7 +106,7 @@ async def test_another_value_than_was_written_is_reported_and_known(
     line: WilfulLine, session: DriveSession, journal: Journal, kept: int
 ) -> None:
     line.drive.keeps = lambda _address, _word: kept
-    with pytest.raises(NotTaken, match=r"ACC: written 5\.0 s, the drive holds"):
+    with pytest.raises(NotTaken, match=r"ACC was written as 5\.0 s, but the drive holds"):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert session.image.raws["ACC"] == kept
     (entry,) = journal.recent
@@ -295,7 +295,7 @@ async def test_a_lost_answer_is_completed_once_the_drive_is_read(
     assert (lost.kind, lost.read_back) == ("write", None)
     assert (later.kind, later.of, later.read_back) == ("read-back", lost.time, 50 if taken else 30)
     (entry,) = completed([lost, later])
-    came = "Taken: it holds 5.0 s" if taken else "Not taken: it holds 3.0 s"
+    came = "Accepted: it holds 5.0 s" if taken else "Not accepted: it holds 3.0 s"
     assert entry.answer == f"{lost.answer} {came}, read back later."
     assert entry.read_back == later.read_back
 
@@ -320,7 +320,8 @@ async def test_a_write_that_a_stop_cuts_short_is_not_kept_as_done(
     await asyncio.wait([task])
     await Reader(session).read(["ACC"])
     cut, later = abilities_in(journal)
-    assert (cut.answer, later.answer) == (CUT_SHORT, "Not taken: it holds 3.0 s, read back later.")
+    found = "Not accepted: it holds 3.0 s, read back later."
+    assert (cut.answer, later.answer) == (CUT_SHORT, found)
 
 
 async def test_a_word_that_the_drive_may_change_is_reported_and_not_judged(

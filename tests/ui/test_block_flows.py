@@ -93,7 +93,7 @@ async def test_pick_move_write_and_verify() -> None:
         await arm(made.pilot)
         await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
         await write(made)
-        await message(made, "Written and read back: NMA2, NMA3", "Lost at power-off")
+        await message(made, "Wrote NMA2, NMA3, all verified", "Lost at power-off")
         assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]
         # nobody has looked at Parameters: what is lost at power-off is told all the same
         await until(made.pilot, lambda: "3 Parameters S" in shown(made.app, "tabs"))
@@ -101,7 +101,7 @@ async def test_pick_move_write_and_verify() -> None:
         await until(made.pilot, lambda: "2 written settings are not saved" in picture(made.app))
         await made.pilot.press("escape")
         await made.pilot.press("V")
-        await message(made, "3 slots bring the same as direct reads")
+        await message(made, "3 slots match direct reads")
         await press(made.pilot, "(factory)")
         await message(made, "2 slots proposed")
         await made.pilot.press("u", "escape")
@@ -115,7 +115,7 @@ async def test_nothing_is_written_while_the_motor_turns_and_stop_works_here() ->
         await made.pilot.press("down", "down", "down")
         await pick(made, "otr")
         await made.pilot.press("w")
-        await message(made, "motor stopped only", "Stop it first")
+        await message(made, "only with the motor stopped", "Stop it first")
         assert isinstance(made.app.screen, BlocksScreen)
         assert made.drive().raw("NMA4") == 0
         await made.pilot.press("enter")
@@ -133,13 +133,13 @@ async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
         made.drive().set("NMA1", 9001)
         await until(made.pilot, lambda: "ACC" in shown(made.app, "first"))
         await write(made)
-        await message(made, "NMA1 was changed in the meantime")
+        await message(made, "Another program changed NMA1")
         assert made.drive().raw("NMA1") == 9001
         # now that it was told, it may be overwritten
         await until(made.pilot, lambda: "→ ETA" in shown(made.app, "first"))
         await until(made.pilot, lambda: not block_editor(made).busy)
         await write(made)
-        await message(made, "Written and read back: NMA1, NMA3")
+        await message(made, "Wrote NMA1, NMA3, all verified")
 
 
 async def test_save_and_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,7 +171,7 @@ async def test_outputs_are_written_when_armed_only() -> None:
         await answer(made, "X", "ACC=5.5")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
-        await message(made, "Written: ACC 5.5", "Came back: ETA")
+        await message(made, "Wrote ACC 5.5", "The reply has ETA")
         assert made.drive().raw("ACC") == 55
 
 
@@ -221,7 +221,7 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         made.app.screen.query_one(Input).value = "FA51=500"
         await made.pilot.press("enter")
         fault = made.app.screen.query_one("#fault")
-        await until(made.pilot, lambda: "reset it first" in str(fault.render()))
+        await until(made.pilot, lambda: "Reset the drive first" in str(fault.render()))
         await made.pilot.press("escape")
         made.drive().power_off()
         await until(made.pilot, lambda: not block_editor(made).mapper.written)
@@ -233,7 +233,7 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         assert "cannot be read" in str(made.app.screen.query_one("#follows").render())
         await made.pilot.press("y")
         events = made.app.events  # the newest may be that replies were lost while it was off
-        await until(made.pilot, lambda: any("Written: FA51 500" in e.text for e in events.events))
+        await until(made.pilot, lambda: any("Wrote FA51 500" in e.text for e in events.events))
         assert made.drive().raw("FA51") == 500
 
 
@@ -288,7 +288,7 @@ async def test_p_names_the_keys_that_write_the_proposal_in_this_state(
         await until(made.pilot, lambda: "FORWARD" in shown(made.app, "strip"))
         await made.pilot.press("p")
         await message(
-            made, "Proposed: Monitor's cycle", "motor stopped only", "Press u to discard it."
+            made, "Proposed: Monitor's cycle", "with the motor stopped", "Press u to discard it."
         )
         assert "w to write" not in shown(made.app, "said")
         await until(made.pilot, lambda: "Stop the motor, then press w" in shown(made.app, "detail"))

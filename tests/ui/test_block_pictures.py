@@ -113,7 +113,7 @@ def differs(block_editor: BlockEditor) -> None:
     unknown = Slot("NMA2", 3199, None, None, verdict=SlotMatch.NONE)
     hold(block_editor.session, {"NMA2": 3199})
     block_editor.views[block.id] = BlockView(block, (bad, unknown, *view.slots[2:]))
-    block_editor.refuse("NMA1 differs; NMA2 no value. 5 slots bring the same as direct reads.")
+    block_editor.refuse("NMA1 differs; NMA2 no value. 5 slots match direct reads.")
 
 
 def indirect() -> BlockEditor:
@@ -135,7 +135,7 @@ def indirect() -> BlockEditor:
         second.id: BlockView(
             second,
             view_of(session, second, (1, 3), {"FA00": 0, "FA01": 0}).slots,
-            "Write block can only be written: what it would take cannot be read.",
+            "Write block can only be written: its words cannot be read.",
         ),
     }
     return block_editor

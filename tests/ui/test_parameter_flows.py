@@ -175,7 +175,7 @@ async def test_reports_on_edits_are_true_while_motor_runs() -> None:
         follows = str(made.app.screen.query_one("#follows").render())
         assert {"ACC", "DEC", "TFR"} & set(follows.split()) == {"DEC"}
         await made.pilot.press("y")
-        await message(made, "Wrote 1, all verified; 2 still staged: ACC, TFR")
+        await message(made, "Wrote 1, all verified. 2 still staged: ACC, TFR")
         await until(made.pilot, lambda: "Now 5.0 s, was 3.0 s." in shown(made.app, "detail"))
         await made.pilot.press("u")
         await message(made, "TFR is no longer staged; 1 is staged now.")

@@ -116,11 +116,11 @@ def refused(editor: Editor) -> None:
     edit = editor.staging.edits.get("HSP")
     assert edit is not None
     text = (
-        "HSP: the drive refused with exception 4, not written. The drive is running forward."
+        "The drive refused HSP with exception 4, not written. The drive is running forward."
         " Stop the motor and write again."
     )
     editor.staging.results = {"HSP": Result(edit, EditOutcome.DRIVE_REFUSED, text, 500)}
-    say(editor, OutcomeKind.REFUSED, "Wrote 2, all verified; 1 still staged: HSP")
+    say(editor, OutcomeKind.REFUSED, "Wrote 2, all verified. 1 still staged: HSP.")
 
 
 def failed(editor: Editor) -> Applied:
@@ -129,7 +129,7 @@ def failed(editor: Editor) -> Applied:
         editor.staging.stage(code, text)
     edits = {edit.code: edit for edit in editor.staging.edits}
     refusal = (
-        "TFR: the drive refused with exception 4, Not completed. The drive is running forward."
+        "The drive refused TFR with exception 4, Not completed. The drive is running forward."
         " Check whether the parameter can be written in this state."
     )
     results = (
@@ -137,7 +137,7 @@ def failed(editor: Editor) -> Applied:
         Result(
             edits["HSP"],
             EditOutcome.HELD_BACK,
-            "HSP is held back: TFR, which it builds on, was not written.",
+            "HSP was not written: it depends on TFR, which was not written.",
             500,
         ),
         Result(edits["ACC"], EditOutcome.WAITS, "ACC is not written yet.", 30),

@@ -74,7 +74,7 @@ def test_palette(snap_compare: Compare, query: str, size: tuple[int, int]) -> No
 
 OVER_MONITOR = {"help": "question_mark", "frames": "7", "messages": "m", "leave": "q"}
 LONG_REFUSAL = (
-    "HSP: the drive refused with exception 4, not written. The drive is running forward."
+    "The drive refused HSP with exception 4, not written. The drive is running forward."
     " Stop the motor and write again."
 )
 

@@ -140,7 +140,7 @@ async def test_a_taught_preset_is_proposed_confirmed_and_run_by() -> None:
         await pilot.press("enter")
         assert isinstance(app.screen, Confirm), "Enter confirms nothing"
         await pilot.press("y")
-        await made.message("1.21 takes the reference, in rpm")
+        await made.message("1.21 now takes the reference, in rpm")
         await made.armed()
         await made.answer("t", "y")
         await made.message("Control by Modbus")

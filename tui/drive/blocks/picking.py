@@ -44,8 +44,7 @@ def raw_named(profile: Profile, block: Block, text: str) -> int:
         if block.selects_by != "address" or address is None:
             raise
         raise MappingError(
-            f"{profile.name} has no parameter at {wanted} that is known here: what the drive"
-            " would copy there is not known. Type a code, or `none`."
+            f"No parameter of {profile.name} is known at {wanted}. Type a code, or `none`."
         ) from None
     return raw_of(profile, block, parameter)
 

@@ -54,19 +54,20 @@ def _slot_problems(
     if parameter is None:
         what = f"{raw} (16#{raw:04X})"
         if block.selects_by == "choice":
-            return [Problem(slot, f"{slot}: {what} is none of its {len(block.choices)} choices.")]
+            text = f"{slot}: {what} is not one of its {len(block.choices)} choices."
+            return [Problem(slot, text)]
         text = f"{slot}: no parameter of {profile.name} is known at {what}."
         return [Problem(slot, text)]
     if wrong := reason_against(profile, block, parameter):
         return [Problem(slot, f"{slot}: {wrong}")]
     if parameter.code in unreadable:
-        return [Problem(slot, f"{slot}: this drive says that it has no {parameter.code}.")]
+        return [Problem(slot, f"{slot}: this drive reports that it has no {parameter.code}.")]
     found = []
     if not is_verified(parameter):
-        text = f"{slot}: {parameter.code} is unverified: no manual in hand confirms its address."
+        text = f"{slot}: no available manual confirms the address of {parameter.code}."
         found.append(Problem(slot, text, _writes_block(block)))
     if _writes_block(block) and parameter.access == "rw-stopped":
-        text = f"{slot}: {parameter.code} is taken by the drive with the motor stopped only."
+        text = f"{slot}: the drive accepts {parameter.code} only with the motor stopped."
         found.append(Problem(slot, text, refuses=False))
     return found
 
@@ -81,15 +82,15 @@ def _shape_problems(plan: Assignment) -> list[Problem]:
     if holes and _writes_block(block):
         text = (
             f"{holes[0]} is unused: the drive refuses every write to this block (exception 4)"
-            f" while {plan.block.slots[0]} is mapped to nothing."
+            f" while {plan.block.slots[0]} is not mapped."
         )
         found.append(Problem(holes[0], text))
     elif holes:
-        text = f"{holes[0]} is unused: slots after it are not read through the block here."
+        text = f"{holes[0]} is unused, so the slots after it are not read through the block."
         found.append(Problem(holes[0], text, refuses=False))
     if length < block.min_words:
         done = "written" if _writes_block(block) else "read"
-        text = f"One slot alone is of no use: {block.min_words} words are {done} at least."
+        text = f"Map more slots: at least {block.min_words} words are {done} at once."
         found.append(Problem(block.slots[length], text, refuses=False))
     return found
 
@@ -99,20 +100,20 @@ def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
     code = parameter.code
     if block.selects_by == "choice" and code not in {c.parameter for c in block.choices}:
         codes = ", ".join(choice.parameter for choice in block.choices)
-        return f"{code} is not in the list of {block.name.lower()}: {codes}."
+        return f"The {block.name.lower()} cannot hold {code}. It can hold {codes}."
     if word_count(parameter) != 1:
-        return f"{code} takes two words; a slot carries one."
+        return f"{code} has two words; a slot holds one."
     if parameter.address == UNUSED:
-        return f"{code} has the address 0, which is that of an unused slot."
+        return f"{code} has the address 0, which marks an unused slot."
     if block.direction == "read" and parameter.access == "w":
-        return f"{code} can only be written; it cannot be in {block.name.lower()}."
+        return f"{code} can only be written. The {block.name.lower()} cannot hold it."
     if block.direction == "write" and parameter.access == "r":
-        return f"{code} can only be read; it cannot be in {block.name.lower()}."
+        return f"{code} can only be read. The {block.name.lower()} cannot hold it."
     if block.direction == "write" and parameter.forbidden:
         return f"{code} is never written by Drive Panel: {parameter.forbidden}"
     own = {c for b in profile.data.blocks for c in (*b.slots, *b.values)}
     if block.selects_by == "address" and code in own:
-        return f"{code} belongs to the scanner itself."
+        return f"{code} belongs to the scanner itself, so no slot can hold it."
     return ""
 
 

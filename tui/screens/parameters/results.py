@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 OUTCOME_WORDS = {
     EditOutcome.DONE: "written",
     EditOutcome.SENT: "sent",
-    EditOutcome.HELD_BACK: "HELD BACK",
     EditOutcome.WAITS: "not yet written",
 }
 """Results of an edit in a word; any other was not written."""
@@ -111,7 +110,7 @@ def results_table(applied: Applied) -> Table:
             Text(plain(values), PLAIN),
         )
         if not result.done and result.outcome is not EditOutcome.WAITS:
-            table.add_row(Text(), Text(), Text(plain(_reason(result)), FAINT))
+            table.add_row(Text(), Text(), Text(plain(result.text), FAINT))
     return table
 
 
@@ -119,8 +118,3 @@ def _style(result: Result) -> Style:
     if result.done:
         return PLAIN
     return ATTENTION if result.outcome is EditOutcome.WAITS else ALARM
-
-
-def _reason(result: Result) -> str:
-    """Why it was not written, without its code, which precedes it already."""
-    return result.text.removeprefix(f"{result.edit.code}: ").removeprefix(f"{result.edit.code} ")

@@ -203,7 +203,7 @@ class BlockEditor:
             raws = session.image.raws
             sent = values_text(session.profile, agreed.wanted, raws)
             back = values_text(session.profile, done.inputs, raws)
-            return f"Written: {sent}." + (f" Came back: {back}." if back else "")
+            return f"Wrote {sent}." + (f" The reply has {back}." if back else "")
 
         self._run(work, "Writing through the outputs", stamp)
 
@@ -211,7 +211,7 @@ class BlockEditor:
         block = next((b for b in self.proposals.blocks if b.direction == "write"), None)
         plan = self.proposals.today(block) if block else None
         if plan is None or not plan.length:
-            raise MappingError("No output slot is in use.")
+            raise MappingError("No output slot is mapped. Map one first.")
         return plan
 
     def _run(
@@ -220,7 +220,7 @@ class BlockEditor:
         """Do it as work on the drive: nothing before it, ended by a stop."""
         queue = self.session.work
         if queue.busy:
-            self._say("Another command is still being carried out.", OutcomeKind.REFUSED)
+            self._say("Another command is in progress. Wait until it ends.", OutcomeKind.REFUSED)
             return
         cut_short = False
 
@@ -234,7 +234,7 @@ class BlockEditor:
 
         def given_up() -> str | None:
             self._look_again()
-            return "What was written stays." if cut_short else None
+            return "Values that were already written stay." if cut_short else None
 
         try:
             queue.put(Task(carry_out, owner=self, working=doing, given_up=given_up), stamp)
@@ -274,10 +274,10 @@ def _verdict(views: list[BlockView]) -> tuple[str, bool]:
         for slot in view.slots:
             counted += slot.verdict in (SlotMatch.SAME, SlotMatch.MOVING)
             if slot.verdict in (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE):
-                brings = f", brings {slot.brings}" if slot.brings else ""
+                brings = f", returns {slot.brings}" if slot.brings else ""
                 waits = " until the next reset" if slot.force is Force.PENDING else ""
                 wrong.append(f"{slot.code} {slot.verdict}{brings}{waits}")
-    text = f"{counted} slots bring the same as direct reads."
+    text = f"{counted} slots match direct reads."
     if wrong:
         return f"{'; '.join(wrong)}. {text}", False
     return text, True

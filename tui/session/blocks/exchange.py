@@ -65,8 +65,8 @@ async def exchange(
         raise AssignmentRefused(f"{why} Nothing was written.")
     if outputs.block.effective == "after-reset" and not in_force:
         raise AssignmentRefused(
-            f"The mapping of {outputs.block.name.lower()} since the last reset cannot be read,"
-            " and no person has confirmed it: nothing is written."
+            f"Nothing was written: the mapping that the {outputs.block.name.lower()} has had since"
+            " the last reset cannot be read, and was not confirmed."
         )
     retrying = RetryingReader(session)
     checks = ExchangeChecks(session, retrying, outputs, inputs, wanted)
@@ -99,7 +99,8 @@ class _Exchange:
         raws = {p.code: self.wanted.get(p.code, held.get(p.code)) for p in self.targets}
         if unknown := [code for code, raw in raws.items() if raw is None]:
             raise AssignmentRefused(
-                f"What {', '.join(unknown)} holds now is not known; give it a value as well."
+                f"Nothing was written: the value of {', '.join(unknown)} is unknown. Enter a value"
+                " for it as well."
             )
         known = {code: raw for code, raw in raws.items() if raw is not None}
         self.checks.check_values(known)
@@ -197,14 +198,14 @@ class _Exchange:
         profile = self.session.profile
         moved = [c for c in back if c not in raws and c in held and back[c] != held[c]]
         if moved:
-            texts = [f"{c} went to {self._text(profile[c], back[c])}" for c in moved]
+            texts = [f"{c} changed to {self._text(profile[c], back[c])}" for c in moved]
             raise NotTaken(
-                f"{self.outputs.block.name} is mapped to something else than its slots say:"
-                f" {', '.join(texts)}. Look at the drive, and reset it before the next try."
+                f"{self.outputs.block.name}: the mapping is not that of its slots, because"
+                f" {', '.join(texts)}. Check the drive, and reset it before you try again."
             )
         if wrong := self._not_held(raws, back):
             texts = [
-                f"{c}: written {self._text(profile[c], raws[c])}, the drive holds"
+                f"{c} was written as {self._text(profile[c], raws[c])}, but the drive holds"
                 f" {self._text(profile[c], back[c])}"
                 for c in wrong
             ]
@@ -281,15 +282,15 @@ class ExchangeChecks:
         profile, block = self.session.profile, self.outputs.block
         known = {p.code for p in self.targets}
         if foreign := [code for code in self.wanted if code not in known]:
-            raise AssignmentRefused(f"No output slot is mapped to {', '.join(foreign)}.")
+            raise AssignmentRefused(
+                f"Nothing was written: no output slot is mapped to {', '.join(foreign)}."
+            )
         if not self.wanted:
-            raise AssignmentRefused("No output was named; nothing was written.")
+            raise AssignmentRefused("Nothing was written: no output was named.")
         for place in self.places:
             if slot_target(profile, block, self.outputs.raws[place]) is None:
-                stands = describe(profile, block, self.outputs.raws[place])
-                raise AssignmentRefused(
-                    f"{block.slots[place]} is {stands}: nothing is written through it."
-                )
+                content = describe(profile, block, self.outputs.raws[place])
+                raise AssignmentRefused(f"Nothing was written: {block.slots[place]} is {content}.")
         if wrong := refusing(assignment_problems(profile, self.outputs)):
             raise AssignmentRefused(" ".join(problem.text for problem in wrong))
 
@@ -301,8 +302,8 @@ class ExchangeChecks:
         stopped = [p.code for p in self.targets if p.access == "rw-stopped"]
         if stopped and state not in AT_REST:
             raise AssignmentRefused(
-                f"{', '.join(stopped)} are written with the motor stopped only; the drive is"
-                f" {self.retrying.headline}."
+                f"Nothing was written: {', '.join(stopped)} can be written only with the motor"
+                f" stopped; the drive is {self.retrying.headline}. Stop it first."
             )
         if not any(is_order(profile, parameter) for parameter in self.targets):
             return
@@ -313,7 +314,7 @@ class ExchangeChecks:
         raws = self.session.image.raws
         found = chart_in_force(profile, raws)
         if found is None or not found.orders:
-            raise AssignmentRefused("Drive Panel does not command this drive.")
+            raise AssignmentRefused("Nothing was written: Drive Panel does not command this drive.")
         if (held := held_back(profile, found, "forward", raws)) is not None:
             raise AssignmentRefused(f"{held.text} {held.remedy}".strip())
 
@@ -336,15 +337,16 @@ class ExchangeChecks:
             changed = [slot for slot, raw in plan.slots.items() if held.get(slot) != raw]
             if not changed:
                 continue
-            text = f"{', '.join(changed)} of {block.name.lower()} were changed by another program"
+            text = f"another program changed {', '.join(changed)} of the {block.name.lower()}."
             if when == "before":
-                raise AssignmentRefused(f"{text}: nothing was written. Look at them first.")
+                raise AssignmentRefused(f"Nothing was written: {text} Check the slots first.")
             if plan is self.inputs:
                 raise AssignmentRefused(
-                    f"{text}: the outputs were written, of what came back nothing is taken."
+                    f"The outputs were written, but the returned values are ignored: {text}"
                 )
             raise AssignmentRefused(
-                f"{text} while words were written through them: look at {self._names(held)}."
+                f"Values may have been written to other parameters: {text} Check"
+                f" {self._names(held)}."
             )
 
     def _names(self, held: Mapping[str, int]) -> str:

@@ -177,7 +177,7 @@ class Mapper:
             changed = tuple(
                 Slot(slot, still.get(slot), verdict=SlotMatch.CHANGED) for slot in block.slots
             )
-            return BlockView(block, changed, "The slots were changed while they were looked at.")
+            return BlockView(block, changed, "The slots changed while they were read.")
         proof.note(words, before, after)
         found = []
         for place, slot in enumerate(block.slots):
@@ -212,13 +212,13 @@ class Mapper:
         if stretch is None:
             return (), ""
         if block.direction == "write" and not block.values:
-            return (), f"{block.name} can only be written: what it would take cannot be read."
+            return (), f"{block.name} can only be written: its words cannot be read."
         try:
             reply = await self.session.line.read(
                 self.session.device, *stretch, priority=self.priority
             )
         except DeviceException as refusal:
-            return (), f"The drive refuses the {block.name.lower()}: {refusal}"
+            return (), f"The drive refuses reads of the {block.name.lower()}: {refusal}"
         return reply.words, ""
 
     def _slot(

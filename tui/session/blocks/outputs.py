@@ -62,16 +62,19 @@ def intended(
     `raws` are known raw values, for scales; `absent` are codes that the drive lacks. Raises
     ValueRefused and UnknownParameter with what is wrong.
     """
-    stand = output_codes(profile, outputs)
+    possible = output_codes(profile, outputs)
     wanted: dict[str, int] = {}
     for part in text.replace(",", ".").split():
         code, sign, value = part.partition("=")
         parameter = profile.find(code)
-        if not sign or parameter.code not in stand:
-            raise ValueRefused(f"{part!r}: write CODE=VALUE with one of {', '.join(stand)}.")
+        if not sign or parameter.code not in possible:
+            raise ValueRefused(
+                f"{part!r} is not a value of an output. Use CODE=VALUE with one of"
+                f" {', '.join(possible)}."
+            )
         wanted[parameter.code] = raw_of_text(profile, parameter, value, raws, absent).raw
     if not wanted:
-        raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
+        raise ValueRefused(f"Use CODE=VALUE with one of {', '.join(possible)}.")
     places = reach(profile, outputs, wanted)
     lines = [*_lines(profile, outputs, places, wanted, raws, absent)]
     words = [_word(profile, outputs, place, wanted, raws) for place in places]
@@ -88,9 +91,7 @@ def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
     `waits` are raw values by slot that were written since.
     """
     if found := [slot for slot, raw in outputs.slots.items() if waits.get(slot) == raw]:
-        raise MappingError(
-            f"{', '.join(found)}: in force after the drive's next reset only; reset it first."
-        )
+        raise MappingError(f"Not in effect yet: {', '.join(found)}. Reset the drive first.")
 
 
 def values_text(
@@ -123,12 +124,12 @@ def _lines(
         else:
             beside.append(code)
     if beside:
-        lines.append(f"With them {', '.join(beside)} is written, with what it holds now.")
+        lines.append(f"Also written, with its present value: {', '.join(beside)}.")
     if block.effective == "after-reset":
         lines.append(
-            f"What the {block.name.lower()} is mapped to since the last reset cannot be read. Go on"
-            f" only if {' and '.join(block.slots)} were set before the drive was last reset or"
-            " switched on."
+            f"The mapping that the {block.name.lower()} has had since the last reset cannot be"
+            f" read. Continue only if {' and '.join(block.slots)} were set before the drive was"
+            " last reset or switched on."
         )
     if any(_moves(profile, describe(profile, block, outputs.raws[place])) for place in places):
         lines.append("A command word or reference can move the motor.")

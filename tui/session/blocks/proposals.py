@@ -69,9 +69,9 @@ class Proposals:
         MappingError."""
         today = self.today(plan.block)
         if today is None:
-            raise MappingError(f"{plan.block.name} could not be read yet.")
+            raise MappingError(f"{plan.block.name} was not read yet. Wait until it is.")
         if self.busy():
-            raise MappingError("Something is being written; wait until that is done.")
+            raise MappingError("Not proposed: a write is in progress. Wait until it ends.")
         if plan.raws == today.raws:
             self.plans.pop(plan.block.id, None)
             return
@@ -102,7 +102,7 @@ class Proposals:
         """
         block = next((block for block in self.blocks if block.direction == "read"), None)
         if block is None:
-            raise MappingError("This drive has no block that is read.")
+            raise MappingError("This drive has no block for reading.")
         timing, profile = wire_timing(self.session), self.session.profile
         today = self._base(block)
         others = slots_of([plan for plan in self.assignments if plan.block is not block])
@@ -123,7 +123,7 @@ class Proposals:
     def _base(self, block: Block) -> Assignment:
         plan = self.proposed(block)
         if plan is None:
-            raise MappingError(f"{block.name} could not be read yet.")
+            raise MappingError(f"{block.name} was not read yet. Wait until it is.")
         return plan
 
     def changes(self, block: Block) -> list[SlotChange]:

@@ -59,7 +59,7 @@ def save_words(session: DriveSession, words: UserWords) -> str:
     try:
         store_json(_file(), kept)
     except OSError as error:
-        return f"The user words cannot be kept: {error.strerror or error}."
+        return f"The user words cannot be stored: {error.strerror or error}."
     return ""
 
 

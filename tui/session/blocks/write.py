@@ -48,11 +48,11 @@ class Written:
     def text(self) -> str:
         """Result, and the steps that remain, for a person."""
         if not self.changes:
-            return "Nothing was to be changed."
+            return "Nothing to change: the drive already holds this assignment."
         codes = ", ".join(dict.fromkeys(change.slot for change in self.changes))
-        text = f"Written and read back: {codes}."
+        text = f"Wrote {codes}, all verified."
         if self.after_reset:
-            text += " In force after the drive's next reset."
+            text += " Takes effect after the drive's next reset."
         if self.unsaved:
             text += " Lost at power-off until saved."
         return text
@@ -87,7 +87,7 @@ async def write_assignment(
 def at_rest_only(block: Block, headline: str) -> str:
     """Return the reason that slots are not written in a state of that name."""
     return (
-        f"{block.name}: slots are changed with the motor stopped only; the drive is {headline}."
+        f"{block.name}: slots can be changed only with the motor stopped; the drive is {headline}."
         " Stop it first."
     )
 
@@ -162,20 +162,20 @@ class _Writing:
         if now is None:
             raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost
         if now != step.new:
-            text = f"{step.slot} was not taken: {strip_outcome_note(lost)}"
+            text = f"{step.slot} was not accepted: {strip_outcome_note(lost)}"
             raise AssignmentRefused(self.so_far(text)) from lost
 
     def _changed(self, slot: str, old: int | None, now: int) -> AssignmentRefused:
         profile, block = self.session.profile, self.plan.block
         was, is_now = describe(profile, block, old), describe(profile, block, now)
-        text = f"{slot} was changed in the meantime by another program: {was} is now {is_now}."
-        return AssignmentRefused(self.so_far(f"{text} Look at it, then write again."))
+        text = f"Another program changed {slot} from {was} to {is_now}."
+        return AssignmentRefused(self.so_far(f"{text} Check it, then write again."))
 
     def so_far(self, text: str, *, sent: str = "") -> str:
         """Return a text with the slots that were written; `sent` may have been written too."""
         if sent:
-            text = f"{sent} was sent: {text}"
+            text = f"{sent} was sent, and may have been written: {text}"
         if not self.done:
             return f"{text} Nothing was written{' before it' if sent else ''}."
         codes = ", ".join(dict.fromkeys(change.slot for change in self.done))
-        return f"{text} Written before: {codes}."
+        return f"{text} Already written: {codes}."

@@ -17,15 +17,15 @@ class EditOutcome(StrEnum):
     """Result of one edit."""
 
     DONE = "done"
-    SENT = "sent, line changed"
-    CHANGED = "changed meanwhile"
-    NOT_TAKEN = "not taken"
-    DRIVE_REFUSED = "the drive refused"
+    SENT = "sent, line settings changed"
+    CHANGED = "not written, changed by another source"
+    NOT_TAKEN = "not accepted"
+    DRIVE_REFUSED = "refused by the drive"
     REFUSED = "not written"
-    UNKNOWN = "not known"
+    UNKNOWN = "may have been written"
     NOT_SENT = "not sent"
-    HELD_BACK = "held back"
-    WAITS = "waits for an answer"
+    HELD_BACK = "not written, depends on another"
+    WAITS = "waiting for confirmation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +95,13 @@ class LinkChange:
         """The effect, and the next step, for a person."""
         when = "From now on" if self.at_once else "After its next reset"
         if not self.device:
-            return f"{when} the drive's server is off ({self.code} = {self.value})."
+            return (
+                f"{when}, the drive does not answer: {self.code} = {self.value} switches its"
+                " Modbus server off."
+            )
         return (
-            f"{when} the drive answers with {self.code} = {self.value}: reach it by"
-            f" {self.line} -d {self.device}. If this line is on another port of the drive,"
-            " nothing changes here."
+            f"{when}, the drive answers with {self.code} = {self.value}. Reach it as {self.line}"
+            f" -d {self.device}. If this line uses another port of the drive, nothing changes."
         )
 
 

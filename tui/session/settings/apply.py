@@ -69,10 +69,10 @@ async def apply_edits(
         if work.stopped:
             result = work.not_sent(edit)
         elif (base := work.missed_base(edit)) != "":
-            text = f"{edit.code} is held back: {base}, which it builds on, was not written."
+            text = f"{edit.code} was not written: it depends on {base}, which was not written."
             result = Result(edit, EditOutcome.HELD_BACK, text, edit.old)
         elif ask_after_failure and work.missed:
-            text = f"{edit.code} is not written yet: {work.missed[0]} failed before it."
+            text = f"{edit.code} was not written yet, because {work.missed[0]} failed before it."
             result = Result(edit, EditOutcome.WAITS, text, edit.old)
         elif edit.code in reported:
             result = Result(edit, EditOutcome.REFUSED, reported[edit.code], edit.old)
@@ -149,7 +149,7 @@ class _Work:
             return await self._after_a_lost_answer(edit, error)
         except LineError as error:
             self.stopped = str(error)
-            return Result(edit, EditOutcome.UNKNOWN, f"Whether {edit.code} was written: {error}")
+            return self._unknown(edit, error)
 
     async def _reason_against(self, edit: Edit) -> Result | None:
         """Return why the edit must not be written, by fresh values; None if it may."""
@@ -162,8 +162,8 @@ class _Work:
         wanted = [edit.code, *([option.code] if option else [])]
         raws = await retrying.ask_raws(self._with_sources(wanted))
         if option is not None and raws.get(option.code) != option.factory:
-            text = f"{edit.code} is not written: {option.code} does not read {option.factory}, so"
-            text += " another option is fitted, to which it means something else."
+            text = f"{edit.code} was not written: {option.code} is not {option.factory}. So another"
+            text += f" option is fitted, for which {edit.code} has another meaning."
             return Result(edit, EditOutcome.REFUSED, text, edit.old)
         held = raws.get(edit.code)
         if held is None:
@@ -171,14 +171,14 @@ class _Work:
             return Result(
                 edit,
                 EditOutcome.REFUSED,
-                f"{edit.code} cannot be read, so it is not written: {message}",
+                f"{edit.code} was not written, because it cannot be read: {message}",
             )
         if held == edit.new and self._means(edit):
             unsaved = self.session.unsaved
             if profile[edit.code].storage == "ram-until-saved" and edit.code not in unsaved:
                 # written by another source: whether it is saved is not known
                 self.session.unsaved_settings.note_write(edit.code, None, held)
-            return Result(edit, EditOutcome.DONE, f"{edit.code} holds {edit.text} already.", held)
+            return Result(edit, EditOutcome.DONE, f"{edit.code} already holds {edit.text}.", held)
         if not self._means(edit) or (edit.old is not None and held != edit.old):
             return Result(edit, EditOutcome.CHANGED, self._changed_text(edit, held), held)
         return None
@@ -199,10 +199,13 @@ class _Work:
         )
         if parameter.scale_by is not None and not self._means(edit):
             source = parameter.scale_by.parameter
-            return f"{edit.code} was not written: its scale {source} was changed meanwhile."
+            return (
+                f"{edit.code} was not written: {source}, which sets its scale, has changed. Check"
+                " the value, and apply again."
+            )
         return (
-            f"{edit.code} was not written: it was {edit.old_text} and is now {now.display},"
-            " changed meanwhile. It stays staged; apply again to overwrite it."
+            f"{edit.code} was not written: another source changed it from {edit.old_text} to"
+            f" {now.display}. It stays staged; apply again to overwrite it."
         )
 
     async def _write(self, edit: Edit) -> Result:
@@ -241,22 +244,28 @@ class _Work:
             held = (await self.retrying.ask_raws([edit.code])).get(edit.code)
         except LineError as later:
             self.stopped = str(later)
-            return Result(edit, EditOutcome.UNKNOWN, f"Whether {edit.code} was written: {later}")
+            return self._unknown(edit, later)
         if held is not None:
             self.session.unsaved_settings.note_value(edit.code, held)
         if held == edit.new:
-            text = f"{edit.code}: {edit.old_text} -> {edit.text} (its answer was lost)"
+            text = f"{edit.code}: {edit.old_text} -> {edit.text} (verified; the reply was lost)"
             return Result(edit, EditOutcome.DONE, text, held)
         if isinstance(error, LineLost):
             text = f"{edit.code} was not written: {strip_outcome_note(error)}"
             return Result(edit, EditOutcome.NOT_SENT, text, held)
-        silent = " This family refuses by silence." if not self._refuses_aloud else ""
+        silent = "" if self._has_exceptions else " This family does not answer what it refuses."
         why = f"{strip_outcome_note(error)}{silent} The drive is {self.retrying.headline}."
-        text = f"{edit.code} was not taken: {why}"
+        text = f"{edit.code} was not accepted: {why}"
         return Result(edit, EditOutcome.NOT_TAKEN, text, held)
 
+    @staticmethod
+    def _unknown(edit: Edit, error: LineError) -> Result:
+        why = strip_outcome_note(error)
+        text = f"{edit.code} may have been written: {why} Read it before you write it again."
+        return Result(edit, EditOutcome.UNKNOWN, text)
+
     @property
-    def _refuses_aloud(self) -> bool:
+    def _has_exceptions(self) -> bool:
         return bool(self.session.profile.data.exceptions)
 
     def summary(self) -> Applied:

@@ -184,7 +184,7 @@ class Editor:
         """Clear the lists of values that wait for a reset or for saving."""
         if self.waits_for_reset or self.unsaved:
             lost = ", ".join(sorted(self.unsaved))
-            gone = f" Not saved before, so look at: {lost}." if lost else ""
+            gone = f" These settings were not saved, so check them: {lost}." if lost else ""
             self._say(f"The drive was reset or switched off.{gone}", OutcomeKind.DONE)
         self.waits_for_reset = set()
         self.session.unsaved_settings.clear()
@@ -220,7 +220,7 @@ class Editor:
         """Queue work on the drive; report a refusal as the outcome."""
         queue = self.session.work
         if queue.busy:
-            self._say("Another command is still being carried out.", OutcomeKind.REFUSED)
+            self._say("Another command is in progress. Wait until it ends.", OutcomeKind.REFUSED)
             return
         try:
             queue.put(Task(work, owner=self, given_up=given_up), stamp)
@@ -234,11 +234,11 @@ class Editor:
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
     """Describe the result of all edits, and the edits that stay staged."""
     done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
-    parts = [f"Wrote {done}, all verified" if done else "Nothing written"]
+    parts = [f"Wrote {done}, all verified." if done else "Nothing written."]
     if left := list(dict.fromkeys((*failed, *staged))):
         more = f" and {len(left) - LEFT_NAMED} more" if len(left) > LEFT_NAMED else ""
-        parts.append(f"{len(left)} still staged: {', '.join(left[:LEFT_NAMED])}{more}")
+        parts.append(f"{len(left)} still staged: {', '.join(left[:LEFT_NAMED])}{more}.")
     parts += [link.text for link in applied.links]
     if applied.after_reset:
-        parts.append(f"in force after a reset of the drive: {', '.join(applied.after_reset)}")
-    return "; ".join(parts)
+        parts.append(f"Takes effect after a reset of the drive: {', '.join(applied.after_reset)}.")
+    return " ".join(parts)

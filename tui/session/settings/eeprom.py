@@ -69,8 +69,8 @@ async def _carry_out(
     parameter = profile[order.parameter]
     if not is_verified(parameter) and parameter.code not in confirmed:
         raise MemoryRefused(
-            f"{parameter.code} of {profile.name} is unverified: it is known from a sister family"
-            " only. Confirm it once to use it."
+            f"{parameter.code} of {profile.name} is unverified: only a manual of a sister family"
+            " describes it. Confirm it once to use it."
         )
     retrying = RetryingReader(session)
     await _check(retrying, order)
@@ -79,7 +79,8 @@ async def _carry_out(
         held = (await retrying.ask_raws([order.parameter])).get(order.parameter)
         if held is None:
             raise MemoryRefused(
-                f"{order.parameter} cannot be read: {retrying.why_absent(order.parameter)}"
+                f"Nothing was written, because {order.parameter} cannot be read:"
+                f" {retrying.why_absent(order.parameter)}"
             )
         word |= held & 0xFFFF & ~order.raw
     raw = from_words(parameter, [word])
@@ -99,18 +100,21 @@ async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
     """Raise MemoryRefused unless the drive is known to be at rest, and has settings to recall."""
     state = await retrying.ask_state()
     if state not in AT_REST:
-        raise MemoryRefused(f"This needs the motor stopped; the drive is now {retrying.headline}.")
+        raise MemoryRefused(
+            f"Nothing was written: the drive is {retrying.headline}. Stop the motor first."
+        )
     status = retrying.session.profile.quantity("extended_status_word")
     if order.at_rest_mask and status is not None:
         word = (await retrying.ask_raws([status.code])).get(status.code)
         if word is None or word & order.at_rest_mask:
             raise MemoryRefused(
-                f"This needs the motor without current; {status.code} does not say so."
+                f"Nothing was written: the motor must be without current, and {status.code} does"
+                " not report that."
             )
     if order.groups and not (await retrying.ask_raws([order.groups])).get(order.groups):
         raise MemoryRefused(
-            f"{order.groups} selects no group of settings, so the drive would recall nothing."
-            " Select the groups at its keypad, in the menu of factory settings."
+            f"{order.groups} selects no group of settings, so the drive would restore nothing."
+            " Select the groups on its keypad, in the menu of factory settings."
         )
 
 
@@ -135,8 +139,8 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
             return
         await retrying.session.clock.sleep(SAVE_POLL_INTERVAL)
     raise MemoryRefused(
-        f"The drive is not done after {SAVING_LONGEST:g} s: look at its display, and read"
-        f" {order.parameter} before anything is written."
+        f"The drive has not finished after {SAVING_LONGEST:g} s. Check its display, and read"
+        f" {order.parameter} before you write anything."
     )
 
 
@@ -167,8 +171,8 @@ async def _report(session: DriveSession, retrying: RetryingReader) -> str:
         for p in held
         if not_factory(profile, p, raws, retrying.lacking)
     ]
-    text = f"{profile.name}: the factory settings are recalled in working memory"
+    text = f"{profile.name}: the factory settings are restored in working memory."
     if not other:
-        return f"{text}; {len(held)} settings were looked at."
+        return f"{text} Checked {len(held)} settings; all have their factory value."
     names = ", ".join(other[:SETTINGS_NAMED]) + (", ..." if len(other) > SETTINGS_NAMED else "")
-    return f"{text}; {len(other)} of {len(held)} hold another value: {names}."
+    return f"{text} {len(other)} of {len(held)} settings have another value: {names}."

@@ -173,13 +173,17 @@ class Mark:
             return ""
         begun, of, taken = (str(reported[key])[:60] for key in ("begun", "parameters", "set"))
         return (
-            f"A restoring of {of} settings (set of {taken}) began at {begun} and did not"
-            " finish. The drive is read, and missing values are written."
+            f"A restore of {of} settings (parameter set of {taken}) began at {begun} and did not"
+            " finish. The drive is read, and the missing values are written."
         )
 
     def begin(self, source: ParameterSet, count: int) -> None:
         """Create the mark; an error of the folder does not stop the restore."""
-        reported = {"begun": now_text(), "parameters": count, "set": source.head.time or "no time"}
+        reported = {
+            "begun": now_text(),
+            "parameters": count,
+            "set": source.head.time or "unknown time",
+        }
         with suppress(OSError):
             store_json(self.path, reported)
 

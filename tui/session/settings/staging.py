@@ -57,7 +57,7 @@ class Staging:
 
     def _staged(self, code: str, edits: Edits) -> str:
         if self.busy():
-            raise ValueRefused("Something is being written; wait until that is done.")
+            raise ValueRefused("Not staged: a write is in progress. Wait until it ends.")
         self.edits = edits
         self.results.pop(code, None)
         edit = edits.get(code)
@@ -78,7 +78,7 @@ class Staging:
                 self.stage_raw(code, old)
                 staged += 1
         if not olds:
-            return "Nothing is staged, and no old value is known that could be."
+            return "Nothing is staged: no old values are known."
         return f"{staged} {'old value is' if staged == 1 else 'old values are'} staged."
 
     def undo_all(self) -> None:

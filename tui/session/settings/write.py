@@ -79,8 +79,8 @@ class Writer:
             if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
                 answer = "holds another value"
                 raise NotTaken(
-                    f"{code}: written {raw_text(self.session, parameter, raw)}, the drive holds"
-                    f" {raw_text(self.session, parameter, back)}."
+                    f"{code} was written as {raw_text(self.session, parameter, raw)}, but the drive"
+                    f" holds {raw_text(self.session, parameter, back)}."
                 )
         except (RequestRefused, Superseded) as error:
             answer, sent = str(error), False
@@ -131,7 +131,7 @@ class Writer:
 
     def _complete(self, entry: Entry, parameter: Parameter, check: int, back: int) -> None:
         taken = not (back ^ entry.new_raw) & check & 0xFFFFFFFF
-        came = f"{'Taken' if taken else 'Not taken'}: it" if check else "It"
+        came = f"{'Accepted' if taken else 'Not accepted'}: it" if check else "It"
         answer = f"{came} holds {raw_text(self.session, parameter, back)}, read back later."
         self.journal.add(
             replace(
@@ -179,7 +179,7 @@ class Writer:
         return back
 
 
-CUT_SHORT = "a stop came: not known whether it was taken"
+CUT_SHORT = "canceled by a stop, may have taken effect"
 """Journal text of a write that was canceled before its reply."""
 
 
@@ -224,10 +224,10 @@ def device_refusal(
     known = next((e for e in profile.data.exceptions if e.code == error.code), None)
     if known is None:
         message = f"exception {error.code}, which no document of this family explains"
-        return f"{parameter.code}: the drive refused with {message}. The drive is {headline}."
+        return f"The drive refused {parameter.code} with {message}. The drive is {headline}."
     meaning = _sentence(known.meaning)
     next_step = _sentence(known.remedy)
-    text = f"{parameter.code}: the drive refused with exception {known.code}, {known.name}."
+    text = f"The drive refused {parameter.code} with exception {known.code}, {known.name}."
     return f"{text} {meaning} The drive is {headline}. {next_step}".strip()
 
 

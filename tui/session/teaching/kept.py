@@ -98,8 +98,9 @@ def load_taught(drive: TaughtDrive) -> TaughtLooks:
         return _looks_in(json.loads(read_small_text(path, LONGEST)))
     except (OSError, ValueError, RecursionError, ValueRefused) as error:
         raise TaughtUnreadable(
-            f"The taught scales of this drive cannot be read, {path}: {_reason(error)}. Nothing"
-            " taught is used. Fix the file, or teach again: it is kept beside the new one."
+            f"The learned scales of this drive are not used: {path} cannot be read"
+            f" ({_reason(error)}). Fix the file, or teach the scales again. The damaged file is"
+            " then kept under another name."
         ) from error
 
 
@@ -124,8 +125,8 @@ def keep_taught(drive: TaughtDrive, kept: TaughtLooks) -> None:
                 part.unlink(missing_ok=True)
     except OSError as error:
         raise TaughtNotKept(
-            f"What was taught is used until this program ends, and not kept: {path} cannot be"
-            f" written ({error.strerror or error})."
+            f"The learned scales are lost when this program ends: {path} cannot be written"
+            f" ({error.strerror or error})."
         ) from error
 
 
@@ -163,7 +164,7 @@ def _looks_in(reported: object) -> TaughtLooks:
         raise ValueRefused("it is not a table")
     looks, reference = reported.get("looks"), reported.get("reference", "")
     if not isinstance(looks, dict) or not isinstance(reference, str):
-        raise ValueRefused("it has no looks")
+        raise ValueRefused("`looks` or `reference` is missing or wrong")
     return TaughtLooks({_code(c): _looks_of(c, listed) for c, listed in looks.items()}, reference)
 
 
@@ -184,7 +185,7 @@ def _look(code: str, reported: object) -> DisplayLook:
         (reported.get("raw"), reported.get("shown")) if isinstance(reported, dict) else (None, None)
     )
     if type(word) is not int or not 0 <= word <= 0xFFFF or not isinstance(shown, str):
-        raise ValueRefused(f"a look at {code} has no raw word and what was shown")
+        raise ValueRefused(f"a reading of {code} lacks its raw word or the displayed value")
     return DisplayLook(word, *parse_display(shown))
 
 

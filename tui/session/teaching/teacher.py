@@ -109,7 +109,7 @@ class Teacher:
             if why := why_no_reference(self.family, code, self._taught_scales()):
                 raise ValueRefused(why)
             self._change({}, code)
-        return f"{code} takes the reference, in {self.scales[code].unit}."
+        return f"{code} now takes the reference, in {self.scales[code].unit}."
 
     def drop_reference(self) -> None:
         """Stop using a taught parameter for the reference."""
@@ -171,9 +171,10 @@ def reference_asks(family: Profile, code: str) -> str:
     if way is not None and way.bits:
         word = family.quantity("command_word")
         bits = " and ".join(f"bit {bit}" for bit in range(16) if way.bits >> bit & 1)
-        chooses = f" Each command to run then sets {bits} of {word.code if word else 'the word'}."
+        word_name = word.code if word else "the command word"
+        chooses = f" Each run command then sets {bits} of {word_name}."
     note = f" {way.note}" if way is not None and way.note else ""
     return (
-        f"No manual at hand says that {code} gives this drive its reference.{chooses}{note} Try it"
-        " first where the motor may turn at any speed, with the stop at hand."
+        f"No available manual says that {code} takes this drive's reference.{chooses}{note} First"
+        " try it where the motor may turn at any speed, and be ready to stop it."
     )
