@@ -106,7 +106,7 @@ DEFECTS = (
         "-float(shares[setting]) / cost,\n            -setting.baud,",
         "-float(shares[setting]),\n            setting.baud,",
         "A search over all settings spends its first minute at 300 baud.",
-        (f"{FAMILIES}::test_of_two_that_are_as_likely_the_faster_comes_first",),
+        (f"{FAMILIES}::test_faster_of_two_equally_likely_settings_comes_first",),
     ),
     Defect(
         "other-settings-unasked",

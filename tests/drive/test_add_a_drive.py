@@ -34,7 +34,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_the_example_is_found_loaded_and_decodes(folder: Path) -> None:
+def test_example_profile_is_found_loaded_and_decodes(folder: Path) -> None:
     (folder / "my-pump.toml").write_text(example(), encoding="utf-8")
     (listing,) = [item for item in library.listings() if item.own]
     assert (listing.id, listing.name, listing.parameters) == (
@@ -61,7 +61,7 @@ def test_packaged_profiles_stay_in_the_list(folder: Path) -> None:
     assert {item.id for item in library.listings()} == before | {"example-pump"}
 
 
-def test_an_own_profile_takes_the_place_of_a_packaged_one(folder: Path) -> None:
+def test_own_profile_replaces_a_packaged_one(folder: Path) -> None:
     text = example().replace('id = "example-pump"', 'id = "atv21"')
     (folder / "mine.toml").write_text(text, encoding="utf-8")
     (listing,) = [item for item in library.listings() if item.id == "atv21"]
@@ -82,7 +82,7 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "reported"), BROKEN)
-def test_a_fault_is_reported_with_its_line(
+def test_profile_error_is_reported_with_its_line(
     folder: Path, right: str, wrong: str, reported: str
 ) -> None:
     text = example()
@@ -95,7 +95,7 @@ def test_a_fault_is_reported_with_its_line(
     assert re.search(r"my-pump\.toml:[1-9]\d*: ", str(caught.value))
 
 
-def test_the_document_names_every_table_field_and_mark() -> None:
+def test_page_names_every_table_field_and_mark() -> None:
     text = README.read_text("utf-8")
     tables = [field.name for field in msgspec.structs.fields(ProfileData)]
     assert [t for t in tables if f"`[{t}]`" not in text and f"`[[{t}]]`" not in text] == []
@@ -104,7 +104,7 @@ def test_the_document_names_every_table_field_and_mark() -> None:
     assert [mark for mark in get_args(Confidence) if f"`{mark}`" not in text] == []
 
 
-def test_the_document_names_every_packaged_profile() -> None:
+def test_page_names_every_packaged_profile() -> None:
     text = README.read_text("utf-8")
     files = sorted(path.name for path in library.packaged_folder().glob("*.toml"))
     assert files

@@ -73,7 +73,7 @@ def held(profile: Profile, raws: dict[str, int]) -> str:
 
 @pytest.mark.parametrize("family", SMALL)
 @pytest.mark.parametrize(("raws", "command", "reference"), CASES, ids=NAMES)
-def test_the_channel_that_counts_is_reported(
+def test_channel_in_force_is_reported(
     family: str, raws: dict[str, int], command: str, reference: str
 ) -> None:
     profile, held_raws = library.load(family), IDLE | raws
@@ -98,7 +98,7 @@ def test_allowed_and_refused_commands_never_contradict(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", SMALL)
-def test_forced_local_goes_before_every_channel(family: str) -> None:
+def test_forced_local_overrides_every_channel(family: str) -> None:
     profile = library.load(family)
     raws = IDLE | {"ETA": 0x0040}
     assert read_chart(profile, raws).channel == "Terminals, forced local"
@@ -106,7 +106,7 @@ def test_forced_local_goes_before_every_channel(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", SMALL)
-def test_below_access_level_3_the_drive_itself_tells(family: str) -> None:
+def test_channels_below_access_level_3_are_reported_by_the_drive(family: str) -> None:
     profile = library.load(family)
     raws = IDLE | {"LAC": 0, "ETI": 0x4000, "Fr1": AI1}
     assert read_chart(profile, raws).channel == "Modbus"
@@ -115,7 +115,7 @@ def test_below_access_level_3_the_drive_itself_tells(family: str) -> None:
 
 @pytest.mark.parametrize("family", SMALL)
 @pytest.mark.parametrize("code", ["LRS3", "rFC", "Fr1", "CHCF"])
-def test_a_word_that_was_not_read_and_decides_holds_a_start_back(family: str, code: str) -> None:
+def test_unread_word_that_decides_blocks_a_start(family: str, code: str) -> None:
     profile = library.load(family)
     raws = {c: raw for c, raw in (IDLE | {"rFC": LI4}).items() if c != code}
     found = command_channel(profile, raws)
@@ -129,7 +129,7 @@ def test_a_word_that_was_not_read_and_decides_holds_a_start_back(family: str, co
     [(0x08, "Modbus", True), (0x01, "Terminals", False), (0x40, "CANopen", False)],
 )
 @pytest.mark.parametrize("profile_id", [1, 2, 3])
-def test_an_altivar_71_tells_its_channels_itself(
+def test_altivar_71_reports_its_channels(
     word: int, who: str, by_line: bool, profile_id: int
 ) -> None:
     profile = library.load("atv71")
@@ -152,7 +152,7 @@ def test_possible_channel_changes_are_reported() -> None:
     assert any("Cd1 and Cd2" in text for text in switch_texts(profile, raws | {"CHCF": SEPARATE}))
 
 
-def test_every_channel_parameter_of_the_manuals_counts() -> None:
+def test_every_channel_parameter_of_the_manuals_is_used() -> None:
     small = {"CHCF", "COP", "rFC", "Fr1", "Fr2", "CCS", "Cd1", "Cd2", "FLO", "LRS3"}
     assert small <= set(channel_codes(library.load("atv31")))
     assert small <= set(channel_codes(library.load("atv312")))

@@ -30,7 +30,7 @@ FIXED = {"RFC": 96, "CCS": 98, "RCB": 96}
 
 
 @pytest.mark.parametrize(("family", "id"), MANUAL)
-def test_a_configuration_sets_what_its_manual_says(family: str, id: str) -> None:
+def test_configuration_sets_the_values_of_its_manual(family: str, id: str) -> None:
     sources = {source.id: source for source in library.load(family).data.control_sources}
     settings = {setting.parameter: setting.value for setting in sources[id].settings}
     assert settings.items() >= MANUAL[family, id].items()
@@ -40,7 +40,7 @@ def test_a_configuration_sets_what_its_manual_says(family: str, id: str) -> None
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_configuration_is_known_again_and_leaves_nothing_to_write(family: str) -> None:
+def test_written_configuration_is_recognized(family: str) -> None:
     profile = library.load(family)
     assert profile.data.control_sources
     for source in profile.data.control_sources:
@@ -51,7 +51,7 @@ def test_a_configuration_is_known_again_and_leaves_nothing_to_write(family: str)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_value_of_a_configuration_may_be_written(family: str) -> None:
+def test_every_value_of_a_configuration_is_writable(family: str) -> None:
     profile = library.load(family)
     for source in profile.data.control_sources:
         for setting in source.settings:
@@ -61,14 +61,14 @@ def test_every_value_of_a_configuration_may_be_written(family: str) -> None:
             check_raw(parameter, setting.value, profile.names(parameter), None)
 
 
-def test_of_two_that_fit_the_one_that_says_more_counts() -> None:
+def test_more_specific_configuration_is_preferred() -> None:
     profile = library.load("atv21")
     found = source_in_force(profile, {"CMOD": 0, "FMOD": 1, "F112": 48})
     assert found is not None
     assert found.id == "input"
 
 
-def test_an_unread_word_fits_nothing() -> None:
+def test_unread_word_matches_no_configuration() -> None:
     profile = library.load("atv21")
     assert source_in_force(profile, {"CMOD": 2}) is None
     unread = source_changes(profile, profile.data.control_sources[0], {"CMOD": 2})

@@ -15,7 +15,7 @@ from tui.session.shown import Quality
 @pytest.mark.parametrize("family", ["atv31", "atv312"])
 @pytest.mark.parametrize("code", ["Otr", "OPr"])
 @pytest.mark.parametrize(("word", "text"), [(63536, "-2000 %"), (0xFFFF, "-1 %"), (85, "85 %")])
-def test_torque_and_power_that_the_motor_gives_back_are_negative(
+def test_regenerated_torque_and_power_are_negative(
     family: str, code: str, word: int, text: str
 ) -> None:
     profile = library.load(family)
@@ -25,7 +25,7 @@ def test_torque_and_power_that_the_motor_gives_back_are_negative(
 
 @pytest.mark.parametrize("code", ["FE18", "FE20", "FE21"])
 @pytest.mark.parametrize(("word", "text"), [(32767, "327.67"), (32768, "327.68?"), (0, "0.00")])
-def test_above_32767_it_is_marked(code: str, word: int, text: str) -> None:
+def test_value_above_32767_is_marked(code: str, word: int, text: str) -> None:
     profile = library.load("atv21")
     parameter = profile[code]
     value = shown(profile, parameter, from_words(parameter, [word]), {})

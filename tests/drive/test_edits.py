@@ -32,7 +32,7 @@ def test_typed_value_is_staged_and_rounding_reported() -> None:
     assert HELD["ACC"] == 30
 
 
-def test_the_held_value_is_no_edit() -> None:
+def test_typing_the_current_value_removes_the_edit() -> None:
     edits = Edits().stage(ATV71, "ACC", "5", HELD)
     assert len(edits) == 1
     assert len(edits.stage(ATV71, "ACC", "3.0", HELD)) == 0
@@ -46,17 +46,17 @@ def test_impossible_value_is_not_staged(typed: str) -> None:
     assert [edit.code for edit in edits] == ["DEC"]
 
 
-def test_an_unknown_code_is_refused() -> None:
+def test_unknown_code_is_refused() -> None:
     with pytest.raises(UnknownParameter):
         Edits().stage(ATV71, "NOSUCH", "1", HELD)
 
 
-def test_a_scale_that_was_not_read_stages_nothing() -> None:
+def test_edit_with_an_unread_scale_is_not_staged() -> None:
     with pytest.raises(ValueRefused, match="INR"):
         Edits().stage(ATV71, "ACC", "5", {"ACC": 30})
 
 
-def test_undo_one_and_all() -> None:
+def test_undo_removes_one_edit_or_all() -> None:
     edits = Edits().stage(ATV71, "ACC", "5", HELD).stage(ATV71, "DEC", "7", HELD)
     left = edits.undo("ACC", ATV71, HELD)
     assert [edit.code for edit in left] == ["DEC"]
@@ -65,7 +65,7 @@ def test_undo_one_and_all() -> None:
     assert len(Edits()) == 0
 
 
-def test_a_ramp_keeps_its_engineering_value_when_its_scale_is_edited() -> None:
+def test_ramp_keeps_its_engineering_value_when_its_scale_is_edited() -> None:
     edits = Edits().stage(ATV71, "ACC", "5 s", HELD)
     assert edits.get("ACC") is not None
     for typed, raw, text in (("0.01 s", 500, "5.00 s"), ("1 s", 5, "5 s")):
@@ -78,13 +78,13 @@ def test_a_ramp_keeps_its_engineering_value_when_its_scale_is_edited() -> None:
         assert back.new == 50
 
 
-def test_a_scale_under_which_a_staged_ramp_has_no_place_is_not_staged() -> None:
+def test_scale_that_cannot_hold_a_staged_ramp_is_not_staged() -> None:
     edits = Edits().stage(ATV71, "ACC", "900 s", HELD)
     with pytest.raises(ValueRefused, match="ACC"):
         edits.stage(ATV71, "INR", "0.01 s", HELD)
 
 
-def test_ramps_that_nobody_edits_change_with_their_scale_and_that_is_reported() -> None:
+def test_unedited_ramps_that_change_with_their_scale_are_reported() -> None:
     edits = Edits().stage(ATV71, "INR", "1 s", HELD).stage(ATV71, "ACC", "4", HELD)
     reported = consequences(ATV71, edits, HELD)
     assert reported == [
@@ -95,7 +95,7 @@ def test_ramps_that_nobody_edits_change_with_their_scale_and_that_is_reported() 
     assert consequences(ATV71, Edits().stage(ATV71, "ACC", "4", HELD), HELD) == []
 
 
-def test_an_old_drive_without_a_ramp_increment_counts_in_tenths() -> None:
+def test_old_drive_without_a_ramp_increment_counts_in_tenths() -> None:
     edits = Edits().stage(ATV31, "ACC", "5", {"ACC": 30}, {"Inr"})
     assert [edit.new for edit in edits] == [50]
 
@@ -108,11 +108,13 @@ def test_an_old_drive_without_a_ramp_increment_counts_in_tenths() -> None:
         ({"HSP": "10", "TFR": "20"}, ["HSP", "TFR"]),
     ],
 )
-def test_limits_move_out_of_the_way_first(typed: Mapping[str, str], order: list[str]) -> None:
+def test_limits_are_written_before_the_values_they_block(
+    typed: Mapping[str, str], order: list[str]
+) -> None:
     assert codes(stage(ATV71, typed, HELD), ATV71, HELD) == order
 
 
-def test_lowering_begins_below() -> None:
+def test_lower_limit_is_lowered_first() -> None:
     held = {**HELD, "LSP": 300, "HSP": 500}
     assert codes(stage(ATV71, {"LSP": "5", "HSP": "10"}, held), ATV71, held) == ["LSP", "HSP"]
 
@@ -132,7 +134,7 @@ def test_mixed_edits_are_written_in_order() -> None:
     assert codes(edits, ATV31, held) == ["bFr", "LAC", "Inr", "ACC", "ttO", "tbr", "Add"]
 
 
-def test_a_value_past_another_is_reported_with_both() -> None:
+def test_value_beyond_another_parameter_is_reported_with_both() -> None:
     edits = Edits().stage(ATV71, "LSP", "55", HELD)
     reported = edit_problems(ATV71, edits, HELD)
     assert reported == {
@@ -144,19 +146,19 @@ def test_a_value_past_another_is_reported_with_both() -> None:
     assert edit_problems(ATV71, Edits().stage(ATV71, "ACC", "4", HELD), {**HELD, "LSP": 600}) == {}
 
 
-def test_values_that_the_drive_took_on_meanwhile_are_seen() -> None:
+def test_edits_are_updated_if_the_drive_already_has_the_value() -> None:
     edits = stage(ATV71, {"ACC": "5", "DEC": "7"}, HELD)
     later = edits.now(ATV71, {**HELD, "ACC": 50, "DEC": 10})
     assert [(edit.code, edit.old, edit.new) for edit in later] == [("DEC", 10, 70)]
 
 
-def test_switching_the_watch_off_carries_a_warning() -> None:
+def test_disabling_the_timeout_has_a_warning() -> None:
     edits = Edits().stage(ATV21, "F803", "0", {"F803": 3})
     assert "watch" in edits.items[0].warning
     assert "watch" in edits.items[0].remark
 
 
-def test_which_words_cut_the_line() -> None:
+def test_settings_that_end_the_connection_are_known() -> None:
     assert cuts_line(ATV21, ATV21["F802"])
     assert not cuts_line(ATV21, ATV21["F800"])
     assert cuts_line(ATV71, ATV71["ADD"])
@@ -192,7 +194,7 @@ rising = st.lists(st.integers(100, 599), min_size=3, max_size=3).map(sorted)
 @given(
     family=st.sampled_from(sorted(SPEEDS)), old=rising, new=rising, take=st.permutations(range(3))
 )
-def test_every_value_is_held_at_the_end(
+def test_write_order_ends_with_every_value_set(
     family: str, old: list[int], new: list[int], take: list[int]
 ) -> None:
     """Whatever the values are, and in whatever order they were staged."""
@@ -214,7 +216,7 @@ def test_every_value_is_held_at_the_end(
     last=st.sampled_from(["0.01 s", "0.1 s", "1 s"]),
     scale_first=st.booleans(),
 )
-def test_a_ramp_is_what_was_typed_in_the_end(
+def test_ramp_and_scale_end_as_typed(
     seconds: Decimal, first: str, last: str, scale_first: bool
 ) -> None:
     """Within half a count of the last scale, whenever the scales were edited."""
@@ -233,7 +235,7 @@ def test_a_ramp_is_what_was_typed_in_the_end(
 
 
 @given(data=st.data())
-def test_the_order_loses_nothing_and_doubles_nothing(data: st.DataObject) -> None:
+def test_write_order_contains_each_edit_once(data: st.DataObject) -> None:
     profile = data.draw(st.sampled_from([ATV31, ATV312, ATV71, ATV21]))
     writable = [
         p for p in profile.parameters if p.access.startswith("rw") and p.factory is not None
@@ -263,7 +265,7 @@ def codes(edits: Edits, profile: Profile, held: Mapping[str, int]) -> list[str]:
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312", "atv71"])
-def test_a_lost_line_is_never_made_to_go_unnoticed(family: str) -> None:
+def test_ignoring_communication_loss_is_never_written(family: str) -> None:
     profile = library.load(family)
     watch = profile.data.communication_fault
     assert watch is not None

@@ -28,7 +28,7 @@ FAMILIES = (*ALTIVARS, "atv21", "powerdrive", "proxidrive", "varmeca")
     ("code", "at_50", "at_60"),
     [("HSP", 500, 600), ("tFr", 600, 720), ("FrS", 500, 600), ("Ftd", 500, 600)],
 )
-def test_a_factory_setting_follows_the_mains_standard(code: str, at_50: int, at_60: int) -> None:
+def test_factory_setting_follows_the_mains_standard(code: str, at_50: int, at_60: int) -> None:
     setting = ATV31[code]
     assert factory_raw(ATV31, setting, {"bFr": 0}) == at_50
     assert factory_raw(ATV31, setting, {"bFr": 1}) == at_60
@@ -38,7 +38,7 @@ def test_a_factory_setting_follows_the_mains_standard(code: str, at_50: int, at_
     assert not not_factory(ATV31, setting, {code: at_50 + 1}), "nobody knows while bFr is not read"
 
 
-def test_a_factory_setting_follows_the_rated_current() -> None:
+def test_factory_setting_follows_the_rated_current() -> None:
     raws = {"INV": 48}
     assert factory_raw(ATV31, ATV31["CLI"], raws) == 72
     assert factory_raw(ATV31, ATV31["IdC"], raws) == 33  # 33.6
@@ -48,7 +48,7 @@ def test_a_factory_setting_follows_the_rated_current() -> None:
     assert not_factory(ATV31, ATV31["IdC"], {**raws, "IdC": 35})
 
 
-def test_a_ramp_left_the_factory_with_the_scale_of_the_factory() -> None:
+def test_factory_ramp_uses_the_factory_scale() -> None:
     acc = ATV31["ACC"]
     fine = {"Inr": 0}  # 0.01 s a count now
     value = factory_value(ATV31, acc, fine)
@@ -59,12 +59,12 @@ def test_a_ramp_left_the_factory_with_the_scale_of_the_factory() -> None:
     assert not not_factory(ATV31, acc, {"ACC": 31}), "its scale is not known"
 
 
-def test_value_set_by_drive_is_not_foreign() -> None:
+def test_value_set_by_the_drive_is_not_a_foreign_change() -> None:
     assert not not_factory(ATV31, ATV31["tUn"], {"tUn": 113})
     assert not not_factory(ATV71, ATV71["TUN"], {"TUN": 2})
 
 
-def test_a_factory_setting_of_a_sister_family_keeps_its_mark() -> None:
+def test_factory_setting_from_a_sister_family_keeps_its_mark() -> None:
     assert factory_is_sure(ATV31["HSP"])
     assert not factory_is_sure(ATV71["HSP"])
     assert factory_is_sure(ATV71["TFR"])
@@ -76,7 +76,7 @@ def test_a_factory_setting_of_a_sister_family_keeps_its_mark() -> None:
     assert reported["TFR"] == ("60.0 Hz", "")
 
 
-def test_a_drive_at_60_hertz_is_compared_with_its_own_factory_settings() -> None:
+def test_drive_at_60_hertz_is_compared_with_its_own_factory_settings() -> None:
     drive = ParameterSet(SetHead("atv31"), {"bFr": 1, "HSP": 600, "INV": 48, "CLI": 72, "tUn": 113})
     compared = compare_settings(ATV31, factory_side(ATV31, drive), side_of("now", drive))
     assert [row.code for row in compared] == ["bFr"]
@@ -92,7 +92,7 @@ def test_a_drive_at_60_hertz_is_compared_with_its_own_factory_settings() -> None
         ("LSP", "51 Hz", "above HSP = 50.0 Hz"),
     ],
 )
-def test_a_value_past_a_limit_of_another_parameter_is_refused(
+def test_value_beyond_a_limit_of_another_parameter_is_refused(
     code: str, typed: str, reported: str
 ) -> None:
     held = {"INV": 48, "ItH": 48, "tA1": 10, "tA2": 10, "HSP": 500, "LSP": 0, "tFr": 600}
@@ -101,12 +101,12 @@ def test_a_value_past_a_limit_of_another_parameter_is_refused(
 
 
 @pytest.mark.parametrize("typed", ["0.9 A", "7.2 A"])
-def test_the_limit_itself_is_taken(typed: str) -> None:
+def test_value_at_the_limit_is_accepted(typed: str) -> None:
     held = {"INV": 48, "ItH": 48}
     assert edit_problems(ATV31, Edits().stage(ATV31, "ItH", typed, held), held) == {}
 
 
-def test_a_limit_of_a_sister_family_says_so() -> None:
+def test_limit_from_a_sister_family_is_marked() -> None:
     held = {"INV": 48, "ITH": 48}
     edits = Edits().stage(ATV71, "ITH", "0.5 A", held)
     assert "no document of this family states" in edit_problems(ATV71, edits, held)["ITH"]
@@ -124,7 +124,7 @@ def test_limit_source_is_read_before_a_write() -> None:
     assert limit_sources(ATV31, ["HSP"]) == {"LSP", "tFr"}
 
 
-def test_of_two_that_share_a_sum_the_one_that_shrinks_is_written_first() -> None:
+def test_values_with_a_common_sum_are_written_smaller_first() -> None:
     held = {"tA1": 10, "tA2": 90}
     edits = Edits().stage(ATV31, "tA1", "60", held).stage(ATV31, "tA2", "40", held)
     assert [edit.code for edit in ordered(ATV31, edits, held)] == ["tA2", "tA1"]
@@ -137,7 +137,7 @@ def test_of_two_that_share_a_sum_the_one_that_shrinks_is_written_first() -> None
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_start_up_keeps_the_order_of_its_steps(family: str) -> None:
+def test_start_up_keeps_the_order_of_its_steps(family: str) -> None:
     profile = library.load(family)
     codes = start_up_codes(profile)
     assert rows(FilterContext(profile), "start-up") == codes
@@ -145,7 +145,7 @@ def test_a_start_up_keeps_the_order_of_its_steps(family: str) -> None:
     assert all(profile.get(code) is not None for code in codes)
 
 
-def test_start_ups_begin_with_what_changes_other_settings() -> None:
+def test_start_up_begins_with_settings_that_change_others() -> None:
     codes = start_up_codes(ATV31)
     assert codes[:4] == ["bFr", "UnS", "FrS", "nCr"]
     assert codes.index("tFr") < codes.index("LSP") < codes.index("HSP") < codes.index("ACC")
@@ -163,5 +163,5 @@ FACTORY = [
 
 
 @pytest.mark.parametrize(("family", "code", "raw"), FACTORY)
-def test_factory_settings(family: str, code: str, raw: int) -> None:
+def test_factory_settings_are_those_of_the_manual(family: str, code: str, raw: int) -> None:
     assert library.load(family)[code].factory == raw

@@ -55,7 +55,7 @@ def test_every_family_has_its_sections(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_pin_rule_command_and_erratum_stands_on_the_page(family: str) -> None:
+def test_page_has_every_pin_rule_command_and_erratum(family: str) -> None:
     data = library.load(family).data
     page = text_of(family)
     reported = [
@@ -84,13 +84,13 @@ WARNED = [
 
 
 @pytest.mark.parametrize(("family", "text"), WARNED)
-def test_the_warnings_of_the_manuals(family: str, text: str) -> None:
+def test_page_has_the_warnings_of_the_manuals(family: str, text: str) -> None:
     assert text in text_of(family, "Warnings")
     assert all(row.warns for row in section(family, "Warnings").rows)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_no_warning_stands_twice(family: str) -> None:
+def test_no_warning_is_repeated(family: str) -> None:
     gateways = [r for r in section(family, "Warnings").rows if "gateway" in r.text]
     assert len(gateways) == 1
     texts = [row.text for row in section(family, "Warnings").rows]
@@ -121,12 +121,12 @@ WAITS = {
 
 
 @pytest.mark.parametrize("family", WAITS)
-def test_how_long_to_wait_before_it_is_opened(family: str) -> None:
+def test_page_has_the_wait_before_opening_the_drive(family: str) -> None:
     assert section(family, "Before it is opened").rows[0].text == WAITS[family]
 
 
 @pytest.mark.parametrize("family", ALTIVAR)
-def test_names_of_the_signals_across_standards(family: str) -> None:
+def test_page_has_signal_names_of_several_standards(family: str) -> None:
     rows = {row.head: row.text for row in section(family, "Names of the signals").rows}
     assert rows == {
         "D0": "EIA/TIA-485: A or A'; Uni-Telway: D(A); Jbus: RD+/TD+ or L+",
@@ -135,7 +135,7 @@ def test_names_of_the_signals_across_standards(family: str) -> None:
     }
 
 
-def test_other_servers_and_lamps_of_the_altivar_71() -> None:
+def test_page_of_altivar_71_has_other_servers_and_lamps() -> None:
     addresses = text_of("atv71", "Addresses")
     assert "AMOA another server" in addresses
     assert "AMOC another server" in addresses
@@ -150,7 +150,7 @@ def test_no_line_is_wider_than_the_page(family: str, width: int) -> None:
         assert len(line.head + line.text) <= width or line.kind == "title"
 
 
-def test_control_characters_of_a_profile_are_not_sent_to_the_terminal() -> None:
+def test_page_does_not_control_terminal() -> None:
     data = library.load("atv71").data
     bad = msgspec.structs.replace(data.wiring.warnings[0], text="a\x1b[2Jb")
     wiring = msgspec.structs.replace(data.wiring, warnings=[bad])
@@ -162,7 +162,7 @@ def test_control_characters_of_a_profile_are_not_sent_to_the_terminal() -> None:
 # Models
 
 
-def test_every_model_of_the_altivar_21_has_its_code_and_class() -> None:
+def test_altivar_21_models_have_code_and_class() -> None:
     profile = library.load("atv21")
     known = profile.data.identification
     assert model_codes(profile) == ["FB05", "FB72"]
@@ -183,7 +183,7 @@ def test_models_that_share_a_code_need_the_class() -> None:
     assert model_of(profile, {}) is None
 
 
-def test_names_of_models() -> None:
+def test_model_names_are_shortened() -> None:
     profile = library.load("atv21")
     assert model_read(profile, {"FB05": 6, "FB72": 0}) == "ATV21HU15M3X, 200 V, 1.5 kW"
     assert model_read(profile, {"FB05": 136, "FB72": 0x80}) == (
@@ -194,7 +194,7 @@ def test_names_of_models() -> None:
     assert model_read(library.load("atv312"), {"FB05": 6}) == ""
 
 
-def test_a_section_without_rows_is_left_out() -> None:
+def test_section_without_rows_is_omitted() -> None:
     data = msgspec.structs.replace(library.load("atv71").data, errata=[], line_rules=[])
     titles = [section.title for section in family_page(Profile(data))]
     assert "Where the manuals are wrong" not in titles

@@ -41,7 +41,7 @@ def test_every_fault_of_a_family_has_help(family: str) -> None:
         assert all(profile[look.code] and look.why for look in hint.look_at)
 
 
-def test_help_is_not_read_with_the_profile(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_is_loaded_separately_from_the_profile(monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
     opened = small_file.open_regular
 
@@ -57,7 +57,7 @@ def test_help_is_not_read_with_the_profile(monkeypatch: pytest.MonkeyPatch) -> N
     assert [path.name for path in read if path.parent == FOLDER] == ["atv71.toml"]
 
 
-def test_a_family_without_numbers_has_one_help_for_any_trip() -> None:
+def test_family_without_fault_numbers_has_one_help_for_any_trip() -> None:
     profile = library.load("varmeca")
     help_ = profile.guide.fault(None)
     assert help_ is not None
@@ -98,7 +98,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_wrong_help_file_is_reported_with_its_line(case: str, tmp_path: Path) -> None:
+def test_invalid_help_file_is_reported_with_its_line(case: str, tmp_path: Path) -> None:
     text, output = BROKEN[case]
     profile = library.load_file(own_drive(tmp_path, text))
     with pytest.raises(ProfileError, match=r"help/mine\.toml:\d+: ") as caught:
@@ -109,7 +109,7 @@ def test_a_wrong_help_file_is_reported_with_its_line(case: str, tmp_path: Path) 
     assert "mine.toml" in profile.guide.trouble
 
 
-def test_help_of_ones_own_beside_a_profile_of_ones_own(tmp_path: Path) -> None:
+def test_own_help_beside_an_own_profile_is_used(tmp_path: Path) -> None:
     profile = library.load_file(own_drive(tmp_path, GOOD))
     help_ = profile.guide.fault(9)
     assert help_ is not None
@@ -117,7 +117,7 @@ def test_help_of_ones_own_beside_a_profile_of_ones_own(tmp_path: Path) -> None:
     assert profile.guide.fault(5) is None
 
 
-def test_a_profile_in_the_place_of_a_packaged_one_keeps_the_help_that_fits(tmp_path: Path) -> None:
+def test_own_profile_replacing_a_packaged_one_keeps_matching_help(tmp_path: Path) -> None:
     path = own_drive(tmp_path, "", "atv312")
     whole = path.read_text("utf-8").replace('raw = 9, code = "OCF"', 'raw = 9, code = "MINE"')
     path.write_text(whole, encoding="utf-8")
@@ -126,7 +126,7 @@ def test_a_profile_in_the_place_of_a_packaged_one_keeps_the_help_that_fits(tmp_p
     assert profile.guide.fault(5) is not None
 
 
-def test_rows_in_the_profile_come_before_those_of_the_file(tmp_path: Path) -> None:
+def test_help_in_the_profile_overrides_the_help_file(tmp_path: Path) -> None:
     path = own_drive(tmp_path, GOOD)
     row = '[[faults.help]]\nraw = 9\nprobable = ["Mine"]\n\n[monitoring]\n'
     whole = path.read_text("utf-8").replace("[monitoring]\n", row, 1)
@@ -136,13 +136,13 @@ def test_rows_in_the_profile_come_before_those_of_the_file(tmp_path: Path) -> No
     assert help_.probable == ["Mine"]
 
 
-def test_the_committed_schema_of_help_is_up_to_date() -> None:
+def test_committed_schema_of_help_is_up_to_date() -> None:
     committed = (FOLDER / "help.schema.json").read_text("utf-8")
     assert committed == json_schema.schema_text("help")
     assert json.loads(committed)["$defs"]["FaultHelp"]["additionalProperties"] is False
 
 
-def test_the_drive_is_believed_before_what_is_recalled() -> None:
+def test_drive_overrides_the_general_advice() -> None:
     profile = library.load("atv71")
     help_ = profile.guide.fault(9)
     assert help_ is not None
@@ -156,7 +156,7 @@ def test_the_drive_is_believed_before_what_is_recalled() -> None:
     assert reset_text(help_, False, "x").text.startswith("Not yet")
 
 
-def test_no_way_of_reset_hides_a_motor_that_may_start() -> None:
+def test_reset_text_always_warns_of_a_motor_that_may_start() -> None:
     for way in RESETS:
         help_ = FaultHelp(raw=1, probable=["x"], reset=way)
         for ready in (None, True, False):
@@ -166,7 +166,7 @@ def test_no_way_of_reset_hides_a_motor_that_may_start() -> None:
     assert "may start it." in reset_text(by_itself, None, "x").text
 
 
-def test_the_ways_of_reset_are_those_of_the_facts() -> None:
+def test_ways_of_reset_match_the_sources() -> None:
     """Undervoltage leaves by itself: then a waiting run command starts the motor."""
     for family, raw in (("atv31", 22), ("atv312", 22), ("atv71", 22)):
         help_ = library.load(family).guide.fault(raw)
@@ -174,7 +174,7 @@ def test_the_ways_of_reset_are_those_of_the_facts() -> None:
         assert help_.reset == "by-itself", family
 
 
-def test_the_document_names_every_field_of_help() -> None:
+def test_page_names_every_field_of_help() -> None:
     text = (library.packaged_folder() / "README.md").read_text("utf-8")
     fields = {
         field.name for kind in (FaultHelp, AlarmHelp) for field in msgspec.structs.fields(kind)
@@ -183,7 +183,7 @@ def test_the_document_names_every_field_of_help() -> None:
     assert [way for way in get_args(ResetWay) if f"`{way}`" not in text] == []
 
 
-def test_the_help_files_are_named_by_a_profile() -> None:
+def test_every_help_file_belongs_to_a_profile() -> None:
     named = {p.data.faults.help_file or p.id for p in map(library.load, FAMILIES)}
     assert {path.stem for path in FOLDER.glob("*.toml")} == named
     for path in FOLDER.glob("*.toml"):

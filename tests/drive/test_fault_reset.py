@@ -60,7 +60,7 @@ def test_reset_follows_by_terminals_names_the_closed_input(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", BY_LINE)
-def test_reset_follows_nothing_read_is_the_general_sentence(family: str) -> None:
+def test_reset_follows_is_general_if_nothing_was_read(family: str) -> None:
     profile = library.load(family)
     assert reset_follows(profile, {}, {}).startswith(MAY_START)
     for row in profile.data.faults.after_reset:
@@ -86,9 +86,7 @@ def test_reset_follows_2_wire_by_level_starts_the_motor() -> None:
         ("atv21", "FD06", 1, "Closed at the terminals now: F."),
     ],
 )
-def test_reset_follows_names_inputs_closed_now(
-    family: str, word: str, raw: int, expected: str
-) -> None:
+def test_reset_follows_names_closed_inputs(family: str, word: str, raw: int, expected: str) -> None:
     profile = library.load(family)
     assert word in reset_codes(profile)
     assert reset_follows(profile, {}, {word: raw}).endswith(expected)
@@ -101,7 +99,7 @@ def test_reset_follows_without_an_input_word_says_so() -> None:
 
 
 @pytest.mark.parametrize("family", BY_LINE)
-def test_no_fault_only_in_states_with_a_fault_is_empty(family: str) -> None:
+def test_fault_interlock_is_empty_without_a_fault_state(family: str) -> None:
     chart = library.load(family).data.charts[0]
     states = {state.id: no_fault(chart, state.id, state.kind, state.name) for state in chart.states}
     faults = [state.id for state in chart.states if state.kind == "fault"]

@@ -27,7 +27,7 @@ def families() -> list[Profile]:
     return [library.load(listing.id) for listing in library.listings()]
 
 
-def test_factory_settings_come_first_and_what_costs_most_last(families: list[Profile]) -> None:
+def test_settings_are_ordered_from_factory_to_slowest(families: list[Profile]) -> None:
     found = likely_settings([family.data.link for family in families], longest_turnaround(families))
     assert [str(setting) for setting in found[:3]] == ["19200 8E1", "19200 8N2", "19200 8N1"]
     assert found.index(LineSetting(9600, "8E1")) < found.index(LineSetting(38400, "8E1"))
@@ -52,13 +52,13 @@ def test_slow_settings_follow_all_likely_ones(
     )
 
 
-def test_names_in_a_sentence() -> None:
+def test_names_are_joined_in_a_sentence() -> None:
     assert names_text([]) == "none"
     assert names_text(["300"]) == "300"
     assert names_text(["300", "600", "1200"]) == "300, 600 and 1200"
 
 
-def test_of_two_that_are_as_likely_the_faster_comes_first() -> None:
+def test_faster_of_two_equally_likely_settings_comes_first() -> None:
     link = profile_of(
         link={"baud": 9600, "format": "8E1", "bauds": [300, 1200, 9600, 38400]}
     ).data.link
@@ -66,7 +66,7 @@ def test_of_two_that_are_as_likely_the_faster_comes_first() -> None:
     assert [setting.baud for setting in found] == [9600, 38400, 1200, 300]
 
 
-def test_an_empty_address_costs_its_request_and_the_turnaround() -> None:
+def test_empty_address_costs_its_request_and_the_turnaround() -> None:
     fast, slow = LineSetting(19200, "8E1"), LineSetting(300, "8N1")
     character = 11 / 19200
     assert wait_for_reply(fast, 0.010) == pytest.approx(0.010 + character)
@@ -75,12 +75,12 @@ def test_an_empty_address_costs_its_request_and_the_turnaround() -> None:
     assert wait_for_reply(slow, 0.010) == pytest.approx(4.5 * 10 / 300)
 
 
-def test_one_read_finds_every_family(families: list[Profile]) -> None:
+def test_one_probe_covers_every_family_without_function_43(families: list[Profile]) -> None:
     (probe,) = presence_probes(families)
     assert probe == PresenceProbe(1039, ("powerdrive", "proxidrive", "varmeca"))
 
 
-def test_a_family_that_meets_an_unknown_word_with_silence_is_requested_who_it_is() -> None:
+def test_family_silent_at_unknown_words_is_identified() -> None:
     functions = [{"code": 3, "name": "Read"}, {"code": 43, "name": "Identify"}]
     mute = profile_of(functions=functions, reading={"unknown_exception": None})
     assert presence_probes([mute]) == (PresenceProbe(None),)

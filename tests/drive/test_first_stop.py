@@ -33,7 +33,7 @@ def word(address: int, raws: dict[int, int], way: OrderId = "stop", *named: str)
 
 
 @pytest.mark.parametrize("stop_profile", FACTS, ids=lambda item: item.id)
-def test_quick_head_equals_full_profile(stop_profile: StopProfile) -> None:
+def test_stop_profile_equals_the_full_profile(stop_profile: StopProfile) -> None:
     profile = library.load(stop_profile.id)
     assert stop_profile.charts == tuple(profile.data.charts)
     assert stop_profile.names_itself is (profile.function(43) is not None)
@@ -47,7 +47,7 @@ def test_quick_head_equals_full_profile(stop_profile: StopProfile) -> None:
     assert needed - {""} <= set(stop_profile.places)
 
 
-def test_a_profile_of_the_users_own_is_read_too() -> None:
+def test_own_profile_is_included() -> None:
     folder = library.user_folder()
     folder.mkdir(parents=True)
     packaged = library.packaged_folder()
@@ -59,14 +59,14 @@ def test_a_profile_of_the_users_own_is_read_too() -> None:
     assert set(found["atv71"].places) <= set(found["pump"].places)
 
 
-def test_families_that_are_silent_at_foreign_words_come_first_and_the_named_before() -> None:
+def test_named_families_then_silent_ones_come_first() -> None:
     assert [place.address for place in stop_places(FACTS)] == [LEROY, CMD, 0xFA00]
     named = stop_places(FACTS, ["atv312"])
     assert named[0].families[0].id == "atv312"
     assert [place.address for place in named] == [CMD, LEROY, 0xFA00]
 
 
-def test_no_family_has_another_word_where_one_is_stopped() -> None:
+def test_command_register_of_one_family_is_no_setting_of_another() -> None:
     """A word for one kind must not change a setting of another."""
     for place in PLACES.values():
         stopped = {family.id for family in place.families}
@@ -84,7 +84,7 @@ def states() -> Iterator[dict[int, int]]:
 
 @pytest.mark.parametrize("named", NAMED)
 @pytest.mark.parametrize("way", WAYS)
-def test_whatever_is_there_it_stops_and_starts_nothing(
+def test_first_stop_word_stops_every_family_and_starts_none(
     way: OrderId, named: tuple[str, ...]
 ) -> None:
     sent = 0
@@ -104,7 +104,7 @@ def test_whatever_is_there_it_stops_and_starts_nothing(
 
 
 @pytest.mark.parametrize("named", NAMED)
-def test_on_the_ramp_where_that_is_sure_and_never_a_drivecom_word_into_the_io_profile(
+def test_first_stop_word_ramps_only_if_the_profile_is_certain(
     named: tuple[str, ...],
 ) -> None:
     assert word(CMD, {ETA: ENABLED, CHCF: 1}, "stop", *named) == 0x0007
@@ -115,11 +115,11 @@ def test_on_the_ramp_where_that_is_sure_and_never_a_drivecom_word_into_the_io_pr
     assert word(CMD, {}, "quick-stop", *named) == 0x0000
 
 
-def test_nothing_is_sent_into_a_profile_of_which_no_word_is_known() -> None:
+def test_no_word_is_sent_to_an_undescribed_profile() -> None:
     assert word(CMD, {CHCF: 0, DOTD: 1}) is None
 
 
-def test_a_drive_that_would_coast_is_halted() -> None:
+def test_drive_that_would_coast_is_halted() -> None:
     """DOTD = 0: Disable operation lets an Altivar 71 coast; only that has DOTD."""
     assert word(CMD, {CHCF: 1, DOTD: 0, ETA: ENABLED}) == 0x010F
     assert word(CMD, {CHCF: 1, DOTD: 0, ETA: HALF_WAY}) == 0x0007
@@ -128,13 +128,13 @@ def test_a_drive_that_would_coast_is_halted() -> None:
     assert word(CMD, {CHCF: 1, DOTD: 0, ETA: ENABLED}, "stop", "atv312") == 0x0007
 
 
-def test_a_leroy_somer_is_stopped_by_its_state() -> None:
+def test_leroy_somer_stop_word_depends_on_its_state() -> None:
     assert word(LEROY, {LEROY_STATUS: 3}) == 0x0001
     assert word(LEROY, {LEROY_STATUS: 5}) == 0x0000
     assert word(LEROY, {}) == 0x0000
 
 
-def test_an_unsaid_drive_is_followed_by_a_family_that_sends_the_same_word() -> None:
+def test_unidentified_drive_is_followed_by_families_with_the_same_word() -> None:
     """Altivar 312's own stop, 16#0007, runs an Altivar 71 that 16#0000 has just stopped."""
 
     def following(raws: dict[int, int], *named: str) -> tuple[str, ...]:
@@ -148,7 +148,7 @@ def test_an_unsaid_drive_is_followed_by_a_family_that_sends_the_same_word() -> N
     assert set(following({CHCF: 1}, "atv312")) == {"atv31", "atv312", "atv71"}
 
 
-def test_families_beside_a_named_one_share_its_register() -> None:
+def test_families_named_together_share_a_register() -> None:
     assert {profile.id for profile in families_beside(FACTS, "atv312")} == {
         "atv31",
         "atv312",

@@ -86,7 +86,7 @@ def test_no_run_word_passes_as_a_stop(profile: Profile) -> None:
                         assert kind(profile, place, word) is WordKind.COMMAND, (order.id, word)
 
 
-def test_a_scanner_word_that_passes_a_command_on_is_a_command() -> None:
+def test_scanner_word_that_forwards_a_command_is_a_command() -> None:
     codes = [code for block in ATV71.data.blocks for code in block.values]
     assert codes
     written = [code for code in codes if ATV71[code].access != "r"]
@@ -94,14 +94,14 @@ def test_a_scanner_word_that_passes_a_command_on_is_a_command() -> None:
         assert kind(ATV71, code, 15) is WordKind.COMMAND
 
 
-def test_a_setting_is_distinguished_from_what_nobody_knows() -> None:
+def test_setting_is_distinguished_from_an_unknown_word() -> None:
     assert kind(ATV71, "ACC", 30) is WordKind.SETTING
     assert kind(ATV71, "RFR", 30) is WordKind.UNKNOWN
     (found,) = classify_words(ATV71, {64000: 1}, {})
     assert found.kind is WordKind.UNKNOWN
 
 
-def test_all_leaves_out_who_commands_and_what_cuts_the_line() -> None:
+def test_allow_all_excludes_control_and_line_settings() -> None:
     def refusal(code: str, *allowed: str) -> str:
         (found,) = classify_words(ATV71, {ATV71[code].address: 1}, {})
         assert found.kind is WordKind.SETTING
@@ -115,7 +115,7 @@ def test_all_leaves_out_who_commands_and_what_cuts_the_line() -> None:
     assert refusal("CHCF", "CHCF") == ""
 
 
-def test_a_value_past_its_limits_is_refused() -> None:
+def test_value_beyond_its_limits_is_refused() -> None:
     acc = ATV71["ACC"]
     assert value_refusal(ATV71, acc, {acc.address: 30}) == ""
     assert value_refusal(ATV71, acc, {acc.address: 60000})
@@ -144,7 +144,7 @@ def test_few_words_are_read_before_stop(
     profile=st.sampled_from([ATV71, ATV31, ATV21, POWERDRIVE]),
     values=st.lists(st.sampled_from([0, 1, 2, 3, 0x33, 0x37, 0xC403]), min_size=6, max_size=6),
 )
-def test_words_read_before_stop_decide(word: int, profile: Profile, values: list[int]) -> None:
+def test_words_read_before_a_stop_decide(word: int, profile: Profile, values: list[int]) -> None:
     """Whatever else is known changes nothing."""
     charts = [chart for chart in profile.data.charts if chart.command]
     known = [code for chart in charts for code in (chart.status, chart.command)]

@@ -59,7 +59,7 @@ def write(tmp_path: Path, text: str | bytes) -> Path:
     return file
 
 
-def test_a_small_profile_loads(tmp_path: Path) -> None:
+def test_small_profile_loads(tmp_path: Path) -> None:
     profile = library.load_file(write(tmp_path, SMALL))
     assert profile["FRQ"].address == 100
 
@@ -82,7 +82,7 @@ def test_a_small_profile_loads(tmp_path: Path) -> None:
         ('group = "All"', 'group = "All"\nenumeration = "no"', 32, "no enumeration 'no'"),
     ],
 )
-def test_a_fault_is_reported_with_file_line_and_words(
+def test_profile_error_is_reported_with_file_and_line(
     tmp_path: Path, old: str, new: str, line: int, words: str
 ) -> None:
     assert old in SMALL
@@ -97,7 +97,7 @@ def test_a_fault_is_reported_with_file_line_and_words(
         assert reported == line, text
 
 
-def test_two_parameters_with_one_address(tmp_path: Path) -> None:
+def test_two_parameters_with_one_address_are_refused(tmp_path: Path) -> None:
     again = SMALL[SMALL.index("[[parameters]]") :].replace("FRQ", "FR2")
     with pytest.raises(ProfileError, match="address 100 is already that of FRQ"):
         library.load_file(write(tmp_path, SMALL + "\n" + again))
@@ -111,7 +111,7 @@ def test_two_parameters_with_one_address(tmp_path: Path) -> None:
         ("powerdrive", "", "6.44"),
     ],
 )
-def test_a_control_source_names_no_word_that_is_not_there(
+def test_control_source_with_an_unknown_word_is_refused(
     tmp_path: Path, family: str, right: str, wrong: str
 ) -> None:
     text = (library.packaged_folder() / f"{family}.toml").read_text("utf-8")
@@ -127,12 +127,12 @@ def test_a_control_source_names_no_word_that_is_not_there(
         library.load_file(write(tmp_path, text.encode()))
 
 
-def test_a_file_that_is_not_text(tmp_path: Path) -> None:
+def test_binary_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="not UTF-8"):
         library.load_file(write(tmp_path, b"\xff\xfe\x00"))
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="cannot be read"):
         library.load_file(tmp_path / "none.toml")
 
@@ -142,7 +142,7 @@ def test_an_unknown_profile_names_the_known_ones() -> None:
         library.load("atv99")
 
 
-def test_a_listing_reads_the_head_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_listing_reads_only_the_head(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
     (tmp_path / "profiles").mkdir()
     (tmp_path / "profiles" / "broken.toml").write_text(
@@ -155,7 +155,7 @@ def test_a_listing_reads_the_head_alone(tmp_path: Path, monkeypatch: pytest.Monk
         library.load_file(found["broken"].path)
 
 
-def test_a_listing_of_packaged_profiles_checks_none() -> None:
+def test_listing_does_not_check_packaged_profiles() -> None:
     code = (
         "import sys; from tui.drive.profile import library; library.listings();"
         "late = ('tui.drive.profile.check', 'tui.drive.profile.shared_rows');"
@@ -165,7 +165,7 @@ def test_a_listing_of_packaged_profiles_checks_none() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_an_own_profile_takes_the_place_of_a_packaged_one(
+def test_own_profile_replaces_a_packaged_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
@@ -183,7 +183,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_a_head_is_read_as_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_head_is_read_as_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = own_folder(tmp_path, monkeypatch)
     prefixes = "[identification]\nreference_prefixes = [\n  'SMALL',  # with a comment\n]\n\n[link]"
     text = SMALL.replace('"small"', "'small'").replace('"Small drive"', '"""Small "one\\""""')
@@ -195,7 +195,7 @@ def test_a_head_is_read_as_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert not library.mentions_function(own, 43)
 
 
-def test_broken_and_doubled_files_are_shown_as_such(
+def test_broken_and_duplicate_profiles_are_marked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = own_folder(tmp_path, monkeypatch)
@@ -216,7 +216,7 @@ def test_broken_and_doubled_files_are_shown_as_such(
     assert len(reported("atv31")) == 1
 
 
-def test_a_profile_is_begun_from_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_profile_is_created_from_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = own_folder(tmp_path, monkeypatch)
     done = CliRunner().invoke(main, ["profiles", "new", "my-drive", "--from", "atv312"])
     assert done.exit_code == 0, done.output
@@ -274,7 +274,7 @@ def test_the_schema_describes_every_field() -> None:
     [("W9001", 9001), ("w 9 001", 9001), ("16#2329", 9001), ("0x2329", 9001), ("9001", 9001),
      ("W99999", None), ("ACC", None), ("16#", None)],
 )  # fmt: skip
-def test_addresses(text: str, address: int | None) -> None:
+def test_address_notations_are_parsed(text: str, address: int | None) -> None:
     assert parse_address(text) == address
 
 
@@ -295,13 +295,15 @@ def test_addresses(text: str, address: int | None) -> None:
         ("atv312", "aCc", "ACC"),
     ],
 )
-def test_three_notations_in_any_case(profile_id: str, typed: str, code: str) -> None:
+def test_parameter_is_found_by_three_notations_in_any_case(
+    profile_id: str, typed: str, code: str
+) -> None:
     found = library.load(profile_id).find(typed)
     assert found.code == code
     assert notations(found)[0] == code
 
 
-def test_an_unknown_code_proposes_near_ones() -> None:
+def test_unknown_code_suggests_similar_ones() -> None:
     with pytest.raises(UnknownParameter, match="ACC"):
         library.load("atv71").find("ACCC")
 
@@ -311,18 +313,18 @@ def test_an_unknown_code_proposes_near_ones() -> None:
     [("ATV71HU15M3", "atv71"), ("atv21h075m3x", "atv21"), ("ATV31HU09M3S232", "atv31"),
      ("ATV312HU09M3", "atv312")],
 )  # fmt: skip
-def test_a_reference_finds_its_profile(reference: str, profile_id: str) -> None:
+def test_model_reference_finds_its_profile(reference: str, profile_id: str) -> None:
     assert library.matching_profiles(reference)[0] == profile_id
 
 
-def test_an_unknown_reference_finds_none() -> None:
+def test_unknown_model_reference_finds_none() -> None:
     assert library.matching_profiles("ACS550") == []
 
 
-def test_the_committed_schema_is_up_to_date() -> None:
+def test_committed_schema_is_up_to_date() -> None:
     committed = library.packaged_folder() / "profile.schema.json"
     assert committed.read_text(encoding="utf-8") == json_schema.schema_text()
 
 
-def test_a_profile_is_not_its_schema() -> None:
+def test_schema_refuses_unknown_fields() -> None:
     assert json_schema.profile_schema()["$defs"]["Parameter"]["additionalProperties"] is False

@@ -37,7 +37,7 @@ def test_a_limit_that_another_parameter_sets_is_named(code: str, text: str) -> N
     assert limits.text == text
 
 
-def test_the_own_limit_counts_where_the_other_is_wider_or_not_known() -> None:
+def test_own_limit_applies_if_the_other_is_wider_or_unknown() -> None:
     assert "1600.0 Hz" in getattr(limits_in_force(ATV71, ATV71["HSP"], {"LSP": 0}), "text", "")
     wide = limits_in_force(ATV71, ATV71["HSP"], {**HELD, "TFR": 30000})
     assert wide is not None
@@ -55,13 +55,13 @@ def test_limit_by_a_multiple_counts_if_either_parameter_is_edited() -> None:
     assert edit_problems(ATV71, Edits().stage(ATV71, "ACC", "4", past), past) == {}
 
 
-def test_non_number_has_no_limits() -> None:
+def test_non_numeric_parameter_has_no_limits() -> None:
     assert limits_in_force(ATV71, ATV71["STT"], HELD) is None
     assert limits_in_force(ATV71, ATV71["RFR"], HELD) is None
     assert limits_in_force(ATV71, ATV71["ACC"], {}) is None  # its scale is not known
 
 
-def test_an_edit_past_a_limit_is_reported_with_its_name_and_a_staged_limit_counts() -> None:
+def test_edit_beyond_a_limit_names_it_and_staged_limits_apply() -> None:
     empty = Edits()
     past = empty.stage(ATV71, "HSP", "70", HELD)
     assert "above TFR = 60.0 Hz" in limit_passed(ATV71, empty, past, HELD)
@@ -70,7 +70,7 @@ def test_an_edit_past_a_limit_is_reported_with_its_name_and_a_staged_limit_count
     assert limit_passed(ATV71, raised, within, HELD) == ""
 
 
-def test_the_exact_code_comes_first_and_settings_before_readings() -> None:
+def test_exact_code_comes_first_and_settings_before_readings() -> None:
     facts = FilterContext(ATV71)
     assert rows(facts, "all", "hsp")[0] == "HSP"
     assert rows(facts, "all", "acc")[0] == "ACC"
@@ -107,7 +107,9 @@ def staged(**typed: str) -> Edits:
         ("ACC", [], ""),
     ],
 )
-def test_edits_that_depend_on_a_missed_edit(code: str, missed: list[str], base: str) -> None:
+def test_edits_that_depend_on_a_failed_edit_are_found(
+    code: str, missed: list[str], base: str
+) -> None:
     edits = staged(TFR="80", HSP="75", LSP="10", INR="16#0000", ACC="4.55 s", BFR="16#0001")
     edit = edits.get(code)
     assert edit is not None

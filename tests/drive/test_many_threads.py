@@ -28,7 +28,7 @@ print(len({library.load(id).id for id in ids}))
 """
 
 
-def test_no_thread_crashes_the_program_that_meets_a_profile_first() -> None:
+def test_concurrent_first_use_of_a_profile_is_safe() -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=PATIENCE
     )

@@ -56,7 +56,7 @@ def made(family: str, direction: str, codes: list[str]) -> Assignment:
 # The manuals' examples
 
 
-def test_the_example_of_the_scanner_by_function_23() -> None:
+def test_manual_example_of_the_scanner_by_function_23_matches() -> None:
     inputs, outputs = made("atv71", "read", EXAMPLE_IN), made("atv71", "write", EXAMPLE_OUT)
     assert inputs.raws == (3201, 8604, 3204, 3205, 3207, 3209, 9630, 7121)
     assert outputs.raws == (8501, 8602, 3104, 3105, 9001, 9002, 0, 0)
@@ -78,11 +78,11 @@ def test_the_example_of_the_scanner_by_function_23() -> None:
         (["FD01"], "010318750002D371"),  # two words at least
     ],
 )
-def test_the_examples_of_the_read_block(codes: list[str], sent: str) -> None:
+def test_manual_examples_of_the_read_block_match(codes: list[str], sent: str) -> None:
     assert block_request(ATV21, 1, made("atv21", "read", codes), None).hex().upper() == sent
 
 
-def test_the_example_of_the_write_block() -> None:
+def test_manual_example_of_the_write_block_matches() -> None:
     outputs = made("atv21", "write", ["FA00", "FA01"])
     assert outputs.raws == (1, 3)
     sent = block_request(ATV21, 1, None, outputs, (0xC400, 0x1770))
@@ -91,7 +91,7 @@ def test_the_example_of_the_write_block() -> None:
     assert hex_text(sent).startswith("01 10 18 70 00 02 04")
 
 
-def test_factory_settings() -> None:
+def test_factory_assignment_is_that_of_the_manual() -> None:
     assert factory(ATV71, block("atv71", "read")).raws == (3201, 8604, 0, 0, 0, 0, 0, 0)
     assert factory(ATV71, block("atv71", "write")).raws == (8501, 8602, 0, 0, 0, 0, 0, 0)
     assert factory(ATV21, block("atv21", "read")).raws == (0,) * 5
@@ -140,7 +140,9 @@ def test_typed_numbers_are_accepted(family: str, direction: str, typed: str, raw
         ("atv71", "read", "nonsense", "no parameter"),
     ],
 )
-def test_targets_a_slot_cannot_have(family: str, direction: str, typed: str, says: str) -> None:
+def test_impossible_slot_target_is_reported(
+    family: str, direction: str, typed: str, says: str
+) -> None:
     profile = library.load(family)
     if typed == "FE18" and profile.get("FE18") is None:
         typed = next(p.code for p in profile.parameters if p.code.startswith("FE1"))
@@ -148,7 +150,7 @@ def test_targets_a_slot_cannot_have(family: str, direction: str, typed: str, say
         raw_named(profile, block(family, direction), typed)
 
 
-def test_twice_is_wrong_in_outputs_and_a_waste_in_inputs() -> None:
+def test_duplicate_is_an_error_in_outputs_and_a_waste_in_inputs() -> None:
     (wrong,) = assignment_problems(ATV71, made("atv71", "write", ["CMD", "CMD"]))
     assert wrong.refuses
     assert "already in NCA1" in wrong.text
@@ -156,7 +158,7 @@ def test_twice_is_wrong_in_outputs_and_a_waste_in_inputs() -> None:
     assert not waste.refuses
 
 
-def test_an_address_nobody_knows_is_a_problem_of_its_slot() -> None:
+def test_unknown_address_is_a_problem_of_its_slot() -> None:
     plan = empty(block("atv71", "read")).with_raw(3, 3199)
     (wrong,) = assignment_problems(ATV71, plan)
     assert (wrong.slot, wrong.refuses) == ("NMA4", True)
@@ -176,7 +178,7 @@ def test_a_parameter_that_this_drive_lacks_is_reported() -> None:
     assert "reports that it has no LCR" in wrong.text
 
 
-def test_the_list_filters_as_one_types() -> None:
+def test_list_is_filtered_by_the_typed_text() -> None:
     inputs = block("atv71", "read")
     every = choices(ATV71, inputs)
     assert len(every) > 300
@@ -197,7 +199,7 @@ RAWS = st.lists(st.one_of(st.just(UNUSED), st.sampled_from(ADDRESSES)), min_size
 
 
 @given(before=RAWS, after=RAWS)
-def test_the_steps_lead_there_and_move_nothing_without_freeing_it(
+def test_steps_reach_the_assignment_and_free_slots_before_moving(
     before: tuple[int, ...], after: tuple[int, ...]
 ) -> None:
     inputs = block("atv71", "read")
@@ -219,7 +221,7 @@ def test_the_steps_lead_there_and_move_nothing_without_freeing_it(
 
 
 @given(raws=RAWS, place=st.integers(0, 7), step=st.sampled_from([-1, 1]))
-def test_moving_there_and_back_changes_nothing(
+def test_moving_a_slot_back_restores_the_assignment(
     raws: tuple[int, ...], place: int, step: int
 ) -> None:
     plan = Assignment(block("atv71", "read"), raws)
@@ -229,7 +231,7 @@ def test_moving_there_and_back_changes_nothing(
 
 
 @given(raws=RAWS)
-def test_a_file_holds_what_was_written_to_it(raws: tuple[int, ...]) -> None:
+def test_file_round_trip_keeps_the_assignment(raws: tuple[int, ...]) -> None:
     inputs = Assignment(block("atv71", "read"), raws)
     outputs = factory(ATV71, block("atv71", "write"))
     text = dump_blocks(ATV71, [inputs, outputs], "pump 3")
@@ -241,7 +243,7 @@ def test_a_file_holds_what_was_written_to_it(raws: tuple[int, ...]) -> None:
 
 
 @given(raws=RAWS)
-def test_an_assignment_never_makes_the_cheapest_plan_dearer(raws: tuple[int, ...]) -> None:
+def test_assignment_never_makes_the_cheapest_plan_slower(raws: tuple[int, ...]) -> None:
     plan = Assignment(block("atv71", "read"), raws)
     found = saving(ATV71, EXAMPLE_IN, TIMING, {}, plan.slots)
     assert found.microseconds >= 0
@@ -266,7 +268,7 @@ def test_the_read_block_saves_three_requests_of_five() -> None:
     assert found.microseconds == found.before.microseconds - found.after.microseconds
 
 
-def test_the_scanner_is_counted_with_the_check_of_its_slots() -> None:
+def test_scanner_cost_includes_the_check_of_its_slots() -> None:
     codes = ["ETA", "ACC", "THR", "LFT"]
     plan = made("atv71", "read", codes)
     found = cost(ATV71, codes, TIMING, plan.slots)
@@ -274,7 +276,7 @@ def test_the_scanner_is_counted_with_the_check_of_its_slots() -> None:
     assert found.microseconds == round(2 * TIMING.read(4) * 1e6)
 
 
-def test_the_time_of_the_exchange_that_is_shown() -> None:
+def test_exchange_time_shown_is_that_of_its_requests() -> None:
     inputs, outputs = made("atv71", "read", EXAMPLE_IN), made("atv71", "write", EXAMPLE_OUT)
     assert microseconds(ATV71, TIMING, inputs, outputs) == round(TIMING.read_write(8, 6) * 1e6)
     assert microseconds(ATV71, TIMING, inputs, None) == round(TIMING.read(8) * 1e6)
@@ -286,7 +288,7 @@ def test_the_time_of_the_exchange_that_is_shown() -> None:
 
 
 @pytest.mark.parametrize("family", WITHOUT)
-def test_neighbors_are_proposed_within_the_limit(family: str) -> None:
+def test_neighbors_are_suggested_within_the_limit(family: str) -> None:
     profile = library.load(family)
     codes = [value.parameter for value in profile.data.monitoring.values]
     found = stretches(profile, codes, TIMING)
@@ -302,7 +304,7 @@ def test_neighbors_are_proposed_within_the_limit(family: str) -> None:
     assert found[0].saves == max(stretch.saves for stretch in found)
 
 
-def test_a_drive_of_single_words_has_no_stretches() -> None:
+def test_single_word_drive_has_no_neighbor_ranges() -> None:
     assert stretches(ATV21, ["FD00", "FD01", "FE03"], TIMING) == []
 
 
@@ -326,14 +328,14 @@ GOOD = dump_blocks(ATV21, [factory(ATV21, block("atv21", "read"))])
         ("[end]", "[end", 12, "not an assignment"),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line(old: str, new: str, line: int, says: str) -> None:
+def test_invalid_file_is_refused_with_its_line(old: str, new: str, line: int, says: str) -> None:
     assert old in GOOD
     with pytest.raises(MappingError, match=says) as error:
         load_blocks(GOOD.replace(old, new), "block.toml", ATV21)
     assert str(error.value).startswith(f"block.toml:{line}: ")
 
 
-def test_a_file_may_be_written_by_hand() -> None:
+def test_hand_written_file_is_accepted() -> None:
     text = GOOD.replace('F875 = "none"', "F875 = 1").replace('F876 = "none"', 'F876 = "16#FD00"')
     plan = load_blocks(text, "x", ATV21)["read"]
     assert plan.raws == (1, 2, 0, 0, 0)
@@ -342,7 +344,7 @@ def test_a_file_may_be_written_by_hand() -> None:
     assert second.code == "FD00"
 
 
-def test_slots_that_could_not_be_read_are_no_assignment() -> None:
+def test_unread_slots_are_not_an_assignment() -> None:
     inputs = block("atv21", "read")
     assert assignment(inputs, {"F875": 1}) is None
     assert assignment(inputs, dict.fromkeys(inputs.slots, 1)) is not None
@@ -363,7 +365,7 @@ def test_slots_that_could_not_be_read_are_no_assignment() -> None:
         (UserWord(3200, "hex"), None, "-----"),
     ],
 )
-def test_user_words_read_as_on_the_drives_terminal(
+def test_user_words_are_shown_as_on_the_drive_keypad(
     word: UserWord, raw: int | None, text: str
 ) -> None:
     assert word.text(raw) == text

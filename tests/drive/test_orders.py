@@ -42,7 +42,7 @@ def words_of(chart: Chart, lock: Interlock) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("family", LOCKED)
-def test_a_word_that_was_not_read_holds_every_moving_command_back(family: str) -> None:
+def test_unread_word_blocks_every_moving_command(family: str) -> None:
     for chart, lock in interlocks(family):
         raws = {c: raw for c, raw in words_of(chart, lock).items() if c != lock.parameter}
         for id in lock.orders or MOVING_ORDERS:
@@ -55,14 +55,14 @@ def test_a_word_that_was_not_read_holds_every_moving_command_back(family: str) -
 
 
 @pytest.mark.parametrize("family", LOCKED)
-def test_no_interlock_ever_holds_a_stop_back(family: str) -> None:
+def test_no_interlock_blocks_a_stop(family: str) -> None:
     for chart, lock in interlocks(family):
         for id in STOP_ORDERS:
             assert refusal(library.load(family), chart, id, {}) == "", (id, lock.parameter)
 
 
 @pytest.mark.parametrize("family", LOCKED)
-def test_another_value_holds_a_command_back_and_tells_what_to_do(family: str) -> None:
+def test_wrong_value_blocks_a_command_with_advice(family: str) -> None:
     for chart, lock in interlocks(family):
         raws = words_of(chart, lock)
         wrong = next(bit for bit in (1 << n for n in range(16)) if lock.mask & bit)

@@ -36,7 +36,7 @@ def own_file() -> Path:
     return path
 
 
-def test_the_command_line_checks_and_lists_it(own_file: Path) -> None:
+def test_own_profile_is_checked_and_listed(own_file: Path) -> None:
     checked = CliRunner().invoke(main, ["profiles", "--check", str(own_file)])
     assert checked.exit_code == 0, checked.output
     assert "no fault found" in checked.output
@@ -45,7 +45,7 @@ def test_the_command_line_checks_and_lists_it(own_file: Path) -> None:
     assert line.startswith(PUMP)
 
 
-def test_a_simulated_one_keeps_its_functions_and_limits(own_file: Path) -> None:
+def test_simulated_drive_keeps_its_functions_and_limits(own_file: Path) -> None:
     drive = SimulatedDrive(library.load(PUMP), DriveSpec(PUMP, ADDRESS, sets={"FREQ": 482}))
 
     def ask(function: int, first: int, second: int) -> bytes | None:
@@ -92,7 +92,7 @@ confidence = "manual"
 """
 
 
-def test_a_simulated_one_has_input_registers_and_fields(own_file: Path) -> None:
+def test_simulated_drive_has_input_registers_and_fields(own_file: Path) -> None:
     text = own_file.read_text("utf-8") + MORE + FIELD
     own_file.write_text(text.replace('code = "MODE"', 'code = "MODE"\nmask = 0xF'), "utf-8")
     assert library.faults_of(own_file) == []
@@ -118,7 +118,7 @@ def test_a_simulated_one_has_input_registers_and_fields(own_file: Path) -> None:
         (0x1, 7, "fault", 0),
     ],
 )
-async def test_it_is_read_over_a_line_with_its_state(
+async def test_own_drive_is_read_over_a_line_with_its_state(
     own_file: Path, status: int, trip: int, state: str, alarms: int
 ) -> None:
     profile = library.load(PUMP)

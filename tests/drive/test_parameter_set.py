@@ -36,7 +36,7 @@ def read(text: str) -> ParameterSet:
 
 @settings(max_examples=25)
 @given(data=st.data())
-def test_every_parameter_of_every_profile_there_and_back(data: st.DataObject) -> None:
+def test_every_parameter_of_every_profile_survives_a_round_trip(data: st.DataObject) -> None:
     """Any word that a drive may answer, also one that the profile does not know a name of."""
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))
     seed = data.draw(st.randoms(use_true_random=False))
@@ -54,7 +54,7 @@ def test_every_parameter_of_every_profile_there_and_back(data: st.DataObject) ->
 
 @settings(max_examples=25)
 @given(data=st.data())
-def test_a_value_without_its_raw_word_is_the_same(data: st.DataObject) -> None:
+def test_value_without_its_raw_word_is_the_same(data: st.DataObject) -> None:
     """What a person reads can stand alone, for every value in its range."""
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))
     seed = data.draw(st.randoms(use_true_random=False))
@@ -76,7 +76,7 @@ def allowed(profile: Profile, parameter: Parameter) -> list[int]:
     return [raw for raw in some if not raw & reserved] or [0]
 
 
-def test_a_line_a_parameter_in_a_stable_order() -> None:
+def test_each_parameter_has_one_line_in_a_stable_order() -> None:
     text = small()
     assert 'ACC = { raw = 30, value = "3.0 s", name = "Acceleration time" }\n' in text
     assert text == small()
@@ -96,7 +96,7 @@ def test_unread_parameters_are_listed_with_reason() -> None:
     assert load_set(text, "f", library.load).absent == {"15.03": 'no "answer"'}
 
 
-def test_a_value_edited_by_hand_counts_once_raw_is_taken_out() -> None:
+def test_hand_edited_value_counts_if_raw_is_removed() -> None:
     text = small().replace('raw = 30, value = "3.0 s"', 'value = "4,25 s"')
     with_scale = text.replace('raw = 1, value = "0.1 s"', 'value = "0.01 s"')
     assert read(with_scale).raws["ACC"] == 425
@@ -125,7 +125,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "place", "expected"), FAULTS)
-def test_a_fault_is_reported_with_its_line(
+def test_set_error_is_reported_with_its_line(
     right: str, wrong: str, place: str, expected: str
 ) -> None:
     text = small().replace(right, wrong, 1)
@@ -138,7 +138,7 @@ def test_a_fault_is_reported_with_its_line(
     assert expected in str(caught.value)
 
 
-def test_a_parameter_named_twice() -> None:
+def test_duplicate_parameter_is_refused() -> None:
     line = next(row for row in small().splitlines() if row.startswith("ACC = "))
     doubled = small().replace("[end]", f'[parameters."Another"]\n{line}\n\n[end]')
     with pytest.raises(SetError, match=r"set\.toml:\d+: ACC is already in line \d+"):
@@ -146,7 +146,7 @@ def test_a_parameter_named_twice() -> None:
 
 
 @given(share=st.floats(0, 0.999))
-def test_a_file_that_was_cut_short_is_always_noticed(share: float) -> None:
+def test_truncated_file_is_always_detected(share: float) -> None:
     """At any character, also between two lines."""
     text = small()
     # without its last line break it is whole yet
@@ -155,7 +155,7 @@ def test_a_file_that_was_cut_short_is_always_noticed(share: float) -> None:
         read(cut)
 
 
-def test_a_file_that_was_cut_short_between_two_lines_is_always_noticed() -> None:
+def test_file_truncated_between_lines_is_always_detected() -> None:
     """As a disk that was full leaves it: what is there is whole TOML."""
     lines = small().splitlines(keepends=True)
     for count in range(len(lines) - 1):
@@ -169,12 +169,12 @@ def test_foreign_files_are_refused(text: str) -> None:
         read(text)
 
 
-def test_a_profile_that_is_not_here() -> None:
+def test_set_of_an_unknown_profile_is_refused() -> None:
     with pytest.raises(UnknownProfile):
         read(small().replace('profile = "atv71"', 'profile = "atv99"'))
 
 
-def test_codes_that_the_profile_has_not_are_kept_apart() -> None:
+def test_unknown_codes_are_kept_separately() -> None:
     text = small().replace("ACC = {", "AXX = {")
     found = read(text)
     assert found.unknown == {"AXX": "3.0 s"}
@@ -184,7 +184,7 @@ def test_codes_that_the_profile_has_not_are_kept_apart() -> None:
 # On disk
 
 
-def test_a_file_is_written_whole_and_read_back(tmp_path: Path) -> None:
+def test_file_is_written_completely_and_read_back(tmp_path: Path) -> None:
     path = tmp_path / "pump.toml"
     write_file(path, small())
     assert read_set(path).raws == SMALL
@@ -195,7 +195,7 @@ def test_a_file_is_written_whole_and_read_back(tmp_path: Path) -> None:
         assert stat.S_IMODE(path.stat().st_mode) == stat.S_IMODE(fresh.stat().st_mode)
 
 
-def test_no_file_is_overwritten_unasked(tmp_path: Path) -> None:
+def test_existing_file_is_not_overwritten_without_force(tmp_path: Path) -> None:
     path = tmp_path / "pump.toml"
     path.write_text("mine", encoding="utf-8")
     with pytest.raises(FileThere, match="--force"):
@@ -206,7 +206,7 @@ def test_no_file_is_overwritten_unasked(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir() if p.is_file()] == ["pump.toml"]
 
 
-def test_a_folder_that_takes_no_file(tmp_path: Path) -> None:
+def test_unusable_path_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SetError, match="cannot be written"):
         write_file(tmp_path / "no" / "pump.toml", small())
     with pytest.raises(SetError, match="cannot be read"):
@@ -219,7 +219,7 @@ def test_a_folder_that_takes_no_file(tmp_path: Path) -> None:
 # Comparing
 
 
-def test_differences_leave_measurements_out() -> None:
+def test_differences_exclude_measurements() -> None:
     profile = library.load("atv71")
     a = Side("a", SMALL)
     b = Side("b", {**SMALL, "ACC": 50, "RFR": 100, "ETA": 0x27, "CMD": 15})
@@ -231,7 +231,7 @@ def test_differences_leave_measurements_out() -> None:
     assert [row.code for row in every if row.differs] == ["ACC"]
 
 
-def test_a_ramp_under_another_scale_is_the_same_ramp() -> None:
+def test_equal_ramps_with_different_scales_are_equal() -> None:
     profile = library.load("atv71")
     a, b = Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 0, "ACC": 300})
     assert [row.code for row in compare_settings(profile, a, b)] == ["INR"]
@@ -239,7 +239,7 @@ def test_a_ramp_under_another_scale_is_the_same_ramp() -> None:
     assert [row.code for row in compare_settings(profile, a, c)] == ["INR", "ACC"]
 
 
-def test_a_difference_behind_the_point_is_one() -> None:
+def test_difference_in_decimals_counts() -> None:
     profile = library.load("atv71")
     a, b = Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 1, "ACC": 31})
     assert [(row.a, row.b) for row in compare_settings(profile, a, b)] == [("3.0 s", "3.1 s")]
@@ -267,7 +267,7 @@ def test_factory_settings_differ_from_themselves_in_nothing(family: str) -> None
     )
 
 
-def test_the_formats() -> None:
+def test_differences_are_written_in_each_format() -> None:
     profile = library.load("atv71")
     rows = compare_settings(
         profile, Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 1, "ACC": 50})

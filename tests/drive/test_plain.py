@@ -21,16 +21,16 @@ from tui.drive.plain import commands, plain
         ("one\u2028two", "one\ufffdtwo"),
     ],
 )
-def test_signs_stand_for_what_commands_a_terminal(text: str, shown: str) -> None:
+def test_control_characters_are_replaced_by_symbols(text: str, shown: str) -> None:
     assert plain(text) == shown
 
 
-def test_line_feeds_stay_where_lines_are_selected() -> None:
+def test_line_feeds_are_kept_on_request() -> None:
     assert plain("one\ntwo\x1b[2J", lines=True) == "one\ntwo␛[2J"
 
 
 @given(st.text(st.characters()))
-def test_one_for_one_and_nothing_left_that_commands(text: str) -> None:
+def test_replacement_keeps_the_length_and_leaves_no_control_character(text: str) -> None:
     shown = plain(text)
     assert len(shown) == len(text)
     assert not any(commands(character) for character in shown)

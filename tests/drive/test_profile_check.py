@@ -339,12 +339,12 @@ def checked(tmp_path: Path, text: str) -> list[str]:
     return library.faults_of(path)
 
 
-def test_the_profile_that_is_broken_below_is_right(tmp_path: Path) -> None:
+def test_unbroken_test_profile_is_valid(tmp_path: Path) -> None:
     assert checked(tmp_path, COMMANDED) == []
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_is_reported_where_it_stands(tmp_path: Path, name: str) -> None:
+def test_each_error_is_reported_at_its_line(tmp_path: Path, name: str) -> None:
     changes, reported, at = FAULTS[name]
     text = COMMANDED
     for right, wrong in changes:
@@ -356,7 +356,7 @@ def test_a_fault_is_reported_where_it_stands(tmp_path: Path, name: str) -> None:
     assert fault.startswith(f"{tmp_path / 'own.toml'}:{line}: "), fault
 
 
-def test_all_faults_are_reported_in_one_run(tmp_path: Path) -> None:
+def test_all_errors_are_reported_in_one_run(tmp_path: Path) -> None:
     """Those of the form do not hide those of the rest."""
     some = ("a field that is none", "a number out of range", "no stop", "one fault twice",
             "a word that is not there", "a field too few", "a hidden state")  # fmt: skip
@@ -385,7 +385,7 @@ def test_several_files_are_checked(tmp_path: Path) -> None:
     assert [len(load["faults"]) for load in json.loads(reported.output)] == [0, 1]
 
 
-def test_lines_of_every_kind_of_place() -> None:
+def test_line_is_found_for_every_kind_of_location() -> None:
     text = '''a = 1 # [no.header]
 "b.c".d = """
 [not]

@@ -57,7 +57,9 @@ PLACES = [
 
 
 @pytest.mark.parametrize(("code", "address", "scale", "unit"), PLACES)
-def test_places(profile: Profile, code: str, address: int, scale: str, unit: str) -> None:
+def test_addresses_scales_and_units_match_the_manual(
+    profile: Profile, code: str, address: int, scale: str, unit: str
+) -> None:
     parameter = profile[code]
     assert (parameter.address, parameter.scale, parameter.unit) == (address, scale, unit)
     assert profile.find(f"16#{address:04X}") is parameter
@@ -81,7 +83,7 @@ RANGES = [
 
 
 @pytest.mark.parametrize(("code", "low", "high", "factory", "effective"), RANGES)
-def test_ranges(
+def test_ranges_and_factory_settings_match_the_manual(
     profile: Profile, code: str, low: int, high: int, factory: int, effective: str
 ) -> None:
     parameter = profile[code]
@@ -89,14 +91,14 @@ def test_ranges(
     assert found == (low, high, factory, effective)
 
 
-def test_ten_seconds_of_acceleration_are_100_counts(profile: Profile) -> None:
+def test_acceleration_of_10_s_is_100_counts(profile: Profile) -> None:
     """The text of section 8.1 would have 1000 counts, which are 100 s."""
     acc = profile["ACC"]
     assert encode(acc, "10", profile.names(acc), Decimal(acc.scale)).raw == 100
     assert decode(acc, 1000, {}, Decimal(acc.scale)).display == "100.0 s"
 
 
-def test_eighty_hertz_are_16_1f40(profile: Profile) -> None:
+def test_frequency_of_80_hz_is_16_1f40(profile: Profile) -> None:
     reference = profile["FA01"]
     assert encode(reference, "80 Hz", {}, Decimal(reference.scale)).raw == 0x1F40
 
@@ -114,7 +116,7 @@ ENUMERATIONS = [
 
 
 @pytest.mark.parametrize(("code", "names"), ENUMERATIONS)
-def test_enumerations(profile: Profile, code: str, names: dict[int, str]) -> None:
+def test_value_names_match_the_manual(profile: Profile, code: str, names: dict[int, str]) -> None:
     assert profile.names(profile[code]) == names
 
 
@@ -129,7 +131,7 @@ FAULTS = {
 """Section 8.7; OL1 is 13 by the decimal column, its hexadecimal one is misprinted."""
 
 
-def test_faults(profile: Profile) -> None:
+def test_fault_codes_match_the_manual(profile: Profile) -> None:
     assert {fault.raw: fault.code for fault in profile.data.faults.codes} == FAULTS
     assert profile.names(profile["FE10"]) == FAULTS
     assert profile.data.faults.parameter == "FC90"
@@ -151,7 +153,7 @@ MODELS = [
 ]
 
 
-def test_models(profile: Profile) -> None:
+def test_model_codes_match_the_manual(profile: Profile) -> None:
     known = {
         (model.code, model.class_b): (model.reference, model.voltage, model.power_kw)
         for model in profile.data.identification.models
@@ -161,7 +163,7 @@ def test_models(profile: Profile) -> None:
         assert known[code, class_b] == tuple(rating)
 
 
-def test_identification(profile: Profile) -> None:
+def test_identification_matches_the_manual(profile: Profile) -> None:
     identification = profile.data.identification
     assert matching_profiles("ATV21H075M3X")[0] == "atv21"
     objects = [item.example for item in identification.objects]
@@ -172,7 +174,7 @@ def test_identification(profile: Profile) -> None:
     assert not identification.exception_has_mei_byte
 
 
-def test_functions_and_limits(profile: Profile) -> None:
+def test_functions_and_limits_match_the_manual(profile: Profile) -> None:
     found = {
         f.code: (f.max_read, f.max_write, f.broadcast, f.past_limit, f.past_limit_exception)
         for f in profile.data.functions
@@ -188,7 +190,7 @@ def test_functions_and_limits(profile: Profile) -> None:
     assert [code.code for code in profile.data.exceptions] == [1, 2, 3, 4]
 
 
-def test_blocks(profile: Profile) -> None:
+def test_blocks_match_the_manual(profile: Profile) -> None:
     read, write = profile.data.blocks
     assert (read.address, read.min_words, read.max_words) == (0x1875, 2, 5)
     assert (write.address, write.min_words, write.max_words) == (0x1870, 2, 2)
@@ -207,7 +209,7 @@ def test_blocks(profile: Profile) -> None:
             assert named == {choice.raw for choice in block.choices}
 
 
-def test_the_block_of_the_example_is_one_request(profile: Profile) -> None:
+def test_manual_example_of_the_block_is_one_request(profile: Profile) -> None:
     """Section 7.5: F875..F879 = 1..5 give status, frequency, current, voltage and alarms."""
     codes = ["FD01", "FD00", "FE03", "FE05", "FC91"]
     slots = {f"F87{5 + place}": place + 1 for place in range(5)}
@@ -234,7 +236,7 @@ STATES = [
 
 
 @pytest.mark.parametrize(("word", "state", "direction", "alarm", "local"), STATES)
-def test_states(
+def test_states_match_the_manual(
     profile: Profile, word: int, state: str, direction: str, alarm: bool, local: bool
 ) -> None:
     found = read_chart(profile, {"FD01": word})
@@ -257,7 +259,7 @@ COMMAND_BITS = {
 }  # fmt: skip
 
 
-def test_command_word(profile: Profile) -> None:
+def test_command_words_match_the_manual(profile: Profile) -> None:
     command = profile["FA00"]
     names = {bit.bit: bit.name for bit in command.bits}
     assert names.items() >= COMMAND_BITS.items()
@@ -270,13 +272,13 @@ def test_command_word(profile: Profile) -> None:
             encode(command, word, {}, Decimal(1))
 
 
-def test_alarm_bits(profile: Profile) -> None:
+def test_alarm_bits_match_the_manual(profile: Profile) -> None:
     alarms = {bit.bit for bit in profile["FC91"].bits if bit.alarm}
     assert alarms == {0, 1, 2, 3, 4, 5, 7, 8, 10, 13, 14, 15}
     assert [bit.bit for bit in profile["FE79"].bits] == [0, 1, 2, 3]
 
 
-def test_only_command_and_reference_live_in_memory(profile: Profile) -> None:
+def test_only_command_and_reference_are_volatile(profile: Profile) -> None:
     """Section 8.2: everything else that can be written wears the EEPROM."""
     ram = {p.code for p in profile.parameters if p.access != "r" and p.storage == "ram"}
     assert ram == {"FA00", "FA20", "FA01", "FA13", "FA50", "FA51"}
@@ -284,14 +286,14 @@ def test_only_command_and_reference_live_in_memory(profile: Profile) -> None:
     assert others == {"eeprom"}
 
 
-def test_speed_as_the_drive_computes_it(profile: Profile) -> None:
+def test_speed_is_computed_as_in_the_manual(profile: Profile) -> None:
     formula = profile.data.monitoring.speed_from
     assert formula is not None
     assert (formula.frequency, formula.poles, formula.result) == ("FD00", "F856", "FE90")
     assert speed_from_frequency(6000, 4) == 1800
 
 
-def test_line_fault(profile: Profile) -> None:
+def test_communication_fault_matches_the_manual(profile: Profile) -> None:
     watch = profile.data.communication_fault
     assert watch is not None
     assert (watch.timeout, watch.off, watch.reaction, watch.fault) == ("F803", 0, "F603", 24)
@@ -329,7 +331,7 @@ SETTINGS = [
 
 
 @pytest.mark.parametrize(("code", "address", "scale", "unit", "low", "high", "factory"), SETTINGS)
-def test_settings_by_number_are_unverified_and_ask_for_a_person(
+def test_settings_by_number_need_confirmation(
     profile: Profile,
     code: str,
     address: int,
@@ -348,7 +350,7 @@ def test_settings_by_number_are_unverified_and_ask_for_a_person(
     assert write_refusal(profile, parameter, "ready", {code}) is None
 
 
-def test_no_setting_of_no_document_is_taken_for_verified(profile: Profile) -> None:
+def test_undocumented_setting_is_not_verified(profile: Profile) -> None:
     manual = "AU1 CMOD FMOD ACC F800 F801 F802 F803 F829 F870 F871 F875 F876 F877 F878 F879"
     settings = {p.code for p in profile.parameters if p.storage == "eeprom" and is_verified(p)}
     assert settings == set(manual.split())
@@ -357,7 +359,7 @@ def test_no_setting_of_no_document_is_taken_for_verified(profile: Profile) -> No
     ]  # fmt: skip
 
 
-def test_inputs_know_their_functions_and_keep_the_mark(profile: Profile) -> None:
+def test_input_functions_are_named_and_unverified(profile: Profile) -> None:
     for code, factory in (("F111", "Forward"), ("F112", "Preset speed bit 1")):
         parameter = profile[code]
         assert not is_verified(parameter)
@@ -368,7 +370,7 @@ def test_inputs_know_their_functions_and_keep_the_mark(profile: Profile) -> None
         assert profile.names(parameter)[parameter.factory] == factory
 
 
-def test_limits_end_at_each_other(profile: Profile) -> None:
+def test_speed_limits_restrict_each_other(profile: Profile) -> None:
     raws = {"FH": 8000, "UL": 5000, "LL": 0, "FA01": 6000}
     past = Edits().stage(profile, "UL", "85 Hz", raws)
     assert "above FH = 80.00 Hz" in edit_problems(profile, past, raws)["UL"]
@@ -377,7 +379,7 @@ def test_limits_end_at_each_other(profile: Profile) -> None:
     assert edit_problems(profile, lower, raws) == {}
 
 
-def test_link_and_addresses(profile: Profile) -> None:
+def test_link_settings_and_addresses_match_the_manual(profile: Profile) -> None:
     data = profile.data
     assert (data.link.baud, data.link.format, data.link.bauds) == (19200, "8E1", [9600, 19200])
     assert (data.addresses.first, data.addresses.last, data.addresses.broadcast) == (1, 247, 0)

@@ -40,21 +40,23 @@ def profile(request: pytest.FixtureRequest) -> Profile:
         ("ttO", 6005, "uint16", "0.1", "s"),
     ],
 )
-def test_words(profile: Profile, code: str, address: int, kind: str, scale: str, unit: str) -> None:
+def test_words_match_the_manual(
+    profile: Profile, code: str, address: int, kind: str, scale: str, unit: str
+) -> None:
     parameter = profile[code]
     assert (parameter.address, parameter.type) == (address, kind)
     assert (parameter.scale, parameter.unit) == (scale, unit)
     assert parameter.number == f"W{address}"
 
 
-def test_limits_of_the_functions(profile: Profile) -> None:
+def test_limits_of_functions_match_the_manual(profile: Profile) -> None:
     functions = {f.code: f for f in profile.data.functions}
     assert set(functions) == {3, 6, 16, 43}
     assert (functions[3].max_read, functions[16].max_write) == (29, 27)
     assert {code for code, f in functions.items() if f.broadcast} == {6, 16}
 
 
-def test_link_settings(profile: Profile) -> None:
+def test_link_settings_match_the_manual(profile: Profile) -> None:
     link = profile.data.link
     assert (link.baud, link.format) == (19200, "8E1")
     choices = {s.role: {c.raw: c.baud or c.format for c in s.choices} for s in link.settings}
@@ -77,7 +79,7 @@ def test_link_settings(profile: Profile) -> None:
         (0x0208, "fault"),
     ],
 )
-def test_states(profile: Profile, word: int, state: str) -> None:
+def test_states_match_the_manual(profile: Profile, word: int, state: str) -> None:
     chart = profile.chart({})
     assert chart is not None
     assert state_of(chart, word).id == state
@@ -90,21 +92,21 @@ def test_ramps_follow_the_increment(profile: Profile) -> None:
         assert profile.scale(profile[code], {}) is None
 
 
-def test_an_older_altivar_31_counts_its_ramps_in_tenths() -> None:
+def test_old_altivar_31_counts_ramps_in_tenths() -> None:
     older = library.load("atv31")
     assert older.scale(older["ACC"], {}, absent={"Inr"}) == Decimal("0.1")
     newer = library.load("atv312")
     assert newer.scale(newer["ACC"], {}, absent={"Inr"}) is None
 
 
-def test_reactions_are_those_of_the_parameter(profile: Profile) -> None:
+def test_reactions_are_the_values_of_the_parameter(profile: Profile) -> None:
     watch = profile.data.communication_fault
     assert watch is not None
     assert {r.raw for r in watch.reactions} == set(profile.names(profile["SLL"])) == {0, 1, 6, 7}
     assert [r.raw for r in watch.reactions if r.motor_keeps_running] == [0]
 
 
-def test_faults(profile: Profile) -> None:
+def test_faults_match_the_manual(profile: Profile) -> None:
     codes = {f.raw: f.code for f in profile.data.faults.codes}
     assert codes[0] == "nOF"
     assert codes[5] == "SLF"
@@ -113,7 +115,7 @@ def test_faults(profile: Profile) -> None:
     assert profile.names(profile["DP1"]) == profile.names(profile["LFt"])
 
 
-def test_confidence() -> None:
+def test_unconfirmed_facts_are_marked() -> None:
     older = library.load("atv31")
     assert older["rFr"].confidence == "public"
     assert older["CMI"].confidence == "analogy"
@@ -121,7 +123,7 @@ def test_confidence() -> None:
     assert library.load("atv312")["ACC"].confidence == "public"
 
 
-def test_the_access_code_is_never_offered(profile: Profile) -> None:
+def test_access_code_is_never_shown(profile: Profile) -> None:
     assert profile["COd"].forbidden
     assert 14 in profile["CMI"].reserved
 
@@ -141,7 +143,7 @@ def test_the_access_level_warns(profile: Profile) -> None:
     assert "starts the motor immediately" in profile["LAC"].note
 
 
-def test_names_of_values_are_this_family_s_own() -> None:
+def test_value_names_are_those_of_the_family() -> None:
     """Sister families name other things with the same raw values."""
     profile = library.load("atv312")
     names = {code: profile.names(profile[code]) for code in ("NCV", "VCAL", "dO", "LAC", "IPL")}
@@ -152,7 +154,7 @@ def test_names_of_values_are_this_family_s_own() -> None:
     assert names["IPL"][1] == "Fast stop"
 
 
-def test_reactions_have_the_names_of_the_keypad(profile: Profile) -> None:
+def test_reactions_have_their_keypad_names(profile: Profile) -> None:
     watch = profile.data.communication_fault
     assert watch is not None
     found = {r.raw: (r.code, r.name) for r in watch.reactions}

@@ -28,7 +28,7 @@ def shown(profile: Profile, code: str, raw: int, **others: int) -> str:
     ).display
 
 
-def test_every_parameter_of_the_standard_drive_is_there(atv71: Profile) -> None:
+def test_profile_has_every_parameter_of_the_standard_drive(atv71: Profile) -> None:
     assert len(atv71.parameters) == 806
     assert len({p.address for p in atv71.parameters}) == 806
 
@@ -37,7 +37,7 @@ def test_every_parameter_of_the_standard_drive_is_there(atv71: Profile) -> None:
     "address",
     [3113, 6063, 6665, 6690, 6692, 7140, 9117, 9217, 9676, 9690, 9697, 11507, 15607, 64280],
 )
-def test_words_of_specification_383_only_are_left_out(atv71: Profile, address: int) -> None:
+def test_words_of_specification_383_only_are_omitted(atv71: Profile, address: int) -> None:
     assert atv71.at(address) is None
 
 
@@ -85,7 +85,7 @@ def test_words_of_specification_383_only_are_left_out(atv71: Profile, address: i
         ("NLS", 12511, "uint16", "m/s", "0.01", "rw-stopped"),
     ],
 )
-def test_words(
+def test_words_match_the_manual(
     atv71: Profile, code: str, address: int, kind: str, unit: str, scale: str, access: str
 ) -> None:
     parameter = atv71[code]
@@ -116,7 +116,7 @@ def test_words(
         ("NLS", 20, 500, 100),
     ],
 )
-def test_ranges_and_factory_settings(
+def test_ranges_and_factory_settings_match_the_manual(
     atv71: Profile, code: str, low: int, high: int, factory: int | None
 ) -> None:
     assert raw_range(atv71[code]) == (low, high)
@@ -140,7 +140,9 @@ def test_ranges_and_factory_settings(
         ("THT", 1),
     ],
 )
-def test_factory_settings_of_enumerations(atv71: Profile, code: str, factory: int) -> None:
+def test_factory_settings_of_enumerations_match_the_manual(
+    atv71: Profile, code: str, factory: int
+) -> None:
     assert atv71[code].factory == factory
 
 
@@ -172,13 +174,13 @@ def test_factory_settings_of_enumerations(atv71: Profile, code: str, factory: in
         ("ETA", 0x8637, {}, "16#8637"),
     ],
 )
-def test_raw_values_in_words(
+def test_raw_values_have_names(
     atv71: Profile, code: str, raw: int, others: dict[str, int], text: str
 ) -> None:
     assert shown(atv71, code, raw, **others) == text
 
 
-def test_low_word_of_a_long_value_stands_first(atv71: Profile) -> None:
+def test_low_word_of_a_long_value_comes_first(atv71: Profile) -> None:
     assert from_words(atv71["SMAL"], [0x0001, 0x0000]) == 1
 
 
@@ -193,7 +195,7 @@ def test_ramps_follow_their_increment(atv71: Profile) -> None:
 # Link, functions, reading
 
 
-def test_link_and_addresses(atv71: Profile) -> None:
+def test_link_settings_and_addresses_match_the_manual(atv71: Profile) -> None:
     link = atv71.data.link
     assert (link.baud, link.format) == (19200, "8E1")
     assert link.bauds == [4800, 9600, 19200, 38400]
@@ -208,7 +210,7 @@ def test_link_and_addresses(atv71: Profile) -> None:
     assert [server.parameter for server in addresses.servers] == ["AMOA", "AMOC"]
 
 
-def test_functions_and_their_limits(atv71: Profile) -> None:
+def test_functions_and_limits_match_the_manual(atv71: Profile) -> None:
     limits = {f.code: (f.max_read, f.max_write, f.broadcast) for f in atv71.data.functions}
     assert limits == {
         3: (63, None, False),
@@ -223,7 +225,7 @@ def test_functions_and_their_limits(atv71: Profile) -> None:
     assert diagnostics.subfunctions == [0x00, 0x0A, 0x0C, 0x0E]
 
 
-def test_unknown_words_of_a_read(atv71: Profile) -> None:
+def test_unknown_words_within_a_read_are_described(atv71: Profile) -> None:
     reading = atv71.data.reading
     assert reading.unknown_word == 0x8000
     assert reading.unknown_exception == 2
@@ -231,7 +233,7 @@ def test_unknown_words_of_a_read(atv71: Profile) -> None:
     assert not reading.single_words_only
 
 
-def test_identification(atv71: Profile) -> None:
+def test_identification_matches_the_manual(atv71: Profile) -> None:
     found = atv71.data.identification
     assert [(o.id, o.meaning, o.example) for o in found.objects] == [
         (0, "vendor", "Telemecanique"),
@@ -246,14 +248,14 @@ def test_identification(atv71: Profile) -> None:
     assert (ratings[9], ratings[23], ratings[45]) == ("1.5", "37", "1200")
 
 
-def test_exceptions(atv71: Profile) -> None:
+def test_exceptions_match_the_manual(atv71: Profile) -> None:
     assert [e.code for e in atv71.data.exceptions] == [1, 2, 3, 4]
 
 
 # Communication scanner
 
 
-def test_scanner(atv71: Profile) -> None:
+def test_scanner_matches_the_manual(atv71: Profile) -> None:
     read, write = atv71.data.blocks
     assert (read.direction, read.address, read.max_words) == ("read", 12741, 8)
     assert (write.direction, write.address, write.max_words) == ("write", 12761, 8)
@@ -270,7 +272,7 @@ def test_scanner(atv71: Profile) -> None:
     assert {atv71[code].access for code in write.values} == {"rw"}
 
 
-def test_scanner_as_it_leaves_the_factory(atv71: Profile) -> None:
+def test_scanner_factory_assignment_matches_the_manual(atv71: Profile) -> None:
     assert [atv71[f"NMA{n}"].factory for n in range(1, 9)] == [3201, 8604, 0, 0, 0, 0, 0, 0]
     assert [atv71[f"NCA{n}"].factory for n in range(1, 9)] == [8501, 8602, 0, 0, 0, 0, 0, 0]
 
@@ -301,7 +303,7 @@ def test_scanner_as_it_leaves_the_factory(atv71: Profile) -> None:
         (0x0250, "disabled"),
     ],
 )
-def test_drivecom_states(atv71: Profile, word: int, state: str) -> None:
+def test_drivecom_states_match_the_manual(atv71: Profile, word: int, state: str) -> None:
     assert state_of(chart_of(atv71, "drivecom"), word).id == state
 
 
@@ -323,7 +325,7 @@ def test_no_drivecom_word_fits_two_states(atv71: Profile) -> None:
         (0x002E, "fault"),
     ],
 )
-def test_states_of_the_io_profile(atv71: Profile, word: int, state: str) -> None:
+def test_states_of_the_io_profile_match_the_manual(atv71: Profile, word: int, state: str) -> None:
     assert state_of(chart_of(atv71, "io"), word).id == state
 
 
@@ -337,7 +339,7 @@ def test_chart_follows_the_control_profile(atv71: Profile) -> None:
     }
 
 
-def test_an_undescribed_profile_tells_no_state_and_takes_no_command(atv71: Profile) -> None:
+def test_undescribed_control_profile_has_no_states_and_no_commands(atv71: Profile) -> None:
     chart = chart_of(atv71, "series-8")
     assert chart.command == ""
     assert chart.transitions == []
@@ -345,7 +347,7 @@ def test_an_undescribed_profile_tells_no_state_and_takes_no_command(atv71: Profi
         assert read_chart(atv71, {"CHCF": 0, "ETA": word}).kind == UNKNOWN.kind
 
 
-def test_status_bits_beside_the_state(atv71: Profile) -> None:
+def test_status_bits_outside_the_state_match_the_manual(atv71: Profile) -> None:
     forward = read_chart(atv71, {"CHCF": 1, "ETA": 0x0637})
     assert (forward.direction, forward.reached, forward.alarm, forward.local) == (
         "forward",
@@ -362,7 +364,7 @@ def test_status_bits_beside_the_state(atv71: Profile) -> None:
     )
 
 
-def test_drivecom_commands(atv71: Profile) -> None:
+def test_drivecom_commands_match_the_manual(atv71: Profile) -> None:
     found = {
         (t.number, t.source, t.target): t.command
         for t in chart_of(atv71, "drivecom").transitions
@@ -385,7 +387,7 @@ def test_drivecom_commands(atv71: Profile) -> None:
     }
 
 
-def test_no_drivecom_word_in_the_io_profile(atv71: Profile) -> None:
+def test_io_profile_has_no_drivecom_word(atv71: Profile) -> None:
     commands = {t.command for t in chart_of(atv71, "io").transitions}
     assert commands == {0x0000, 0x0001}
 
@@ -419,13 +421,13 @@ def test_reserved_command_bits_are_refused(atv71: Profile) -> None:
         (99, "CSF"),
     ],
 )
-def test_faults(atv71: Profile, raw: int, code: str) -> None:
+def test_fault_codes_match_the_manual(atv71: Profile, raw: int, code: str) -> None:
     fault = atv71.fault(raw)
     assert fault is not None
     assert fault.code == code
 
 
-def test_faults_as_a_whole(atv71: Profile) -> None:
+def test_fault_table_is_complete(atv71: Profile) -> None:
     faults = atv71.data.faults
     assert len(faults.codes) == 75
     assert faults.parameter == "LFT"
@@ -435,14 +437,14 @@ def test_faults_as_a_whole(atv71: Profile) -> None:
     assert atv71.fault(105) is None
 
 
-def test_records_of_past_faults(atv71: Profile) -> None:
+def test_fault_history_matches_the_manual(atv71: Profile) -> None:
     firsts = {"DP": 7200, "EP": 7210, "IP": 7220, "CMP": 7230, "LCP": 7240, "RFP": 7250}
     firsts |= {"RTP": 7260, "ULP": 7270, "THP": 7280, "CRP": 7290, "MD": 7300, "DM": 7310}
     for name, first in firsts.items():
         assert [atv71[f"{name}{n}"].address for n in range(9)] == list(range(first, first + 9))
 
 
-def test_communication_fault(atv71: Profile) -> None:
+def test_communication_fault_matches_the_manual(atv71: Profile) -> None:
     watch = atv71.data.communication_fault
     assert watch is not None
     assert (watch.timeout, watch.reaction, watch.fault) == ("TTO", "SLL", 5)
@@ -476,7 +478,7 @@ def test_communication_fault(atv71: Profile) -> None:
         ("CIC", {0, 2, 3, 4, 6, 7, 9, 10, 12, 13}),
     ],
 )
-def test_bits(atv71: Profile, code: str, bits: set[int]) -> None:
+def test_bits_match_the_manual(atv71: Profile, code: str, bits: set[int]) -> None:
     assert {bit.bit for bit in atv71[code].bits} == bits
 
 
@@ -512,7 +514,7 @@ def test_unconfirmed_fact_is_marked(atv71: Profile) -> None:
             assert parameter.unit == "", parameter.code
 
 
-def test_errata_are_carried_along(atv71: Profile) -> None:
+def test_errata_are_recorded(atv71: Profile) -> None:
     def about(text: str) -> Erratum:
         return next(e for e in atv71.data.errata if text in e.place)
 
@@ -520,7 +522,7 @@ def test_errata_are_carried_along(atv71: Profile) -> None:
     assert about("second output").right.startswith("8602")
 
 
-def test_monitoring_set(atv71: Profile) -> None:
+def test_monitoring_set_has_the_main_values(atv71: Profile) -> None:
     rates = {value.parameter: value.rate for value in atv71.data.monitoring.values}
     assert [code for code, rate in rates.items() if rate == "fast"][:3] == ["RFR", "FRH", "RFRD"]
     assert {"LCR", "OTR", "UOP", "ETA"} <= {c for c, r in rates.items() if r == "fast"}

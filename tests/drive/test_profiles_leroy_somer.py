@@ -47,7 +47,7 @@ ADDRESSES = [
 
 
 @pytest.mark.parametrize(("code", "address"), ADDRESSES)
-def test_addresses(profile: Profile, code: str, address: int) -> None:
+def test_addresses_match_the_manual(profile: Profile, code: str, address: int) -> None:
     assert profile[code].address == address
     assert profile.find(code) is profile.find(str(address))
 
@@ -59,7 +59,7 @@ def test_every_address_follows_from_menu_and_parameter(profile: Profile) -> None
         assert parameter.number == parameter.code
 
 
-def test_functions_limits_and_silence(profile: Profile) -> None:
+def test_functions_and_limits_match_the_manual(profile: Profile) -> None:
     found = {f.code: (f.max_read, f.max_write, f.broadcast) for f in profile.data.functions}
     assert found == {
         3: (20, None, False),
@@ -72,7 +72,7 @@ def test_functions_limits_and_silence(profile: Profile) -> None:
     assert profile.data.identification.objects == []
 
 
-def test_group_addresses(profile: Profile) -> None:
+def test_group_addresses_match_the_manual(profile: Profile) -> None:
     addresses = profile.data.addresses
     assert addresses.zero_digit_is_group
     assert (addresses.first, addresses.last, addresses.factory) == (1, 247, 1)
@@ -88,7 +88,7 @@ MODULE = [
 
 
 @pytest.mark.parametrize(("code", "low", "high", "factory", "scale", "unit"), MODULE)
-def test_module_settings(
+def test_module_settings_match_the_manual(
     profile: Profile, code: str, low: int, high: int, factory: int, scale: str, unit: str
 ) -> None:
     p = profile[code]
@@ -99,7 +99,7 @@ BAUDS = [300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
 
 
 @pytest.mark.parametrize(("name", "count"), [("powerdrive", 10), ("proxidrive", 7), ("varmeca", 7)])
-def test_baud_rates(name: str, count: int) -> None:
+def test_baud_rates_match_the_manual(name: str, count: int) -> None:
     """38400, 57600 and 115200 work on the Powerdrive only."""
     profile = PROFILES[name]
     rates = {raw: str(baud) for raw, baud in enumerate(BAUDS[:count])}
@@ -113,7 +113,7 @@ def test_baud_rates(name: str, count: int) -> None:
             assert {c.raw: c.baud for c in setting.choices} == dict(enumerate(BAUDS[:count]))
 
 
-def test_formats(profile: Profile) -> None:
+def test_formats_match_the_manual(profile: Profile) -> None:
     settings = [s for s in profile.data.link.settings if s.role == "format"]
     assert [s.parameter for s in settings] == ["15.05", "11.27"]
     for setting in settings:
@@ -128,7 +128,7 @@ def test_option_code_comes_before_the_rest_of_menu_15(profile: Profile, code: st
     assert profile["15.01"].access == "r"
 
 
-def test_time_out_in_tenths(profile: Profile) -> None:
+def test_timeout_is_in_tenths_of_a_second(profile: Profile) -> None:
     timeout = profile["15.07"]
     names = profile.names(timeout)
     assert encode(timeout, "2.5 s", names, Decimal(timeout.scale)).raw == 25
@@ -142,7 +142,7 @@ CONTROL_BITS = {0: "6.15", 1: "6.30", 2: "6.31", 3: "6.32", 4: "6.33", 5: "6.34"
 CONTROL_BITS[13] = "10.33"
 
 
-def test_control_word(profile: Profile) -> None:
+def test_control_words_match_the_manual(profile: Profile) -> None:
     command = profile["6.42"]
     assert {bit.bit for bit in command.bits} == set(CONTROL_BITS)
     assert command.reserved == [6, 7, 9, 10, 11, 12, 14, 15]
@@ -163,7 +163,7 @@ def test_derived_command_words_are_marked(profile: Profile) -> None:
 @pytest.mark.parametrize(
     ("name", "bits"), [("powerdrive", 15), ("proxidrive", 14), ("varmeca", 14)]
 )
-def test_status_word(name: str, bits: int) -> None:
+def test_status_bits_match_the_manual(name: str, bits: int) -> None:
     """Each bit is a parameter of menu 10; 10.15 is not used on Proxidrive and Varmeca."""
     profile = PROFILES[name]
     status = profile["10.40"]
@@ -186,7 +186,7 @@ STATES = [
 
 
 @pytest.mark.parametrize(("word", "control", "state", "kind", "reached", "local"), STATES)
-def test_states(
+def test_states_match_the_manual(
     profile: Profile, word: int, control: int, state: str, kind: str, reached: bool, local: bool
 ) -> None:
     found = read_chart(profile, {"10.40": word, "6.43": control})
@@ -221,7 +221,7 @@ def test_bits_of_the_status_are_read_in_one_request(profile: Profile) -> None:
     assert (request.address, request.count) == (1000, 14)
 
 
-def test_varmeca_knows_what_its_cover_diagram_names() -> None:
+def test_varmeca_has_the_parameters_of_its_cover_diagram() -> None:
     varmeca, powerdrive = PROFILES["varmeca"], PROFILES["powerdrive"]
     for code in ("1.11", "1.17", "12.43", "12.44"):
         assert varmeca[code].source.startswith("varmeca-30")
@@ -230,7 +230,7 @@ def test_varmeca_knows_what_its_cover_diagram_names() -> None:
     assert powerdrive["5.01"].confidence == "analogy"
 
 
-def test_connectors(profile: Profile) -> None:
+def test_connectors_match_the_manual(profile: Profile) -> None:
     sub_d, terminals = profile.data.connectors
     assert {p.pin: p.signal for p in sub_d.pins if p.signal != "Not connected"} == {
         "1": "0 V common", "2": "TX\\", "3": "RX\\", "6": "TX", "7": "RX", "Shield": "0 V common",

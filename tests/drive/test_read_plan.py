@@ -74,23 +74,23 @@ def test_neighbors_are_read_together() -> None:
     assert spans(plan_reads(profile, codes([3201, 3202, 3204]), TIMING)) == [(3201, 4)]
 
 
-def test_an_unknown_gap_is_not_read_over() -> None:
+def test_unknown_gap_is_not_read() -> None:
     profile = profile_of([10, 11, 13])
     assert spans(plan_reads(profile, codes([10, 11, 13]), TIMING)) == [(10, 2), (13, 1)]
 
 
-def test_a_readable_gap_is_read_over_when_cheaper() -> None:
+def test_readable_gap_is_read_if_cheaper() -> None:
     profile = profile_of([10, 11, 13, 80], gaps=True)
     assert spans(plan_reads(profile, codes([10, 11, 13, 80]), TIMING)) == [(10, 4), (80, 1)]
 
 
-def test_the_longest_read_is_kept() -> None:
+def test_longest_read_is_not_exceeded() -> None:
     profile = profile_of(range(100, 160), longest=20)
     plan = plan_reads(profile, codes(range(100, 160)), TIMING)
     assert sorted(count for _, count in spans(plan)) == [20, 20, 20]
 
 
-def test_the_second_word_of_the_last_counts_too() -> None:
+def test_second_word_of_the_last_value_counts() -> None:
     profile = profile_of([1, 2, 3, 4], longest=4, wide=[4])
     plan = plan_reads(profile, codes([1, 2, 3, 4]), TIMING)
     assert covered(plan) == codes([1, 2, 3, 4])
@@ -102,19 +102,19 @@ def test_single_words_only() -> None:
     assert spans(plan_reads(profile, codes([1, 2, 3]), TIMING)) == [(1, 1), (2, 1), (3, 1)]
 
 
-def test_a_refused_parameter_is_not_read_over() -> None:
+def test_refused_parameter_is_not_read_as_a_gap() -> None:
     profile = profile_of([1, 2, 3])
     plan = plan_reads(profile, codes([1, 3]), TIMING, unreadable={"P2"})
     assert spans(plan) == [(1, 1), (3, 1)]
 
 
-def test_a_word_that_can_only_be_written_is_refused() -> None:
+def test_write_only_word_is_refused() -> None:
     profile = profile_of([1, 2], write_only=[2])
     with pytest.raises(DriveError, match="only be written"):
         plan_reads(profile, ["P2"], TIMING)
 
 
-def test_an_unknown_code_is_named() -> None:
+def test_unknown_code_is_named() -> None:
     with pytest.raises(UnknownParameter, match="'P9'"):
         plan_reads(profile_of([1]), ["P9"], TIMING)
 
@@ -134,7 +134,7 @@ BLOCK = {
 }
 
 
-def test_an_indirect_block_is_used_when_its_slots_are_known() -> None:
+def test_indirect_block_is_used_if_its_slots_are_known() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
     wanted = codes([500, 900])
     slots = {"P2165": 1, "P2166": 2, "P2167": 0}
@@ -144,7 +144,7 @@ def test_an_indirect_block_is_used_when_its_slots_are_known() -> None:
     assert spans(plan_reads(profile, wanted, TIMING)) == [(500, 1), (900, 1)]
 
 
-def test_a_place_of_an_indirect_block_that_is_not_known_is_read_over() -> None:
+def test_unknown_slot_of_an_indirect_block_is_read_as_a_gap() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
     plan = plan_reads(profile, codes([500, 900]), TIMING, slots={"P2165": 2, "P2167": 1})
     (request,) = plan.requests
@@ -152,7 +152,7 @@ def test_a_place_of_an_indirect_block_that_is_not_known_is_read_over() -> None:
     assert [(place.code, place.offset) for place in request.places] == [("P900", 0), ("P500", 2)]
 
 
-def test_a_scanner_is_not_read_over_an_unused_slot() -> None:
+def test_scanner_read_does_not_include_an_unused_slot() -> None:
     profile = profile_of([500, 900, 1200, 2165, 2166, 2167], single=True, blocks=[SCANNER])
     plan = plan_reads(profile, codes([500, 1200]), TIMING, slots={"P2165": 500, "P2167": 1200})
     assert spans(plan) == [(500, 1), (1200, 1)]
@@ -176,7 +176,7 @@ SCANNER = BLOCK | {
 }
 
 
-def test_slots_that_anybody_may_change_are_read_after_their_block() -> None:
+def test_changeable_slots_are_read_after_their_block() -> None:
     profile = profile_of([500, 900, 1200, 2165, 2166, 2167], blocks=[SCANNER])
     slots = {"P2165": 500, "P2166": 900, "P2167": 1200}
     plan = plan_reads(profile, codes([500, 900, 1200]), TIMING, slots=slots)
@@ -202,7 +202,9 @@ def test_a_scanner_that_saves_no_time_is_not_used() -> None:
     wanted=st.sets(st.sampled_from([10, 11, 12, 20, 30, 40, 50]), min_size=1),
     checked=st.booleans(),
 )
-def test_no_use_of_a_block_is_cheaper(slots: list[int], wanted: set[int], *, checked: bool) -> None:
+def test_no_other_use_of_blocks_is_cheaper(
+    slots: list[int], wanted: set[int], *, checked: bool
+) -> None:
     """Every part of the block, with the best direct reads of what it leaves."""
     block = SCANNER | {"effective": "at-once" if checked else "after-reset"}
     profile = profile_of([10, 11, 12, 20, 30, 40, 50, 2165, 2166, 2167], blocks=[block])
@@ -237,7 +239,7 @@ def splits(items: Sequence[int]) -> Iterator[list[Sequence[int]]]:
     gaps=st.booleans(),
     turnaround=st.floats(0.0, 0.02),
 )
-def test_no_split_is_cheaper(
+def test_no_other_split_is_cheaper(
     known: set[int], share: object, longest: int, gaps: bool, turnaround: float
 ) -> None:
     timing = WireTiming(11 / 19200, 3.5 * 11 / 19200, turnaround)

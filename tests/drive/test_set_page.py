@@ -19,7 +19,7 @@ def example() -> str:
     return str(text)
 
 
-def test_the_example_is_a_parameter_set() -> None:
+def test_page_example_is_a_valid_parameter_set() -> None:
     found = load_set(example(), "page.toml", library.load)
     assert found.raws == {"HSP": 500, "INR": 1, "ACC": 30, "DEC": 35}
     assert "exception 2" in found.absent["LAC"]
@@ -39,12 +39,12 @@ def test_the_example_is_a_parameter_set() -> None:
         ("format = 1\n", ""),
     ],
 )
-def test_refusals_match_the_profile_page(old: str, new: str) -> None:
+def test_page_lists_every_refusal(old: str, new: str) -> None:
     assert old in example()
     with pytest.raises(SetError, match=r"page\.toml"):
         load_set(example().replace(old, new), "page.toml", library.load)
 
 
-def test_the_page_names_every_part() -> None:
+def test_page_names_every_part() -> None:
     for part in (SET_HEADER, ABSENT, END_OF_SET, "identity"):
         assert f"| `[{part}]` |" in PAGE.read_text("utf-8")

@@ -29,7 +29,7 @@ NOTHING: dict[str, int] = {}
         ({"Inr": 7}, set(), "50 raw", "50"),
     ],
 )
-def test_a_ramp_in_the_unit_that_the_drive_counts_in(
+def test_ramp_is_shown_in_the_increment_of_the_drive(
     raws: dict[str, int], absent: set[str], text: str, typed: str
 ) -> None:
     ramp = ATV31["ACC"]
@@ -41,12 +41,12 @@ def test_a_ramp_in_the_unit_that_the_drive_counts_in(
 @pytest.mark.parametrize(
     ("word", "text"), [(0, "3 s"), (16, "3 min"), (32, "3 h"), (48, "3 raw"), (None, "3 raw")]
 )
-def test_a_unit_that_a_word_tells(word: int | None, text: str) -> None:
+def test_unit_is_set_by_another_word(word: int | None, text: str) -> None:
     raws = NOTHING if word is None else {"UNT": word}
     assert shown_text(ATV71, ATV71["RTH"], 3, raws) == text
 
 
-def test_words_of_bits_and_names() -> None:
+def test_bit_words_and_named_values_are_shown() -> None:
     assert shown_text(ATV71, ATV71["CMD"], 15, NOTHING) == "16#000F"
     assert typed_text(ATV71, ATV71["CMD"], 15, NOTHING) == "16#000F"
     assert shown_text(ATV71, ATV71["CHCF"], 3, NOTHING) == "I/O profile"
@@ -54,7 +54,7 @@ def test_words_of_bits_and_names() -> None:
     assert shown_text(ATV71, ATV71["CMD"], None, NOTHING) == ""
 
 
-def test_dependencies_of_values() -> None:
+def test_values_know_their_dependencies() -> None:
     assert depends_on(ATV31["ACC"]) == ("Inr",)
     assert depends_on(ATV71["RTH"]) == ("UNT",)
     assert depends_on(ATV71["CMD"]) == ()

@@ -26,14 +26,14 @@ def family(request: pytest.FixtureRequest) -> Profile:
     return library.load(str(request.param))
 
 
-def test_every_measurement_of_a_leroy_somer_drive_can_be_taught(family: Profile) -> None:
+def test_scale_of_every_leroy_somer_measurement_can_be_learned(family: Profile) -> None:
     assert {"1.06", "1.21", "4.01", "5.01", "5.02"} <= {*teachable_codes(family)}
     for code in ("6.42", "10.40", "6.43", "15.07", "10.01"):
         assert why_not_taught(family, code), code
 
 
 @pytest.mark.parametrize("id", ["atv21", "atv31", "atv312", "atv71"])
-def test_known_scale_of_family_is_not_taught(id: str) -> None:
+def test_known_scale_of_a_family_cannot_be_learned(id: str) -> None:
     family = library.load(id)
     reported = [p for p in family.parameters if p.unit or p.values or p.bits or p.scale != "1"]
     assert reported
@@ -42,7 +42,7 @@ def test_known_scale_of_family_is_not_taught(id: str) -> None:
     assert not {p.code for p in written} & {*teachable_codes(family)}, "no measurements"
 
 
-def test_a_taught_value_is_reported_with_its_sign_and_mark(family: Profile) -> None:
+def test_value_with_a_learned_scale_has_its_sign_and_mark(family: Profile) -> None:
     own = with_taught(family, {"5.01": HERTZ, "1.21": RPM})
     value = shown(own, own["5.01"], 65236, {})
     assert (value.display, value.taught) == ("-30.0 Hz", True)
@@ -55,7 +55,7 @@ def test_a_taught_value_is_reported_with_its_sign_and_mark(family: Profile) -> N
     assert not shown(family, family["5.01"], 300, {}).taught
 
 
-def test_taught_value_stays_read_only_in_editor(family: Profile) -> None:
+def test_value_with_a_learned_scale_stays_read_only(family: Profile) -> None:
     own = with_taught(family, {"1.21": RPM}, "1.21")
     refused = write_refusal(own, own["1.21"], "ready", ("1.21",))
     assert refused is not None
@@ -64,7 +64,7 @@ def test_taught_value_stays_read_only_in_editor(family: Profile) -> None:
     assert not not_factory(own, own["1.21"], {"1.21": 900})
 
 
-def test_the_confirmed_reference_is_chosen_by_each_command_to_run_and_by_nothing_else(
+def test_only_run_commands_select_the_confirmed_reference(
     family: Profile,
 ) -> None:
     own = with_taught(family, {"1.21": RPM}, "1.21")
@@ -79,18 +79,18 @@ def test_the_confirmed_reference_is_chosen_by_each_command_to_run_and_by_nothing
 
 
 @pytest.mark.parametrize("unit", ["", "%", "A"])
-def test_a_preset_in_another_unit_takes_no_reference(family: Profile, unit: str) -> None:
+def test_preset_in_another_unit_accepts_no_reference(family: Profile, unit: str) -> None:
     own = with_taught(family, {"1.21": TaughtScale(Decimal(1), unit, None)}, "1.21")
     assert own.quantity("command_speed") is None
     assert own.data.charts == family.data.charts
 
 
-def test_nothing_known_is_the_family_itself(family: Profile) -> None:
+def test_profile_without_learned_scales_is_unchanged(family: Profile) -> None:
     assert with_taught(family, {}) is family
     assert with_taught(family, {"NOSUCH": HERTZ, "10.40": HERTZ}, "1.21") is family
 
 
-def test_commander_of_a_drive(family: Profile) -> None:
+def test_control_source_is_line_terminals_or_unknown(family: Profile) -> None:
     unknown, line, terminals = (
         control_taking(family, raws) for raws in ({}, {"6.43": 1}, {"6.43": 0})
     )
@@ -106,7 +106,7 @@ def test_commander_of_a_drive(family: Profile) -> None:
 @pytest.mark.parametrize(
     ("word", "holds"), [(0, False), (1, False), (3, True), (9, True), (0x20, True)]
 )
-def test_the_control_is_not_taken_over_a_waiting_run_command(
+def test_control_is_not_taken_while_a_run_command_waits(
     family: Profile, word: int, holds: bool
 ) -> None:
     (chart,) = family.data.charts

@@ -45,7 +45,7 @@ def taught(*looks: DisplayLook) -> Lesson:
 
 
 @given(scales, st.booleans(), words, words, st.integers(0, 4), cuts)
-def test_every_scale_is_found_from_two_honest_looks(
+def test_every_scale_is_found_from_two_correct_readings(
     scale: Decimal, signed: bool, number: int, other: int, places: int, cut: str
 ) -> None:
     first, second = (honest(word, scale, signed, places, cut) for word in (number, other))
@@ -63,7 +63,7 @@ def test_every_scale_is_found_from_two_honest_looks(
 
 
 @given(scales, st.booleans(), st.lists(words, min_size=1, max_size=12), st.integers(0, 4), cuts)
-def test_honest_looks_never_teach_another_scale(
+def test_correct_readings_never_give_a_wrong_scale(
     scale: Decimal, signed: bool, seen: list[int], places: int, cut: str
 ) -> None:
     looks = [honest(word, scale, signed, places, cut) for word in seen]
@@ -77,7 +77,7 @@ def test_honest_looks_never_teach_another_scale(
 
 
 @given(scales, words, words, st.sampled_from(["1.3", "0.7", "4", "0.1", "10"]))
-def test_an_inconsistent_pair_teaches_nothing_and_says_so(
+def test_inconsistent_readings_give_no_scale_and_a_reason(
     scale: Decimal, number: int, other: int, wrong: str
 ) -> None:
     first, second = (honest(word, scale, False, 4, ROUND_HALF_UP) for word in (number, other))
@@ -90,7 +90,7 @@ def test_an_inconsistent_pair_teaches_nothing_and_says_so(
     assert "no usual scale" in lesson.text
 
 
-def test_the_words_of_a_reverse_run_tell_the_sign() -> None:
+def test_reverse_run_shows_the_sign() -> None:
     lesson = taught(look(0, "0.0"), look(503, "50.3", "Hz"))
     assert lesson.scale is not None
     assert lesson.scale.signed is None
@@ -103,14 +103,14 @@ def test_the_words_of_a_reverse_run_tell_the_sign() -> None:
     assert "sign" in later.text
 
 
-def test_a_word_without_a_sign() -> None:
+def test_unsigned_word_is_recognized() -> None:
     lesson = taught(look(1000, "100.0"), look(40000, "4000.0"))
     assert lesson.scale is not None
     assert lesson.scale.signed is False
     assert lesson.scale.number(40000) == Decimal("4000.0")
 
 
-def test_a_third_look_that_disagrees_ends_it() -> None:
+def test_disagreeing_third_reading_discards_the_scale() -> None:
     two = taught(look(300, "30.0", "Hz"), look(503, "50.3"))
     assert two.kind is LessonKind.TAUGHT
     lesson = learn("5.01", two.looks, look(400, "20.0"))
@@ -121,12 +121,12 @@ def test_a_third_look_that_disagrees_ends_it() -> None:
     assert lesson.looks == (look(400, "20.0"),), "the last look may begin anew"
 
 
-def test_a_third_look_in_another_unit_ends_it_too() -> None:
+def test_third_reading_in_another_unit_discards_the_scale() -> None:
     two = taught(look(300, "30.0", "Hz"), look(503, "50.3"))
     assert learn("5.01", two.looks, look(400, "40.0", "A")).kind is LessonKind.ENDED
 
 
-def test_one_look_and_the_same_look_again_teach_nothing() -> None:
+def test_repeated_equal_readings_give_no_scale() -> None:
     lesson = taught(look(503, "50.3", "Hz"))
     assert (lesson.kind, lesson.scale) == (LessonKind.FIRST, None)
     again = learn("5.01", lesson.looks, look(503, "50.3"))
@@ -134,7 +134,7 @@ def test_one_look_and_the_same_look_again_teach_nothing() -> None:
     assert "another value" in again.text
 
 
-def test_small_values_ask_for_a_larger_one() -> None:
+def test_small_values_require_a_larger_reading() -> None:
     lesson = taught(look(0, "0.0"), look(3, "0.3"))
     assert lesson.kind is LessonKind.UNSURE
     assert "larger" in lesson.text
@@ -142,7 +142,7 @@ def test_small_values_ask_for_a_larger_one() -> None:
     assert learn("4.01", lesson.looks, look(84, "8.4", "A")).kind is LessonKind.TAUGHT
 
 
-def test_a_unit_may_be_reported_later() -> None:
+def test_unit_may_be_added_by_a_later_reading() -> None:
     two = taught(look(300, "30.0"), look(503, "50.3"))
     assert two.scale is not None
     assert two.scale.unit == ""
@@ -151,12 +151,12 @@ def test_a_unit_may_be_reported_later() -> None:
     assert (reported.scale.unit, len(reported.looks)) == ("Hz", 2)
 
 
-def test_a_look_that_no_scale_gives_is_not_kept() -> None:
+def test_reading_that_fits_no_scale_is_not_kept() -> None:
     lesson = taught(look(0, "12.0"))
     assert (lesson.kind, lesson.looks) == (LessonKind.DISAGREES, ())
 
 
-def test_without_a_look_nothing_fits() -> None:
+def test_lesson_without_readings_has_no_scale() -> None:
     assert scales_that_fit([]) == []
 
 
@@ -175,7 +175,7 @@ def test_without_a_look_nothing_fits() -> None:
         ("80 %", "%", "80", "%"),
     ],
 )
-def test_typed_display_values(typed: str, unit: str, number: str, means: str) -> None:
+def test_typed_display_value_is_parsed(typed: str, unit: str, number: str, means: str) -> None:
     assert parse_display(typed, unit) == (Decimal(number), means)
 
 
@@ -187,6 +187,6 @@ def test_typed_display_values(typed: str, unit: str, number: str, means: str) ->
         ("5 Hz", "rpm"), ("5", "\x1b[2J"), ("5", "Hertzhertz"),
     ],
 )  # fmt: skip
-def test_invalid_display_numbers(typed: str, unit: str) -> None:
+def test_invalid_display_number_is_refused(typed: str, unit: str) -> None:
     with pytest.raises(ValueRefused):
         parse_display(typed, unit)

@@ -50,7 +50,7 @@ def test_profiles_are_not_nested_too_deep() -> None:
 
 
 @pytest.mark.parametrize("value", ["9" * 5000, "1979-99-99", "0x" + "f" * 9_000, "99:99:99"])
-def test_values_that_cannot_be(value: str) -> None:
+def test_impossible_toml_value_is_reported(value: str) -> None:
     try:
         toml_tables(f"a = {value}")
     except tomli.TOMLDecodeError as error:
@@ -61,7 +61,7 @@ def test_values_that_cannot_be(value: str) -> None:
 
 @pytest.mark.parametrize("odd", ['["ACC"]', "{ a = 1 }", "[]", "1979-05-27"])
 @pytest.mark.parametrize("key", ["code", "id", "raw"])
-def test_a_row_whose_name_is_none_is_reported(key: str, odd: str, tmp_path: Path) -> None:
+def test_row_with_an_invalid_name_is_reported(key: str, odd: str, tmp_path: Path) -> None:
     """It hid every other profile behind a traceback."""
     text = (library.packaged_folder() / "varmeca.toml").read_text("utf-8")
     table = {"code": "parameters", "id": "sources", "raw": "faults.codes"}[key]

@@ -40,7 +40,7 @@ def test_a_unit_of_another_kind_is_refused(typed: str) -> None:
         encode(ATV312["ACC"], typed, {}, TENTH)
 
 
-def test_a_number_without_a_unit_takes_none() -> None:
+def test_number_without_a_unit_is_not_converted() -> None:
     bare = next(p for p in ATV312.parameters if not p.unit and not ATV312.names(p) and not p.bits)
     with pytest.raises(ValueRefused):
         encode(bare, "5 s", {}, Decimal(1))
@@ -57,7 +57,7 @@ def test_no_two_units_of_a_kind_differ_by_capitals_alone() -> None:
                 assert abs(there * back - 1) < Decimal("1e-20")
 
 
-def test_every_unit_of_the_profiles_is_its_own() -> None:
+def test_every_unit_of_the_profiles_is_known() -> None:
     for listing in library.listings():
         for parameter in library.load(listing.id).parameters:
             assert factor_between(parameter.unit, parameter.unit) == 1
@@ -80,7 +80,7 @@ def test_values_changed_by_rounding(typed: str, rounded: bool, lossy: bool) -> N
     assert (found.rounded, found.lossy) == (rounded, lossy)
 
 
-def test_an_edit_tells_what_it_would_become() -> None:
+def test_edit_reports_its_rounded_value() -> None:
     held = {"LSP": 0, "HSP": 500, "TFR": 600}
     (edit,) = Edits().stage(ATV312, "LSP", "0.04 Hz", {**held, "LSP": 100})
     assert edit.loss == "LSP: 0.04 Hz would be held as 0.0 Hz"

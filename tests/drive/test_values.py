@@ -51,7 +51,7 @@ def parameter(**fields: object) -> Parameter:
 
 @settings(max_examples=1500)
 @given(which=st.integers(0, len(ALL) - 1), share=st.floats(0, 1))
-def test_raw_to_text_to_raw(which: int, share: float) -> None:
+def test_raw_value_survives_conversion_to_text(which: int, share: float) -> None:
     """What the panel shows can be typed back and gives the same raw value."""
     profile, p = ALL[which]
     names = profile.names(p)
@@ -111,7 +111,7 @@ def test_shown_digits_lead_back_to_the_raw_value_and_no_further(scale: Decimal, 
         ("0.0030518509476", 3, "0.009"),
     ],
 )
-def test_a_number_is_shown_with_the_digits_of_its_scale(scale: str, raw: int, text: str) -> None:
+def test_number_has_the_digits_of_its_scale(scale: str, raw: int, text: str) -> None:
     p = parameter(unit="Hz", scale=scale, type="int16")
     value = decode(p, raw, {}, Decimal(scale))
     assert (value.text, f"{value.number:f}") == (text, text)
@@ -136,7 +136,7 @@ def test_a_long_scale_rounds_only_numbers_between_its_counts(
 
 
 @given(raw=st.integers(-0x8000, 0x7FFF))
-def test_signed_words(raw: int) -> None:
+def test_signed_words_are_decoded(raw: int) -> None:
     p = parameter(type="int16")
     (word,) = to_words(p, raw)
     assert 0 <= word <= 0xFFFF
@@ -145,7 +145,7 @@ def test_signed_words(raw: int) -> None:
 
 @pytest.mark.parametrize("low_first", [True, False])
 @given(raw=st.integers(-(2**31), 2**31 - 1))
-def test_words_of_32_bits(low_first: bool, raw: int) -> None:
+def test_values_of_32_bits_are_decoded(low_first: bool, raw: int) -> None:
     p = parameter(type="int32", low_word_first=low_first)
     words = to_words(p, raw)
     assert len(words) == 2
@@ -175,7 +175,7 @@ def test_a_negative_half_is_rounded_away_from_zero() -> None:
      ("", "not a number"), ("nan", "not a number"), ("inf", "not a number"),
      ("16#FFFFF", "does not fit"), ("16#XY", "not a hexadecimal")],
 )  # fmt: skip
-def test_refusals_say_why(typed: str, words: str) -> None:
+def test_refused_text_has_a_reason(typed: str, words: str) -> None:
     p = parameter(unit="s", scale="0.1", min=1, max=9999)
     with pytest.raises(ValueRefused, match=words):
         encode(p, typed, {}, Decimal("0.1"))
@@ -184,7 +184,7 @@ def test_refusals_say_why(typed: str, words: str) -> None:
 @pytest.mark.parametrize(
     "typed", ["1e999999999", "-1e999999", "1e-999999999", "9" * 5000, "0." + "0" * 500 + "1"]
 )
-def test_numbers_that_nobody_means(typed: str) -> None:
+def test_absurd_number_is_refused(typed: str) -> None:
     p = parameter(unit="s", scale="0.1", min=1, max=9999)
     with pytest.raises(ValueRefused, match="out of range") as refused:
         encode(p, typed, {}, Decimal("0.1"))
@@ -225,7 +225,7 @@ def test_a_number_with_a_special_name_is_still_a_number() -> None:
     assert encode(p, "off", {0: "Off"}, Decimal(1)).raw == 0
 
 
-def test_reserved_bits_stay_zero() -> None:
+def test_reserved_bits_must_be_zero() -> None:
     p = parameter(bits=[{"bit": 0, "name": "run"}], reserved=[3])
     assert encode(p, "16#0001", {}, Decimal(1)).raw == 1
     with pytest.raises(ValueRefused, match="reserved bit 3"):
@@ -244,16 +244,16 @@ def test_an_unknown_scale_is_shown_raw_and_never_written() -> None:
 @pytest.mark.parametrize(
     ("raw", "poles", "rpm"), [(5000, 4, 1500), (6000, 2, 3600), (3333, 4, 1000), (0, 4, 0)]
 )
-def test_speed_by_the_formula_of_the_manual(raw: int, poles: int, rpm: int) -> None:
+def test_speed_follows_the_formula_of_the_manual(raw: int, poles: int, rpm: int) -> None:
     assert speed_from_frequency(raw, poles) == rpm
 
 
-def test_no_motor_without_poles() -> None:
+def test_speed_without_poles_is_refused() -> None:
     with pytest.raises(ValueRefused):
         speed_from_frequency(5000, 0)
 
 
-def test_a_percentage_of_a_rating() -> None:
+def test_percentage_is_converted_to_its_rating() -> None:
     assert percent_of(Decimal("45.66"), Decimal("3.3")) == Decimal("1.5")
     assert percent_of(Decimal(50), Decimal("0.25")) == Decimal("0.13")
 
@@ -264,7 +264,7 @@ def test_every_range_fits_its_type() -> None:
         assert type_range(p)[0] <= low <= high <= type_range(p)[1], (profile.id, p.code)
 
 
-def test_every_factory_setting_is_one_the_panel_would_take() -> None:
+def test_every_factory_setting_is_accepted() -> None:
     for profile, p in ALL:
         if p.factory is None or p.scale_by or p.forbidden:
             continue
@@ -279,7 +279,7 @@ def find_everything(profile: Profile) -> int:
 
 
 @pytest.mark.parametrize("profile_id", PROFILES)
-def test_every_code_is_found(profile_id: str) -> None:
+def test_every_code_of_a_profile_is_found(profile_id: str) -> None:
     profile = library.load(profile_id)
     assert find_everything(profile) == len(profile.parameters)
 
@@ -293,9 +293,9 @@ def test_every_code_is_found(profile_id: str) -> None:
         ("int32", -2147483648, 2147483647),
     ],
 )
-def test_range_of_each_type(type: str, low: int, high: int) -> None:
+def test_each_type_has_its_range(type: str, low: int, high: int) -> None:
     assert type_range(parameter(type=type)) == (low, high)
 
 
-def test_range_of_a_field_is_its_mask() -> None:
+def test_field_has_the_range_of_its_mask() -> None:
     assert type_range(parameter(mask=7, shift=4)) == (0, 7)

@@ -52,7 +52,9 @@ REFUSALS = [
 
 
 @pytest.mark.parametrize(("family", "code", "state", "reason", "text"), REFUSALS)
-def test_refusals(family: str, code: str, state: StateKind, reason: str, text: str) -> None:
+def test_unwritable_parameter_is_refused_with_a_reason(
+    family: str, code: str, state: StateKind, reason: str, text: str
+) -> None:
     profile = library.load(family)
     found = write_refusal(profile, profile[code], state)
     assert found is not None
@@ -76,12 +78,12 @@ ALLOWED = [
 
 
 @pytest.mark.parametrize(("family", "code", "state"), ALLOWED)
-def test_allowed(family: str, code: str, state: StateKind) -> None:
+def test_writable_parameter_is_allowed(family: str, code: str, state: StateKind) -> None:
     profile = library.load(family)
     assert write_refusal(profile, profile[code], state) is None
 
 
-def test_an_unverified_one_is_written_once_it_is_confirmed() -> None:
+def test_unverified_parameter_is_writable_if_confirmed() -> None:
     profile = library.load("atv21")
     assert write_refusal(profile, profile["F111"], "stopped", {"F112"}) is not None
     assert write_refusal(profile, profile["F111"], "stopped", {"F111"}) is None
@@ -91,7 +93,7 @@ def test_an_unverified_one_is_written_once_it_is_confirmed() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_order_of_a_chart_is_no_setting(family: str) -> None:
+def test_command_words_are_not_settings(family: str) -> None:
     """No word that can start a motor is ever taken for a setting."""
     profile = library.load(family)
     channel = profile.quantity("command_channel")
@@ -130,7 +132,7 @@ MARKS = [
 
 
 @pytest.mark.parametrize(("family", "code", "expected"), MARKS)
-def test_marks(family: str, code: str, expected: set[str]) -> None:
+def test_parameter_has_its_marks(family: str, code: str, expected: set[str]) -> None:
     profile = library.load(family)
     assert set(marks(profile, profile[code])) == expected
     later = "in force after a reset of the drive" in expected
@@ -138,7 +140,7 @@ def test_marks(family: str, code: str, expected: set[str]) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_switching_the_watch_off_is_warned_of(family: str) -> None:
+def test_disabling_the_timeout_is_warned_about(family: str) -> None:
     profile = library.load(family)
     watch = profile.data.communication_fault
     assert watch is not None
