@@ -15,7 +15,7 @@ from textual.widgets import Input
 
 from tests.bus.peer import PtyPeer, silent
 from tui.app import DrivePanelApp
-from tui.cli.shared.bundle_documents import drive_documents
+from tui.cli.shared.diagnosis_documents import drive_documents
 from tui.screens.bundle import NO_LINE_CHOSEN
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.bundle import CANCELLED, BundleScreen

@@ -78,7 +78,7 @@ def open_panel(
 
 def _drive_documents() -> DriveDocuments:
     """Import and return the JSON documents of drives."""
-    from .shared.bundle_documents import drive_documents
+    from .shared.diagnosis_documents import drive_documents
 
     return drive_documents()
 

@@ -155,7 +155,7 @@ def _subject(
     from tui.session.bundle.subject import BundleSubject
     from tui.session.diagnosis.asking import profile_remembered
 
-    from ..shared.bundle_documents import drive_documents
+    from ..shared.diagnosis_documents import drive_documents
 
     def expected(device: int) -> Profile | None:
         named = library.load(target.profile_id) if target.profile_id is not None else None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.diagnosis_documents import counters_document
 from ..shared.drive_commands import arm_option, close_journal, journal_document, need_arming
 from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure
 from ..shared.numbers import seconds as seconds_range
@@ -21,19 +22,15 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.output import drive_fields, last_minute_field, print_json
+from ..shared.output import drive_fields, print_json
 from ..shared.registration import WRITING, command
 from ..shared.rows import say_row, titled
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.bus.api import DeviceCounters
     from tui.session.connect.open_line import OpenLine
     from tui.session.counters.watch import CountersNow, CounterWatch
 
-    from ..documents.counter_parts import OurCountersField
-    from ..documents.document import DriveFields
-    from ..documents.drive_documents import CountersDocument
 
 FRAMES_SENT = 20
 """Frames sent for counting (default)."""
@@ -166,73 +163,3 @@ def _minute_text(found: CountersNow) -> str:
         )
     )
     return f"{'; '.join(texts)}; {line.foreign} foreign frames, {line.strays} strays"
-
-
-def counters_document(
-    fields: DriveFields, found: CountersNow, frames: int, answered: int, *, reset: bool
-) -> CountersDocument:
-    """The counts as a document; so many of the sent `frames` were answered."""
-    from ..documents.counter_parts import (
-        CountingTestField,
-        DifferenceField,
-        DriveCountersField,
-        LastMinutesField,
-        LoadField,
-    )
-    from ..documents.drive_documents import CountersDocument
-
-    return CountersDocument(
-        **fields,
-        counted_by=found.counted_by or None,
-        seconds=round(found.seconds, 3),
-        ours=_ours_field(found.since),
-        since_opened=_ours_field(found.total),
-        last_minute=LastMinutesField(
-            line=last_minute_field(found.line_minute, found.line_minute.share),
-            device=last_minute_field(found.total.minute, found.total.minute.whole_share),
-        ),
-        load=LoadField(line=found.line_load, device=found.device_load),
-        drive=[
-            DriveCountersField(
-                name=name,
-                frames=comparison.last.frames,
-                checksum_errors=comparison.last.damaged,
-                saturated=comparison.last.saturated,
-                frames_since=comparison.frames,
-                checksum_errors_since=comparison.damaged,
-                counts_this_line=comparison.counts_this_line,
-            )
-            for name, comparison in found.drive
-        ],
-        differences=[
-            DifferenceField(kind=item.kind, count=item.count, text=item.text)
-            for item in found.differences
-        ],
-        agree=found.agree,
-        trouble=found.trouble or None,
-        test=CountingTestField(frames=frames, answered=answered),
-        reset=reset,
-    )
-
-
-def _ours_field(ours: DeviceCounters) -> OurCountersField:
-    from tui.session.counters.turnarounds import bars
-
-    from ..documents.counter_parts import OurCountersField, TurnaroundField
-
-    return OurCountersField(
-        frames=ours.requests,
-        replies=ours.replies,
-        timeouts=ours.timeouts,
-        checksum=ours.checksum,
-        wrong=ours.wrong,
-        repeats=ours.repeats,
-        exceptions={str(code): count for code, count in sorted(ours.exceptions.items())},
-        bytes_out=ours.bytes_out,
-        bytes_in=ours.bytes_in,
-        busy_seconds=round(ours.busy_seconds, 4),
-        turnarounds=[
-            TurnaroundField(up_to_ms=bar.up_to_ms, count=bar.count)
-            for bar in bars(ours.turnarounds)
-        ],
-    )

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import click
 
-from ..running.holding import Holding, keep_polling
 from ..shared.drive_commands import complain
 from ..shared.errors import LINE_TROUBLE, Failure, status_of
+from ..shared.holding import Holding, keep_polling
 from ..shared.options import (
     Target,
     connect_drive,

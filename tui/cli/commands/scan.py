@@ -65,8 +65,8 @@ def scan(
     scans: list[Scan] = []
 
     async def work(opened: OpenLine) -> None:
-        from ..running.holding import hold_on
         from ..running.scanning import Scan
+        from ..shared.holding import hold_on
 
         item = Scan(opened, line_text, devices, tell, yes=yes)
         await _prepare(item, all_settings=all_settings)

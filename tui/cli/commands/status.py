@@ -172,7 +172,7 @@ async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: St
 
     Returns the highest exit status. Raises unexpected errors.
     """
-    from ..running.holding import hold_lines_on
+    from ..shared.holding import hold_lines_on
 
     each = await asyncio.gather(*(_read_line(opened, wish, wanted) for opened, wish in lines))
     if wanted.as_json:

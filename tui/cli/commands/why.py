@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import click
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from tui.session.diagnosis.diagnosis import Diagnosis
 
     from ..documents.document import DriveFields
-    from ..documents.why_document import CertaintyText, MeasuredReads, WhyDocument
 
 
 @command("Diagnose why a drive does not answer.", statuses=ON_LINE)
@@ -145,6 +144,7 @@ def _unopened(target: Target, named: Profile | None, error: Exception) -> Diagno
 
 
 def _tell(target: Target, found: Diagnosis, fields: DriveFields | None, as_json: bool) -> None:
+    from ..shared.diagnosis_documents import why_document
     from ..shared.output import print_json
 
     if as_json:
@@ -163,68 +163,3 @@ def _tell(target: Target, found: Diagnosis, fields: DriveFields | None, as_json:
         say("Next steps:")
     for step in found.steps:
         say(f"  - {step}", indent=4)
-
-
-def why_document(
-    line_text: str, device: int, fields: DriveFields | None, found: Diagnosis
-) -> WhyDocument:
-    """The diagnosis as a document; `fields` are those of a drive with a session."""
-    from ..documents.parts import HeardField
-    from ..documents.why_document import WhyDocument
-
-    sight, heard = found.sight, found.sight.heard
-    late, profile = sight.turnaround, sight.profile
-    without_session: DriveFields = {
-        "line": line_text,
-        "device": device,
-        "profile": profile.id if profile is not None else None,
-        "timeout": None,
-    }
-    return WhyDocument(
-        **(fields or without_session),
-        rung=found.rung,
-        answers=found.well,
-        certainty=cast("CertaintyText", found.certainty),
-        others=list(found.others),
-        text=found.text,
-        next=list(found.steps),
-        measured=_measured_reads(found),
-        seen=HeardField(
-            asked=heard.requested,
-            answered=heard.answered,
-            late=heard.late,
-            echoed=heard.echoed,
-            damaged=heard.damaged,
-            garbage_bytes=heard.garbage,
-            exceptions=list(heard.exceptions),
-            functions=list(heard.functions),
-            others=list(heard.others),
-            framing_errors=sight.errors.framing,
-            parity_errors=sight.errors.parity,
-            breaks=sight.errors.breaks,
-            turnaround_ms=round(late * 1000, 1) if late is not None else None,
-            latency_timer_ms=sight.port.latency if sight.port is not None else None,
-        ),
-    )
-
-
-def _measured_reads(found: Diagnosis) -> MeasuredReads | None:
-    """The counts of the short reads; None where there were none."""
-    from ..documents.why_document import MeasuredReads
-
-    measure = found.sight.measure
-    if measure is None:
-        return None
-    return MeasuredReads(
-        asked=measure.requested,
-        answered=measure.answered,
-        lost=measure.lost,
-        damaged=measure.damaged,
-        late=measure.late,
-        duplicated=measure.duplicated,
-        foreign=measure.foreign,
-        unreached=measure.unreached,
-        behind=measure.behind,
-        second=measure.second,
-        seconds=round(measure.seconds, 2),
-    )

@@ -40,7 +40,7 @@ def on_each_drive(
     """
 
     async def at_drives(opened: OpenLine) -> int:
-        from ..running.holding import hold_on
+        from .holding import hold_on
 
         chosen = target if choose is None else await choose(opened)
         status = await _each_drive(opened, chosen, work, as_json=as_json, titled=titled)

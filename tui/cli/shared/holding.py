@@ -16,7 +16,7 @@ import click
 from tui.session.running.ending import Ending
 from tui.session.signals import BY_SIGNAL
 
-from ..shared.drive_commands import complain
+from .drive_commands import complain
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine

@@ -1,0 +1,184 @@
+"""JSON documents of `why` and `counters` about one drive, for these commands and for a bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+from .output import drive_fields, last_minute_field
+
+if TYPE_CHECKING:
+    from tui.bus.api import DeviceCounters
+    from tui.session.bundle.subject import DriveDocuments
+    from tui.session.counters.watch import CountersNow
+    from tui.session.diagnosis.diagnosis import Diagnosis
+    from tui.session.drive import DriveSession
+
+    from ..documents.counter_parts import OurCountersField
+    from ..documents.document import Document, DriveFields
+    from ..documents.drive_documents import CountersDocument
+    from ..documents.why_document import CertaintyText, MeasuredReads, WhyDocument
+
+
+def drive_documents() -> DriveDocuments:
+    """Return the JSON documents of both commands."""
+    from tui.session.bundle.subject import DriveDocuments
+
+    return DriveDocuments(_why, _counters)
+
+
+def _why(line: str, device: int, session: DriveSession | None, found: Diagnosis) -> dict[str, Any]:
+    fields = drive_fields(line, session) if session is not None else None
+    return _as_object(why_document(line, device, fields, found))
+
+
+def _counters(
+    line: str, session: DriveSession, found: CountersNow, sent: Mapping[str, int]
+) -> dict[str, Any]:
+    fields = drive_fields(line, session)
+    return _as_object(
+        counters_document(fields, found, sent["frames"], sent["answered"], reset=False)
+    )
+
+
+def _as_object(document: Document) -> dict[str, Any]:
+    """A document as a plain object."""
+    import msgspec
+
+    found: dict[str, Any] = msgspec.to_builtins(document)
+    return found
+
+
+def why_document(
+    line_text: str, device: int, fields: DriveFields | None, found: Diagnosis
+) -> WhyDocument:
+    """The diagnosis as a document; `fields` are those of a drive with a session."""
+    from ..documents.parts import HeardField
+    from ..documents.why_document import WhyDocument
+
+    sight, heard = found.sight, found.sight.heard
+    late, profile = sight.turnaround, sight.profile
+    without_session: DriveFields = {
+        "line": line_text,
+        "device": device,
+        "profile": profile.id if profile is not None else None,
+        "timeout": None,
+    }
+    return WhyDocument(
+        **(fields or without_session),
+        rung=found.rung,
+        answers=found.well,
+        certainty=cast("CertaintyText", found.certainty),
+        others=list(found.others),
+        text=found.text,
+        next=list(found.steps),
+        measured=_measured_reads(found),
+        seen=HeardField(
+            asked=heard.requested,
+            answered=heard.answered,
+            late=heard.late,
+            echoed=heard.echoed,
+            damaged=heard.damaged,
+            garbage_bytes=heard.garbage,
+            exceptions=list(heard.exceptions),
+            functions=list(heard.functions),
+            others=list(heard.others),
+            framing_errors=sight.errors.framing,
+            parity_errors=sight.errors.parity,
+            breaks=sight.errors.breaks,
+            turnaround_ms=round(late * 1000, 1) if late is not None else None,
+            latency_timer_ms=sight.port.latency if sight.port is not None else None,
+        ),
+    )
+
+
+def _measured_reads(found: Diagnosis) -> MeasuredReads | None:
+    """The counts of the short reads; None where there were none."""
+    from ..documents.why_document import MeasuredReads
+
+    measure = found.sight.measure
+    if measure is None:
+        return None
+    return MeasuredReads(
+        asked=measure.requested,
+        answered=measure.answered,
+        lost=measure.lost,
+        damaged=measure.damaged,
+        late=measure.late,
+        duplicated=measure.duplicated,
+        foreign=measure.foreign,
+        unreached=measure.unreached,
+        behind=measure.behind,
+        second=measure.second,
+        seconds=round(measure.seconds, 2),
+    )
+
+
+def counters_document(
+    fields: DriveFields, found: CountersNow, frames: int, answered: int, *, reset: bool
+) -> CountersDocument:
+    """The counts as a document; so many of the sent `frames` were answered."""
+    from ..documents.counter_parts import (
+        CountingTestField,
+        DifferenceField,
+        DriveCountersField,
+        LastMinutesField,
+        LoadField,
+    )
+    from ..documents.drive_documents import CountersDocument
+
+    return CountersDocument(
+        **fields,
+        counted_by=found.counted_by or None,
+        seconds=round(found.seconds, 3),
+        ours=_ours_field(found.since),
+        since_opened=_ours_field(found.total),
+        last_minute=LastMinutesField(
+            line=last_minute_field(found.line_minute, found.line_minute.share),
+            device=last_minute_field(found.total.minute, found.total.minute.whole_share),
+        ),
+        load=LoadField(line=found.line_load, device=found.device_load),
+        drive=[
+            DriveCountersField(
+                name=name,
+                frames=comparison.last.frames,
+                checksum_errors=comparison.last.damaged,
+                saturated=comparison.last.saturated,
+                frames_since=comparison.frames,
+                checksum_errors_since=comparison.damaged,
+                counts_this_line=comparison.counts_this_line,
+            )
+            for name, comparison in found.drive
+        ],
+        differences=[
+            DifferenceField(kind=item.kind, count=item.count, text=item.text)
+            for item in found.differences
+        ],
+        agree=found.agree,
+        trouble=found.trouble or None,
+        test=CountingTestField(frames=frames, answered=answered),
+        reset=reset,
+    )
+
+
+def _ours_field(ours: DeviceCounters) -> OurCountersField:
+    from tui.session.counters.turnarounds import bars
+
+    from ..documents.counter_parts import OurCountersField, TurnaroundField
+
+    return OurCountersField(
+        frames=ours.requests,
+        replies=ours.replies,
+        timeouts=ours.timeouts,
+        checksum=ours.checksum,
+        wrong=ours.wrong,
+        repeats=ours.repeats,
+        exceptions={str(code): count for code, count in sorted(ours.exceptions.items())},
+        bytes_out=ours.bytes_out,
+        bytes_in=ours.bytes_in,
+        busy_seconds=round(ours.busy_seconds, 4),
+        turnarounds=[
+            TurnaroundField(up_to_ms=bar.up_to_ms, count=bar.count)
+            for bar in bars(ours.turnarounds)
+        ],
+    )
