@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..errors import UnknownParameter
 from ..profile.profile import Profile, parse_address
 from ..profile.schema import Block, Parameter
+from ..profile.search import parameter_search
 from .assignment import UNUSED, Assignment, MappingError
 from .slot_rules import reason_against
 
@@ -50,23 +51,14 @@ def raw_named(profile: Profile, block: Block, text: str) -> int:
 
 
 def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]:
-    """Return the parameters that a slot of the block can select, best matches first.
-
-    A search finds codes, numbers, addresses and names, and leaves out what holds none of its
-    words.
-    """
+    """Return the parameters that a slot of the block can select, best matches first."""
     if block.selects_by == "choice":
         offered = [profile[choice.parameter] for choice in block.choices]
     else:
         offered = sorted(profile.parameters, key=lambda parameter: parameter.address)
     fitting = [p for p in offered if not reason_against(profile, block, p)]
-    wanted = search.casefold().split()
-    if not wanted:
+    if not search.split():
         return fitting
-    found = [p for p in fitting if all(word in _words_of(p) for word in wanted)]
-    return sorted(found, key=lambda p: not p.code.casefold().startswith(wanted[0]))
-
-
-def _words_of(parameter: Parameter) -> str:
-    spelled = (parameter.code, parameter.number, parameter.name, str(parameter.address))
-    return f"{' '.join(spelled)} 16#{parameter.address:04X}".casefold()
+    scores = parameter_search(profile).scores(search)
+    found = [p for p in fitting if p.code in scores]
+    return sorted(found, key=lambda p: scores[p.code])

@@ -1,7 +1,7 @@
 """The JSON Schema of a profile, for editors that complete and check TOML.
 
-`python -m tui.drive.profile.json_schema` prints it, with `help` that of a help file; the committed
-copies are profiles/profile.schema.json and profiles/help/help.schema.json.
+`python -m tui.drive.profile.json_schema` prints it, with `help` or `search` that of another file.
+The committed copies are in the folder `profiles`.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from typing import Any
 import msgspec
 
 from .field_texts import field_text
-from .schema import HelpData, ProfileData, Table
+from .schema import FamilySearch, HelpData, ProfileData, Table
 
 SCHEMA_FORMS: dict[str, tuple[type[Table], str]] = {
     "profile": (ProfileData, "Drive Panel profile"),
     "help": (HelpData, "Drive Panel help of faults"),
+    "search": (FamilySearch, "Drive Panel words of a search"),
 }
 """The forms of files and their titles."""
 

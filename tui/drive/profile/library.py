@@ -142,20 +142,24 @@ def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
 
 
 def all_faults_of(path: Path) -> list[str]:
-    """Return all faults of a profile file and of its help file; a profile needs no help file."""
+    """Return all faults of a profile file and of its files of help and search, if it has them."""
     from .check import examined
     from .help_file import read_help
+    from .search_file import read_vocabulary
 
     try:
         data, faults = examined(path, packaged_folder())
     except ProfileError as error:
         return [str(error)]
     reported = [str(fault) for fault in faults]
-    try:
-        if data is not None:
-            read_help(data, (path.resolve().parent, packaged_folder()))
-    except ProfileError as error:
-        reported += str(error).splitlines()
+    if data is None:
+        return reported
+    folders = (path.resolve().parent, packaged_folder())
+    for read in (read_help, read_vocabulary):
+        try:
+            read(data, folders)
+        except ProfileError as error:
+            reported += str(error).splitlines()
     return reported
 
 

@@ -6,8 +6,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from ..profile.profile import Profile, is_verified, notations
+from ..profile.profile import Profile, is_verified
 from ..profile.schema import Parameter, Quantity
+from ..profile.search import parameter_search
 from .edits import Edits
 from .factory import not_factory
 from .writable import is_setting
@@ -97,19 +98,20 @@ def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
 
     Recent ones begin with the last edited; a start-up keeps the order of its steps.
     """
-    words = search.casefold().split()
     profile = facts.profile
     parameters = list(profile.parameters)
     if chosen == "recent":
         parameters = [p for code in facts.recent if (p := profile.get(code)) is not None]
     if chosen == "start-up":
         parameters = [profile[code] for code in start_up_codes(profile)]
+    passing = [p for p in parameters if passes(facts, chosen, p)]
+    if not search.split():
+        return [p.code for p in passing]
+    scores = parameter_search(profile).scores(search)
     found = [
-        (rank, bool(words) and not is_setting(profile, p), p.code)
-        for p in parameters
-        if passes(facts, chosen, p) and (rank := match(profile, p, words)) is not None
+        (scores[p.code], not is_setting(profile, p), p.code) for p in passing if p.code in scores
     ]
-    return [code for *_, code in sorted(found, key=lambda pair: pair[:2])]
+    return [code for *_, code in sorted(found, key=lambda row: row[:2])]
 
 
 def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool:
@@ -136,23 +138,3 @@ def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool
             return code in facts.favorites
         case _:
             return True
-
-
-def match(profile: Profile, parameter: Parameter, words: Collection[str]) -> int | None:
-    """Return how well every word is found, the best with 0; None if one is not found.
-
-    0: it is the code, 1: the code begins with it, 2: in the code, 3: in name or address, 4: in
-    the group or a value's name.
-    """
-    if not words:
-        return 0
-    code = parameter.code.casefold()
-    if all(word in code for word in words):
-        first = next(iter(words))
-        return 0 if first == code else 1 if code.startswith(first) else 2
-    text = " ".join((*notations(parameter), parameter.name)).casefold()
-    left = [word for word in words if word not in text]
-    if not left:
-        return 3
-    values = " ".join((parameter.group, *profile.names(parameter).values())).casefold()
-    return 4 if all(word in values for word in left) else None

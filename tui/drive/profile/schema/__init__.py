@@ -102,6 +102,7 @@ from .parameter import (
     WordState,
     WordType,
 )
+from .search import FamilySearch, FamilyTopic, SearchTopic, SearchWords
 from .start_up import StartUpStep
 from .whole import ProfileData
 from .wiring import FamilyWarning, Lamp, Opening, SignalName, Wiring
@@ -134,6 +135,8 @@ __all__ = [
     "Erratum",
     "ExceptionCode",
     "FactoryBy",
+    "FamilySearch",
+    "FamilyTopic",
     "FamilyWarning",
     "FaultCode",
     "FaultHelp",
@@ -181,6 +184,8 @@ __all__ = [
     "RuledOut",
     "ScaleBy",
     "ScaleWhen",
+    "SearchTopic",
+    "SearchWords",
     "Setting",
     "SignalName",
     "SignedDecimalText",
