@@ -181,7 +181,7 @@ async def test_the_end_of_arming_closes_the_line() -> None:
         before = writes(made.app)
         await made.pilot.press("r")
         await until(made.pilot, open_lines(made))
-        made.app.screen.commander.disarm()  # type: ignore[attr-defined]
+        made.app.screen.session.arming.disarm()  # type: ignore[attr-defined]
         await until(made.pilot, lambda: not open_lines(made)())
         await made.pilot.press("enter")
         await made.pilot.pause(0.3)

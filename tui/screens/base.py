@@ -39,7 +39,7 @@ class PanelScreen(Framed):
         yield from self.framed()
         yield Lines(id="frame-room")  # the place of strip and tabs
         yield from self.body()
-        yield Lines(id="keys", fit=self._keys)
+        yield Lines(id="keys", fit=self.keys_now)
 
     def body(self) -> Iterable[Widget]:
         """Compose the part between the tabs and the message."""
@@ -85,10 +85,6 @@ class PanelScreen(Framed):
 
     def keys_now(self, width: int) -> list[Text]:
         """The line of keys as it is now."""
-        return self._keys(width)
-
-    def _keys(self, width: int) -> list[Text]:
-        """The line of keys."""
         target, field = self.app.stop_target_text, self.focused
         if self.app.opening.goes_on:
             keys = opening_line(width, target)

@@ -185,7 +185,7 @@ class InStep:
         if replied and isinstance(read, Read) and read.expectation() == expectation:
             self._probes.note_good(read)
             if device in self._probes.silent:
-                self._probes.forms.note_device(device)
+                self._probes.forms.note_silence(device)
         self._probes.silent.discard(device)
         if replied and proves:
             self._proved.add(device)

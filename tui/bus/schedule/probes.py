@@ -172,13 +172,10 @@ class Forms:
         if result.kind is ResultKind.EXCEPTION:
             self._refused.add(form)
         else:
-            self._note_silence(form)
+            self.note_silence(form)
 
-    def note_device(self, device: int) -> None:
-        """A drive was silent to a longer read, and then answered what it was sent for."""
-        self._note_silence(device)
-
-    def _note_silence(self, which: Read | int) -> None:
+    def note_silence(self, which: Read | int) -> None:
+        """Note a read without a reply, or a drive silent to a longer read than it answers."""
         self._silences[which] = self._silences.get(which, (0, 0.0))[0] + 1, self._clock()
 
 

@@ -213,9 +213,6 @@ def line_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return _accept_option(share_group_option(command))
 
 
-takes_line = takes_line_as(LineArgument, "LINE")
-
-
 def mind_the_line(opened: OpenLine) -> None:
     """Compare an open line with what is remembered of it; nothing keeps a stop from its work."""
     ctx = click.get_current_context(silent=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import click
 
 from .completion import complete_profile
-from .line_argument import mind_the_drive, mind_the_line, takes_line
+from .line_argument import LineArgument, mind_the_drive, mind_the_line, takes_line_as
 from .looking_after import guard_motors, say_shared, to_its_end
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
 from .say import say
@@ -79,7 +79,7 @@ def devices_option(help_text: str, **more: Any) -> Option:
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
 
-line_argument = takes_line
+line_argument = takes_line_as(LineArgument, "LINE")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
 read_only_option = click.option("--read-only", is_flag=True, help="Write nothing on this line.")

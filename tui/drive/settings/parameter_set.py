@@ -74,13 +74,15 @@ def dump_set(profile: Profile, values: ParameterSet) -> str:
         "",
         f"[{SET_HEADER}]",
         f"format = {SET_FORMAT}",
-        *(f"{key} = {_text(text)}" for key, text in _head_texts(head)),
+        *(f"{key} = {escaped_toml(text)}" for key, text in _head_texts(head)),
         f"device = {head.device}",
         f"parameters = {len(known)}",
     ]
     if head.identity:
         lines += ["", "[identity]"]
-        lines += [f"{_key(key)} = {_text(text)}" for key, text in sorted(head.identity.items())]
+        lines += [
+            f"{_key(key)} = {escaped_toml(text)}" for key, text in sorted(head.identity.items())
+        ]
     for group in profile.groups:
         members = [p for p in known if p.group == group]
         if members:
@@ -89,7 +91,7 @@ def dump_set(profile: Profile, values: ParameterSet) -> str:
     if values.absent:
         lines += ["", f"[{ABSENT}]"]
         order = [p.code for p in profile.parameters if p.code in values.absent]
-        lines += [f"{_key(code)} = {_text(values.absent[code])}" for code in order]
+        lines += [f"{_key(code)} = {escaped_toml(values.absent[code])}" for code in order]
     return "\n".join([*lines, "", f"[{END_OF_SET}]", f"parameters = {len(known)}", ""])
 
 
@@ -108,8 +110,8 @@ def _line(profile: Profile, parameter: Parameter, values: ParameterSet) -> str:
     raw = values.raws[parameter.code]
     value = shown(profile, parameter, raw, values.raws, lacking(profile, values.raws)).display
     return (
-        f"{_key(parameter.code)} = {{ raw = {raw}, value = {_text(value)},"
-        f" name = {_text(parameter.name)} }}"
+        f"{_key(parameter.code)} = {{ raw = {raw}, value = {escaped_toml(value)},"
+        f" name = {escaped_toml(parameter.name)} }}"
     )
 
 
@@ -119,9 +121,4 @@ def lacking(profile: Profile, raws: Mapping[str, int]) -> frozenset[str]:
 
 
 def _key(text: str) -> str:
-    return text if _BARE.fullmatch(text) else _text(text)
-
-
-def _text(text: str) -> str:
-    """A basic string of TOML."""
-    return escaped_toml(text)
+    return text if _BARE.fullmatch(text) else escaped_toml(text)

@@ -167,5 +167,5 @@ class ArmingKeys(PanelScreen):
 
     def action_disarm(self) -> None:
         """Let nothing through any more."""
-        self.commander.disarm()
+        self.session.arming.disarm()
         self.look()

@@ -32,14 +32,14 @@ class CounterKeys(PanelScreen):
     def on_mount(self) -> None:
         """Look at the drive's own now and then, while they are shown."""
         every = COUNTERS_SELDOM if self.app.low_bandwidth else COUNTERS_EVERY
-        self.set_interval(every, self._look_at_drive)
+        self.set_interval(every, self._begin_sum)
 
     @property
     def shows_counters(self) -> bool:
         """True if the counters are shown now."""
         raise NotImplementedError
 
-    def counter_lines(self, width: int, height: int) -> list[Text]:
+    def sum_lines(self, width: int, height: int) -> list[Text]:
         """The page as it is now."""
         from .counters_view import counters_lines
 
@@ -47,11 +47,7 @@ class CounterKeys(PanelScreen):
         who = plain(f"drive {session.device}, {session.profile.name}")
         return counters_lines(self.console.counters.now(), who, width, height)
 
-    def begin_counters(self) -> None:
-        """They are shown from now on."""
-        self._look_at_drive()
-
-    def _look_at_drive(self) -> None:
+    def _begin_sum(self) -> None:
         # one after the other: with a silent drive a look takes longer than the time between two
         if self.shows_counters and self.is_current and not self._looking:
             self._looking = True

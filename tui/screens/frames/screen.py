@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from rich.text import Text
-
 from tui.bus.api import Frame, ModbusLine
 from tui.bus.link import Link
 from tui.drive.profile.profile import Profile
@@ -64,11 +62,3 @@ class FramesScreen(CounterKeys, FrameListScreen):
     def shows_counters(self) -> bool:
         """True if the counters replace the frames."""
         return self._shows_sum
-
-    def sum_lines(self, width: int, height: int) -> list[Text]:
-        """The counters."""
-        return self.counter_lines(width, height)
-
-    def _begin_sum(self) -> None:
-        """Ask the drive for its own."""
-        self.begin_counters()

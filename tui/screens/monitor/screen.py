@@ -110,7 +110,7 @@ class MonitorScreen(InputKeys):
 
     def on_unmount(self) -> None:
         """Stop watching; nobody looks any more, and nothing is commanded any more."""
-        self.commander.disarm()
+        self.session.arming.disarm()
         self.console.monitor.stop()
 
     def on_resize(self, event: Resize) -> None:

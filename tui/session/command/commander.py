@@ -97,10 +97,6 @@ class Commander:
 
         session.work.put(Task(work, owner=self, armed=False))
 
-    def disarm(self, why: str = "") -> None:
-        """End the arming of the drive; `why` is shown to a person."""
-        self.session.arming.disarm(why)
-
     @property
     def armed_for(self) -> float | None:
         """Seconds until the drive is disarmed; None if it is not armed."""
