@@ -9,8 +9,7 @@ WORK = "tests/session/test_work.py"
 STOP = "tests/session/test_stop_words.py"
 WAVES = "tests/session/test_stop_waves.py"
 FAULTS = (
-    "tests/session/test_stop_faults.py"
-    "::test_an_error_anywhere_on_the_way_of_a_stop_keeps_no_frame_from_the_drive"
+    "tests/session/test_stop_faults.py::test_error_anywhere_in_a_stop_does_not_prevent_its_frame"
 )
 PROVER = "tests/session/test_prover.py"
 LINE_WATCH = "tests/session/test_line_watch.py"
@@ -63,7 +62,7 @@ DEFECTS = (
         "if not self._means(edit) or (edit.old is not None and held != edit.old):",
         "if not self._means(edit):",
         "A setting that a colleague changed at the keypad in the meantime is overwritten.",
-        ("tests/session/test_applying.py::test_a_change_by_somebody_else_is_not_overwritten",),
+        ("tests/session/test_applying.py::test_change_by_another_source_is_not_overwritten",),
     ),
     Defect(
         "lost-answer-taken-for-done",
@@ -71,7 +70,10 @@ DEFECTS = (
         "if held == edit.new:",
         "if held is not None:",
         "A setting that the drive ignored without a reply is reported as written.",
-        ("tests/session/test_applying.py::test_a_silent_refusal_is_found_by_reading",),
+        (
+            "tests/session/test_applying.py"
+            "::test_refusal_without_an_exception_is_found_by_reading_back",
+        ),
     ),
     Defect(
         "stop-count-not-raised",
@@ -111,7 +113,7 @@ DEFECTS = (
         "if until <= self._clock.monotonic():",
         "if until <= 0.0:",
         "A panel that was unattended for an hour starts a motor on an accidental key press.",
-        ("tests/session/test_command.py::test_arming_ends_by_itself",),
+        ("tests/session/test_command.py::test_arming_expires",),
     ),
     Defect(
         "armed-though-the-line-was-lost",
@@ -119,7 +121,7 @@ DEFECTS = (
         "is not LineStatus.CONNECTED",
         "is LineStatus.CLOSED",
         "A drive is still armed after its line was lost and came back, without a check.",
-        ("tests/session/test_command.py::test_a_lost_line_disarms",),
+        ("tests/session/test_command.py::test_lost_line_disarms",),
     ),
     Defect(
         "walk-does-not-wait",
@@ -136,7 +138,7 @@ DEFECTS = (
         "if held is not None and not held.text:\n"
         "            raise OrderRefused(block_reason_text(held))",
         "A motor starts although its enable or its channel forbids it.",
-        ("tests/session/test_command.py::test_refusals",),
+        ("tests/session/test_command.py::test_refused_command_has_its_reason",),
     ),
     Defect(
         "old-reference-behind-a-reset",
@@ -152,7 +154,10 @@ DEFECTS = (
         "if turns is None or turns == id:",
         "if turns is None or turns != id:",
         "A motor that starts in the wrong direction keeps running.",
-        ("tests/session/test_command.py::test_a_motor_that_starts_the_other_way_is_stopped",),
+        (
+            "tests/session/test_command.py"
+            "::test_motor_that_starts_in_the_wrong_direction_is_stopped",
+        ),
     ),
     Defect(
         "reference-clamped",
@@ -160,7 +165,7 @@ DEFECTS = (
         "_check_limits(ReferenceUnits(profile, readings), found)\n    if",
         "pass\n    if",
         "A mistyped reference is limited and written instead of being refused.",
-        ("tests/session/test_command.py::test_references_that_are_refused",),
+        ("tests/session/test_command.py::test_invalid_reference_is_refused",),
     ),
     Defect(
         "reference-before-the-state-check",
@@ -187,7 +192,7 @@ DEFECTS = (
         "20 Hz are written as 200 Hz if the scale of the reference follows another word.",
         (
             "tests/session/test_reference.py"
-            "::test_run_with_scale_by_turns_at_the_hertz_that_were_typed",
+            "::test_run_with_a_scale_factor_turns_at_the_typed_frequency",
         ),
     ),
     Defect(
@@ -204,10 +209,7 @@ DEFECTS = (
         "    if not unit:\n        return places[0], typed\n",
         "    if unit:\n        return places[0], typed\n",
         "20Hz are written as 20 % to a drive whose reference is a percentage.",
-        (
-            "tests/session/test_reference.py"
-            "::test_reference_in_a_unit_that_leads_nowhere_is_refused",
-        ),
+        ("tests/session/test_reference.py::test_reference_in_an_unknown_unit_is_refused",),
     ),
     Defect(
         "stop-behind-the-queue",
@@ -215,7 +217,7 @@ DEFECTS = (
         "parameter, raw, why=why, priority=Priority.STOP, read_back=False",
         "parameter, raw, why=why, priority=Priority.BACKGROUND, read_back=False",
         "A stop waits for all other work of the line.",
-        ("tests/session/test_stop.py::test_a_stop_goes_before_all_that_waits",),
+        ("tests/session/test_stop.py::test_stop_precedes_all_waiting_requests",),
     ),
     Defect(
         "stop-word-from-unread-words",
@@ -231,7 +233,7 @@ DEFECTS = (
         "if not hertz and kind in STANDING:",
         "if kind in STANDING:",
         "A motor that coasts at full speed is reported as stopped.",
-        (f"{STOP}::test_a_motor_that_coasts_is_not_stopped_before_it_stands",),
+        (f"{STOP}::test_coasting_motor_is_not_stopped_before_standstill",),
     ),
     Defect(
         "standstill-by-the-frequency-alone",
@@ -239,7 +241,7 @@ DEFECTS = (
         "if not hertz and kind in STANDING:",
         "if not hertz:",
         "A motor that is enabled at 0 Hz is reported as stopped.",
-        (f"{STOP}::test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped",),
+        (f"{STOP}::test_enabled_motor_at_0_hz_is_not_reported_as_stopped",),
     ),
     Defect(
         "prepared-frames-not-sent",
@@ -271,7 +273,7 @@ DEFECTS = (
         "    if session.state(SEEN_RUNNING).motion in ENABLED:\n        raws",
         "    if True:\n        raws",
         "F9 starts a motor at rest whose profile was changed at the keypad.",
-        (f"{WAVES}::test_the_first_word_starts_no_motor_whatever_chart_is_in_force",),
+        (f"{WAVES}::test_first_stop_word_starts_no_motor_in_any_chart",),
     ),
     Defect(
         "first-wave-waits-for-reads",
@@ -279,7 +281,7 @@ DEFECTS = (
         "            await self.wave.over()\n",
         "            await self._chosen()\n",
         "The last of many drives is stopped seconds after the first.",
-        (f"{WAVES}::test_every_drive_is_sent_its_word_before_anything_is_read",),
+        (f"{WAVES}::test_every_drive_gets_its_stop_word_before_any_read",),
     ),
     Defect(
         "stopping-before-the-frame",
@@ -287,7 +289,7 @@ DEFECTS = (
         'self._say(session, Phase.SENDING, "stop waits for the line", ordered)',
         'self._say(session, Phase.STOPPING, "stop waits for the line", ordered)',
         "A row shows STOPPING although no stop was sent to its drive.",
-        (f"{WAVES}::test_every_drive_is_sent_its_word_before_anything_is_read",),
+        (f"{WAVES}::test_every_drive_gets_its_stop_word_before_any_read",),
     ),
     Defect(
         "stop-in-vain-not-said-at-once",
@@ -295,7 +297,7 @@ DEFECTS = (
         '    if state.motion not in ENABLED:\n        return ""\n',
         '    return ""\n',
         "A motor run from its terminals is shown as STOPPING for seconds.",
-        (f"{WAVES}::test_a_stop_of_a_motor_that_its_terminals_run_is_not_stopped_at_once",),
+        (f"{WAVES}::test_motor_run_by_terminals_is_not_reported_as_stopped",),
     ),
     Defect(
         "stop-tried-once",
@@ -303,7 +305,7 @@ DEFECTS = (
         "STOP_TRIES: Final = 5",
         "STOP_TRIES: Final = 1",
         "After one disturbed frame the motor keeps running.",
-        ("tests/session/test_stop.py::test_a_dead_drive_is_tried_again_and_reported_of",),
+        ("tests/session/test_stop.py::test_stop_of_a_dead_drive_is_retried_and_reported",),
     ),
     Defect(
         "broadcast-to-all-families",
@@ -311,7 +313,7 @@ DEFECTS = (
         "if chart is None or found is None or not found.broadcast:",
         "if chart is None or found is None:",
         "The stop of one drive starts another drive that interprets its word differently.",
-        ("tests/session/test_stop.py::test_all_are_stopped_and_a_broadcast_starts_none",),
+        ("tests/session/test_stop.py::test_stop_all_stops_every_drive_and_starts_none",),
     ),
     Defect(
         "start-not-on-record",
@@ -337,7 +339,7 @@ DEFECTS = (
         "The record of a start is removed before the motor turns.",
         (
             "tests/session/test_starts.py"
-            "::test_a_rest_read_before_the_run_frame_does_not_take_the_record",
+            "::test_standstill_read_before_the_run_frame_keeps_the_record",
         ),
     ),
     Defect(
@@ -370,7 +372,7 @@ DEFECTS = (
         "self.places = reach(profile, self.outputs, self.wanted)",
         "self.places = range(self.outputs.length)",
         "Writing a ramp through the scanner writes the command word as well.",
-        ("tests/session/test_exchange.py::test_only_what_was_named_is_written",),
+        ("tests/session/test_exchange.py::test_only_named_values_are_written",),
     ),
     Defect(
         "outputs-not-looked-at-before",
@@ -380,7 +382,7 @@ DEFECTS = (
         "Words are sent to parameters that another program assigned to the slots in the meantime.",
         (
             "tests/session/test_exchange.py"
-            "::test_an_exchange_needs_arming_and_the_interlocks_of_an_order",
+            "::test_exchange_needs_arming_and_the_interlocks_of_a_command",
         ),
     ),
     Defect(
@@ -389,7 +391,7 @@ DEFECTS = (
         "            self._check_rest(state)\n",
         "",
         "A motor that the terminals start during a timeout test is not polled, without a question.",
-        (f"{PROVER}::test_a_motor_that_begins_to_turn_meanwhile_is_still_polled",),
+        (f"{PROVER}::test_motor_that_starts_during_the_test_is_polled_again",),
     ),
     Defect(
         "proved-against-another-setting",
@@ -397,7 +399,7 @@ DEFECTS = (
         "            await self._check_same(rules, readings)\n",
         "",
         "A drive whose timeout was changed during its test is reported as not reacting as set.",
-        (f"{PROVER}::test_foreign_change_during_test_proves_nothing",),
+        (f"{PROVER}::test_foreign_change_during_the_test_invalidates_it",),
     ),
     Defect(
         "proof-on-the-run-unasked",
@@ -429,6 +431,6 @@ DEFECTS = (
         "            await look_for_drive(reader.session, error)\n",
         "",
         "A drive without a port's words counts as silent, so its polls and keep-alive reads wait.",
-        (f"{TIMEOUT}::test_a_drive_is_requested_what_it_has_after_a_silence",),
+        (f"{TIMEOUT}::test_timeout_is_read_again_after_a_silence",),
     ),
 )

@@ -63,10 +63,7 @@ DEFECTS = (
         "journal.add(_reset_entry(self.session, answer))",
         "pass",
         "No record shows who reset the drive's counters that others use to find lost frames.",
-        (
-            "tests/session/test_counters.py::"
-            "test_the_drives_counters_are_reset_and_compared_from_there",
-        ),
+        ("tests/session/test_counters.py::test_drive_counters_are_reset_and_compared_from_zero",),
     ),
     Defect(
         "dead-drive-spoils-the-line",

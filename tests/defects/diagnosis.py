@@ -16,7 +16,7 @@ DEFECTS = (
         "return bool(heard.requested) and heard.nothing and not heard.echoed",
         "return bool(heard.requested) and heard.nothing and bool(sight.neighbors)",
         "A script takes a line without any answer for a good one.",
-        (f"{LADDER}::test_a_drive_that_has_not_answered_is_never_reported_to_be_well",),
+        (f"{LADDER}::test_silent_drive_is_never_reported_as_healthy",),
     ),
     Defect(
         "echo-taken-for-an-answer",
@@ -24,7 +24,7 @@ DEFECTS = (
         "        if not tcp and data == request:\n",
         "        if not tcp and data == asked:\n",
         "An adapter that repeats every frame is taken for the drive.",
-        (f"{LADDER}::test_only_the_echo_comes_back",),
+        (f"{LADDER}::test_echo_without_a_reply_is_the_cause",),
     ),
     Defect(
         "other-speed-told-the-wrong-way-round",
@@ -32,7 +32,7 @@ DEFECTS = (
         "wanted = sight.link.baud * due / came",
         "wanted = sight.link.baud * came / due",
         "The advice leads to a baud at which the drive is received even less.",
-        (f"{LADDER}::test_bytes_that_came_at_another_baud_tell_which",),
+        (f"{LADDER}::test_bytes_at_another_baud_show_which",),
     ),
     Defect(
         "families-own-exception-taken-for-a-gateways",
@@ -40,7 +40,7 @@ DEFECTS = (
         "if code in codes]",
         "if code not in codes]",
         "The drive is suspected although the gateway cannot reach it.",
-        (f"{LADDER}::test_a_gateway_answers_in_the_drives_place",),
+        (f"{LADDER}::test_gateway_exception_is_the_cause",),
     ),
     Defect(
         "latency-told-unmeasured",
@@ -48,7 +48,7 @@ DEFECTS = (
         "return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT",
         "return not sight.heard.damaged",
         "An adapter that delays nothing is blamed.",
-        (f"{LADDER}::test_latency_is_reported_where_it_is_set_and_measured",),
+        (f"{LADDER}::test_latency_is_reported_if_set_and_measured",),
     ),
     Defect(
         "old-counts-taken-for-new",
@@ -64,7 +64,7 @@ DEFECTS = (
         "device, address, 1, priority=Priority.OPERATOR_READ, function=function",
         "device, address, 1, priority=Priority.FEED, function=function",
         "A diagnosis takes priority over the commands of an operator.",
-        (f"{LADDER}::test_it_asks_as_an_operator_does",),
+        (f"{LADDER}::test_diagnosis_uses_operator_priority",),
     ),
     Defect(
         "why-ends-well-for-a-script",
@@ -80,10 +80,7 @@ DEFECTS = (
         "if not came or not due or same_speed(sight) or not isinstance(sight.link, SerialLink):",
         "if not came or not due or not isinstance(sight.link, SerialLink):",
         "The advice says that the speed is right, and to open the line at another one.",
-        (
-            "tests/session/test_diagnosis.py::"
-            "test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed",
-        ),
+        ("tests/session/test_diagnosis.py::test_garbage_at_the_same_baud_suggests_another_format",),
     ),
     Defect(
         "wires-of-who-answers",
@@ -99,7 +96,7 @@ DEFECTS = (
         "        if paused.second >= TURNS:",
         "        if self.second:",
         "A person looks for a second drive although an adapter sends each frame twice.",
-        (f"{MEASURED}::test_a_copy_during_the_next_request_is_no_second_drive",),
+        (f"{MEASURED}::test_copy_during_the_next_request_is_not_a_second_drive",),
     ),
     Defect(
         "late-replies-taken-for-one-behind",
@@ -107,7 +104,7 @@ DEFECTS = (
         "prompt = due and frame.time - now.began < PROMPT",
         "prompt = due",
         "A slow drive is reported as showing values of other registers.",
-        (f"{MEASURED}::test_one_behind_is_at_once_and_a_late_reply_is_not",),
+        (f"{MEASURED}::test_reply_one_behind_is_immediate_unlike_a_late_one",),
     ),
     Defect(
         "collisions-taken-for-one-behind",
@@ -116,7 +113,7 @@ DEFECTS = (
         '(exchange.replies or exchange.damaged or exchange.older == "second"):',
         "if exchange.older and exchange.replies:",
         "Two drives at one address are reported as a converter that is behind.",
-        (f"{MEASURED}::test_an_older_reply_is_counted_by_what_else_came",),
+        (f"{MEASURED}::test_older_reply_is_classified_by_the_other_replies",),
     ),
     Defect(
         "gateway-refusals-taken-for-replies",
@@ -124,7 +121,7 @@ DEFECTS = (
         "and body[2] in unreached:",
         "and body[2] in ():",
         "A gateway that sometimes misses the drive is reported as good.",
-        (f"{MEASURED}::test_a_gateway_that_misses_the_drive_is_counted",),
+        (f"{MEASURED}::test_gateway_exceptions_are_counted",),
     ),
     Defect(
         "lone-unit-of-a-gateway-that-passes-units-on",
@@ -132,7 +129,7 @@ DEFECTS = (
         "    if others - {device, ANY_UNIT}:\n        return None  # the gateway passes units on\n",
         "",
         "An unused address is reported as a gateway that answers only unit 255.",
-        (f"{MEASURED}::test_no_connection_is_made_beside_a_line_that_answers",),
+        (f"{MEASURED}::test_answering_line_gets_no_second_connection",),
     ),
     Defect(
         "requests-beside-another-master",
@@ -140,7 +137,7 @@ DEFECTS = (
         "if ready and not isinstance(line.link, TcpLink) and (others := await _others(line)):",
         'if ready and (others := ""):',
         "A diagnosis disturbs the master that controls the line.",
-        (f"{MEASURED}::test_nothing_is_sent_while_another_master_is_heard",),
+        (f"{MEASURED}::test_nothing_is_sent_while_another_master_is_active",),
     ),
     Defect(
         "line-lost-in-a-silence-ends-the-proof",
@@ -150,7 +147,7 @@ DEFECTS = (
         "Behind a gateway that closes idle connections, a timeout test has no result.",
         (
             "tests/session/test_prover.py::"
-            "test_connection_closed_in_a_silence_is_read_once_it_is_back",
+            "test_connection_closed_in_a_silence_is_read_after_it_returns",
         ),
     ),
 )

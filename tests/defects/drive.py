@@ -13,7 +13,7 @@ DEFECTS = (
         "elif self._held[code] != before:",
         "elif False:",
         "A setting changed at the keypad is lost at power-off without a warning.",
-        (f"{EDITOR}::test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved",),
+        (f"{EDITOR}::test_setting_changed_by_another_source_counts_as_unsaved",),
     ),
     Defect(
         "field-clears-its-neighbors",
@@ -197,7 +197,7 @@ DEFECTS = (
         "kept = raws.get(where, 0) & optional_bits(chart, where)",
         "kept = 0",
         "A run command switches off an option of the drive.",
-        ("tests/session/test_command.py::test_options_of_an_altivar_21_stay_from_order_to_order",),
+        ("tests/session/test_command.py::test_options_of_an_altivar_21_persist_between_commands",),
     ),
     Defect(
         "stop-that-coasts-instead",

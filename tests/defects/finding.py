@@ -26,7 +26,7 @@ DEFECTS = (
         "if len(self._idle) < MUCH_TALK:",
         "if True:",
         "A master without long silences is not detected, and is disturbed.",
-        (f"{MASTERS}::test_a_master_is_heard_on_a_line_on_which_nothing_is_sent",),
+        (f"{MASTERS}::test_master_is_detected_on_an_idle_line",),
     ),
     Defect(
         "late-echo-taken-for-a-master",
@@ -34,7 +34,7 @@ DEFECTS = (
         "elif frame.time < since or frame.data in ours:",
         "elif frame.time < since:",
         "With an adapter that echoes late, no drive is ever found.",
-        (f"{MASTERS}::test_frames_of_no_master",),
+        (f"{MASTERS}::test_own_or_damaged_frames_show_no_master",),
     ),
     Defect(
         "empty-address-waited-for",
@@ -42,7 +42,7 @@ DEFECTS = (
         "silent = await first(self.devices, Priority.BACKGROUND, how.within)",
         "silent = await first(self.devices, Priority.BACKGROUND, None)",
         "A search of 31 addresses takes ten times as long.",
-        (f"{SEARCH}::test_an_empty_address_costs_one_request_and_the_longest_turnaround",),
+        (f"{SEARCH}::test_empty_address_costs_one_request_and_the_longest_turnaround",),
     ),
     Defect(
         "late-answer-not-asked-again",
@@ -50,7 +50,7 @@ DEFECTS = (
         "            if late:\n",
         "            if late and not self._once:\n",
         "A drive with a long response delay is not found.",
-        (f"{SEARCH}::test_late_answer_is_heard_and_requested_again",),
+        (f"{SEARCH}::test_late_reply_is_accepted_and_requested_again",),
     ),
     Defect(
         "family-inferred-from-damage",
@@ -74,7 +74,7 @@ DEFECTS = (
         "if _damage(line) != damage or",
         "if",
         "An Altivar on a line with bit errors is shown as a Leroy-Somer drive.",
-        (f"{FIND}::test_silence_on_a_line_that_damages_frames_infers_no_family",),
+        (f"{FIND}::test_silence_on_a_damaging_line_infers_no_family",),
     ),
     Defect(
         "object-with-two-contents-believed",
@@ -186,7 +186,7 @@ DEFECTS = (
         "if paused := line.facts.paused.get(device):",
         "if False and (paused := ('', '')):",
         "A person looks for a broken wire at a drive whose timeout is being tested.",
-        (f"{SEARCH}::test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one",),
+        (f"{SEARCH}::test_paused_drive_is_not_reported_as_silent",),
     ),
     Defect(
         "unclear-answer-told-silent",

@@ -306,7 +306,7 @@ DEFECTS = (
         "if not self._may_go_first():",
         "if True:",
         "A stop waits many seconds for the client's earlier requests to a silent drive.",
-        (f"{GATEWAY}::test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them",),
+        (f"{GATEWAY}::test_stop_overtakes_and_cancels_writes_of_its_connection",),
     ),
     Defect(
         "foreign-stop-judged-too-early",
@@ -314,7 +314,7 @@ DEFECTS = (
         "return not self._line.pending.changes_before(self._write, registers)",
         "return True",
         "A word passes as a stop although a setting just before it makes it run the motor.",
-        (f"{GATEWAY}::test_a_word_that_stops_by_what_was_set_before_it_waits_for_that",),
+        (f"{GATEWAY}::test_stop_word_that_depends_on_an_earlier_write_waits_for_it",),
     ),
     Defect(
         "foreign-stop-voids-what-follows-it",
@@ -322,7 +322,7 @@ DEFECTS = (
         "for pending_write in self._pending[at:]:",
         "for pending_write in self._pending[at : at + 1]:",
         "A client's requests after its stop are refused as if they came before it.",
-        (f"{GATEWAY}::test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them",),
+        (f"{GATEWAY}::test_stop_overtakes_and_cancels_writes_of_its_connection",),
     ),
     Defect(
         "foreign-reads-keep-a-stop-in-the-socket",
@@ -338,7 +338,7 @@ DEFECTS = (
         "if self._request.stale:",
         "if False:",
         "A gateway that was frozen starts a motor for a client that gave up long ago.",
-        (f"{GATEWAY}::test_requests_from_a_suspension_only_stop",),
+        (f"{GATEWAY}::test_requests_queued_during_a_suspension_can_only_stop",),
     ),
     Defect(
         "stale-bytes-taken-for-new",
@@ -362,7 +362,7 @@ DEFECTS = (
         "or self._barred.get((device, client))",
         "",
         "A controller that repeats its run word starts the motor that another client stopped.",
-        (f"{GATEWAY}::test_a_client_that_repeats_its_run_word_does_not_undo_the_stop_of_another",),
+        (f"{GATEWAY}::test_repeated_run_word_does_not_undo_a_stop_of_another_client",),
     ),
     Defect(
         "half-a-value-written",

@@ -19,7 +19,10 @@ DEFECTS = (
         "or (healthy and _is_sick(line, device)):",
         "or (healthy and _is_sick(line, device) and False):",
         "An ATV71 on a line that has just lost frames is shown as a Leroy-Somer drive.",
-        ("tests/session/test_find_drive.py::test_silence_after_a_sick_minute_infers_no_family",),
+        (
+            "tests/session/test_find_drive.py"
+            "::test_silence_after_a_minute_with_errors_infers_no_family",
+        ),
     ),
     Defect(
         "swapped-bytes-armed",
@@ -27,7 +30,7 @@ DEFECTS = (
         "        if why := self.trouble():\n",
         "        if (why := self.trouble()) and False:\n",
         "A motor is commanded by words whose bytes arrive swapped.",
-        (f"{BYTES}::test_swapped_bytes_refuse_arming_and_what_was_armed_before",),
+        (f"{BYTES}::test_swapped_bytes_refuse_arming_and_disarm",),
     ),
     Defect(
         "swapped-bytes-kept",
@@ -43,7 +46,7 @@ DEFECTS = (
         "LEAST_REGISTERS = 3\n",
         "LEAST_REGISTERS = 1\n",
         "One value out of range takes a healthy drive out of use.",
-        (f"{BYTES}::test_values_read_anyway_show_that_bytes_are_swapped_from_now_on",),
+        (f"{BYTES}::test_regular_reads_detect_bytes_that_become_swapped",),
     ),
     Defect(
         "line-that-was-lost-not-checked-again",
@@ -51,7 +54,7 @@ DEFECTS = (
         "        self._was_away = self._tested\n",
         "        self._was_away = False\n",
         "Through another gateway a motor is commanded by swapped words.",
-        (f"{BYTES}::test_line_that_was_lost_is_checked_again_before_a_command",),
+        (f"{BYTES}::test_recovered_line_is_checked_again_before_a_command",),
     ),
     Defect(
         "stop-by-a-value-of-no-chart",
@@ -59,7 +62,7 @@ DEFECTS = (
         "return found if found is None or found.when is None or found.when.holds(raws) else None",
         "return found",
         "The stop word of Drivecom runs a motor in the I/O profile.",
-        (f"{BYTES}::test_stop_on_swapped_bytes_never_takes_the_word_of_another_chart",),
+        (f"{BYTES}::test_stop_with_swapped_bytes_never_uses_the_word_of_another_chart",),
     ),
     Defect(
         "contradicted-drive-armed",
@@ -83,7 +86,7 @@ DEFECTS = (
         "if not session.contradiction or own is None:",
         "if True or own is None:",
         "The stop key runs a motor whose drive was identified as another family.",
-        (f"{CONTRADICTION}::test_a_contradicted_drive_is_stopped_as_what_it_says_it_is",),
+        (f"{CONTRADICTION}::test_contradicting_drive_is_stopped_by_its_own_family",),
     ),
     Defect(
         "profile-believed-by-the-command-line",
@@ -115,10 +118,7 @@ DEFECTS = (
         "journal.add(_entry(line, device, what, answer))",
         "pass",
         "No record shows what stopped or moved a motor.",
-        (
-            "tests/session/test_first_stop.py"
-            "::test_it_is_in_the_journal_with_what_was_reported_to_it",
-        ),
+        ("tests/session/test_first_stop.py::test_first_stop_is_in_the_journal",),
     ),
     Defect(
         "timeout-of-the-other-port-ignored",

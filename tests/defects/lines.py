@@ -24,7 +24,7 @@ DEFECTS = (
         "before is not None and before != name.key:",
         "before is not None and not name.key:",
         "After adapters were replugged, the motor of another machine starts.",
-        (f"{KNOWN}::test_another_adapter_under_the_same_name_holds_the_line",),
+        (f"{KNOWN}::test_other_adapter_under_the_same_name_holds_the_line",),
     ),
     Defect(
         "another-drive-not-noticed",
@@ -32,7 +32,7 @@ DEFECTS = (
         "return self.stated == now.stated",
         "return self.vendor == now.vendor",
         "A replaced drive runs with the commands meant for the earlier one.",
-        (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),
+        (f"{KNOWN}::test_other_drive_at_an_address_holds_the_line",),
     ),
     Defect(
         "changed-line-accepted-unasked",
@@ -40,7 +40,7 @@ DEFECTS = (
         "if device not in self._changed and None not in self._changed and before != now:",
         "if before != now:\n                self._changed = {}",
         "The second command writes to the wrong drive, as the first one accepted it as known.",
-        (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),
+        (f"{KNOWN}::test_other_drive_at_an_address_holds_the_line",),
     ),
     Defect(
         "held-line-writes",
@@ -48,7 +48,7 @@ DEFECTS = (
         "    if held and request.changes:\n        return held\n",
         "",
         "A line on hold accepts writes from code that requires no arming.",
-        (f"{KNOWN}::test_a_held_line_takes_nothing_but_a_stop",),
+        (f"{KNOWN}::test_held_line_accepts_stops_only",),
     ),
     Defect(
         "held-line-keeps-a-stop-back",
@@ -57,7 +57,7 @@ DEFECTS = (
         "held = self.held",
         "A motor cannot be stopped because the adapter was changed.",
         (
-            f"{KNOWN}::test_the_real_line_holds_too",
+            f"{KNOWN}::test_real_line_is_held_too",
             f"{COMMANDS}::test_stop_is_sent_to_a_changed_drive",
         ),
     ),
@@ -67,7 +67,7 @@ DEFECTS = (
         "return self._line.held or self.barred",
         "return self.barred",
         "The panel shows a drive as armed that accepts no command.",
-        (f"{KNOWN}::test_a_held_line_arms_nothing",),
+        (f"{KNOWN}::test_held_line_arms_no_drive",),
     ),
     Defect(
         "armed-though-the-line-changed",
@@ -75,7 +75,7 @@ DEFECTS = (
         "        if self._line.held:\n            self.disarm(",
         "        if not self._line.link:\n            self.disarm(",
         "A drive stays armed although another adapter now has its line's name.",
-        (f"{KNOWN}::test_a_held_line_arms_nothing",),
+        (f"{KNOWN}::test_held_line_arms_no_drive",),
     ),
     Defect(
         "start-recorded-by-number",
@@ -83,7 +83,7 @@ DEFECTS = (
         "line=remembered_text(task.record.line)",
         "line=task.record.line",
         "A motor left running is searched for on the adapter that now has the old number.",
-        (f"{KNOWN}::test_a_start_is_found_where_its_adapter_is_plugged_in_now",),
+        (f"{KNOWN}::test_recorded_start_is_found_at_the_new_port_of_its_adapter",),
     ),
     Defect(
         "name-drops-the-address",
@@ -107,7 +107,7 @@ DEFECTS = (
         "        if found := _salvaged(line_settings().text, text):\n            return found\n",
         "",
         "A missing bracket in the settings file prevents stopping a motor.",
-        (f"{NAMED}::test_a_stop_finds_its_line_in_a_broken_file",),
+        (f"{NAMED}::test_stop_finds_its_line_in_a_broken_file",),
     ),
     Defect(
         "address-lost-in-a-broken-file",
@@ -115,7 +115,7 @@ DEFECTS = (
         'return found._replace(device=int(parts["device"]))',
         "return found",
         "A stop by name stops the drive at address 1 while the named one keeps running.",
-        (f"{NAMED}::test_a_stop_finds_its_drive_in_a_broken_file",),
+        (f"{NAMED}::test_stop_finds_its_drive_in_a_broken_file",),
     ),
     Defect(
         "first-word-taken-for-the-line",

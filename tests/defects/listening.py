@@ -88,7 +88,7 @@ DEFECTS = (
         'return AssumedProfile(first, "likely",',
         'return AssumedProfile(first, "identified",',
         "A guessed family is shown as one that the drive has reported.",
-        ("tests/session/test_listening.py::test_a_family_is_likely_by_what_the_drive_answers",),
+        ("tests/session/test_listening.py::test_likely_family_follows_from_the_replies",),
     ),
     Defect(
         "requests-feed-without-an-answer",
@@ -97,7 +97,7 @@ DEFECTS = (
         "        if exchange.turnaround is None:\n            self.fed = exchange.time\n"
         "        else:\n",
         "A drive that trips for lack of requests is shown as kept alive.",
-        ("tests/session/test_listening.py::test_a_request_that_is_not_answered_feeds_nobody",),
+        ("tests/session/test_listening.py::test_unanswered_request_does_not_restart_the_timeout",),
     ),
     Defect(
         "pause-of-now-forgotten",
@@ -105,7 +105,7 @@ DEFECTS = (
         "now - self.fed if self.fed is not None else 0.0)",
         "0.0)",
         "A master that has exited is shown as keeping its drives alive.",
-        ("tests/session/test_listening.py::test_a_pause_that_goes_on_counts_too",),
+        ("tests/session/test_listening.py::test_pause_in_progress_counts",),
     ),
     Defect(
         "half-a-packet-left",

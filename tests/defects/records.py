@@ -11,7 +11,7 @@ DEFECTS = (
         'b"\\n" + _mark() + line',
         'b"\\n" + line',
         "The journal does not mark an entry that a crash cut off.",
-        ("tests/session/test_journal_file.py::test_half_a_line_is_kept_and_marked",),
+        ("tests/session/test_journal_file.py::test_partial_line_is_kept_and_marked",),
     ),
     Defect(
         "half-a-line-swallows-the-next",
@@ -19,7 +19,7 @@ DEFECTS = (
         'line if end[-1:] in (b"", b"\\n") else',
         "line if True else",
         "The first write after a crash is not recorded.",
-        ("tests/session/test_journal_file.py::test_half_a_line_is_kept_and_marked",),
+        ("tests/session/test_journal_file.py::test_partial_line_is_kept_and_marked",),
     ),
     Defect(
         "programs-take-no-turns",
@@ -43,7 +43,7 @@ DEFECTS = (
         "OWN_MODE = 0o600",
         "OWN_MODE = 0o644",
         "Every user of the computer can read the journal of writes.",
-        ("tests/session/test_journal_file.py::test_the_journal_is_its_owners_alone",),
+        ("tests/session/test_journal_file.py::test_journal_is_private_to_its_owner",),
     ),
     Defect(
         "last-entries-left-behind",
@@ -51,10 +51,7 @@ DEFECTS = (
         "atexit.register(ending)",
         "pass",
         "The last write before a program ends is not recorded.",
-        (
-            "tests/session/test_journal_file.py"
-            "::test_a_program_that_ends_puts_its_last_entries_down",
-        ),
+        ("tests/session/test_journal_file.py::test_last_entries_are_written_at_the_exit",),
     ),
     Defect(
         "journal-trouble-not-told-at-once",
@@ -62,7 +59,7 @@ DEFECTS = (
         "if why and not before:\n                self._cry()",
         "if before and not why:\n                self._cry()",
         "A run of an hour reports only at its end that nothing was recorded.",
-        ("tests/session/test_journal_file.py::test_trouble_is_reported_at_once_and_once",),
+        ("tests/session/test_journal_file.py::test_trouble_is_reported_immediately_and_once",),
     ),
     Defect(
         "lost-answer-not-completed",
@@ -70,7 +67,7 @@ DEFECTS = (
         "answer, lost = str(error), True",
         "answer, lost = str(error), False",
         "The journal never shows the result of a write whose answer was lost.",
-        ("tests/session/test_writing.py::test_a_lost_answer_is_completed_once_the_drive_is_read",),
+        ("tests/session/test_writing.py::test_lost_reply_is_completed_by_a_later_read",),
     ),
     Defect(
         "setting-cut-short-is-kept-as-done",
@@ -78,7 +75,7 @@ DEFECTS = (
         "answer, lost = CUT_SHORT, True",
         "pass",
         "The journal shows a setting as written although a stop interrupted it.",
-        ("tests/session/test_writing.py::test_a_write_that_a_stop_cuts_short_is_not_kept_as_done",),
+        ("tests/session/test_writing.py::test_write_cut_by_a_stop_is_not_recorded_as_done",),
     ),
     Defect(
         "exchange-cut-short-is-kept-as-done",
@@ -94,10 +91,7 @@ DEFECTS = (
         "self._waiting_for.pop(code, None)\n            self._doubted",
         "self._doubted",
         "The journal confirms a lost write by the value of the next one.",
-        (
-            "tests/session/test_writing.py"
-            "::test_a_lost_answer_is_not_completed_by_what_a_later_write_left",
-        ),
+        ("tests/session/test_writing.py::test_lost_reply_is_not_completed_by_a_later_write",),
     ),
     Defect(
         "full-disk-prints-tracebacks",

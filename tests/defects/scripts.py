@@ -186,7 +186,7 @@ DEFECTS = (
         "        future.cancel()\n        call.cancel()",
         "        future.cancel()",
         "Settings are written after the task of a script was cancelled.",
-        (f"{ASYNC}::test_nothing_more_of_a_cancelled_write_is_sent",),
+        (f"{ASYNC}::test_cancelled_write_sends_no_more_frames",),
     ),
     Defect(
         "opening-line-left-open",
@@ -194,7 +194,7 @@ DEFECTS = (
         "        except asyncio.CancelledError as error:\n            cancelled = error",
         "        except asyncio.CancelledError:\n            raise",
         "A cancelled script keeps a serial port, and its drives are polled on.",
-        (f"{ASYNC}::test_a_line_whose_opening_is_cancelled_is_closed",),
+        (f"{ASYNC}::test_cancelled_open_closes_the_line",),
     ),
     Defect(
         "script-starts-a-motor-unarmed",
@@ -211,7 +211,7 @@ DEFECTS = (
         'None if opened.simulation else StartKeeper("script")',
         "None",
         "The motor of a killed script runs on.",
-        (f"{RUNNING}::test_the_start_is_on_record_while_it_runs",),
+        (f"{RUNNING}::test_start_is_recorded_while_the_motor_runs",),
     ),
     Defect(
         "own-handler-ends-the-wait-for-standstill",
@@ -219,7 +219,7 @@ DEFECTS = (
         "                interruption = interruption or late",
         "                raise",
         "A second signal to a script that handles it ends the wait while the motor still turns.",
-        (f"{RUNNING}::test_an_own_handler_that_raises_during_the_stop_ends_no_wait",),
+        (f"{RUNNING}::test_own_handler_that_raises_during_the_stop_does_not_end_the_wait",),
     ),
     Defect(
         "outer-motor-runs-on-after-a-signal",
@@ -227,7 +227,7 @@ DEFECTS = (
         "    for guard in tuple(_guards):",
         "    for guard in _guards[-1:]:",
         "After a signal to a script with two motors, the second runs on for the ramp of the first.",
-        (f"{RUNNING}::test_a_signal_stops_the_motors_of_nested_blocks_together",),
+        (f"{RUNNING}::test_signal_stops_motors_of_nested_blocks_together",),
     ),
     Defect(
         "handler-of-a-script-replaced",
@@ -236,9 +236,9 @@ DEFECTS = (
         "    if not in_script:",
         "A signal that a script handles ends it, or Ctrl-C ends `run` before standstill.",
         (
-            f"{RUNNING}::test_a_signal_ends_an_async_script_after_standstill",
-            f"{RUNNING}::test_a_signal_that_the_script_handles_is_left_to_it",
-            f"{RUNNING}::test_a_ctrl_c_while_it_starts_leaves_none_running",
+            f"{RUNNING}::test_signal_ends_an_async_script_after_standstill",
+            f"{RUNNING}::test_signal_handled_by_the_script_is_left_to_it",
+            f"{RUNNING}::test_ctrl_c_during_the_start_leaves_no_motor_running",
             "tests/line/test_signals.py",
         ),
     ),
@@ -248,7 +248,7 @@ DEFECTS = (
         "if error is None or isinstance(found, NotStopped):",
         "if isinstance(found, NotStopped):",
         "A script takes a motor that tripped for one that has done its work.",
-        (f"{RUNNING}::test_a_trip_is_reported_at_the_end_and_at_once_by_wait",),
+        (f"{RUNNING}::test_trip_is_reported_at_the_end_and_immediately_by_wait",),
     ),
     Defect(
         "stop-just-before-the-end-hidden",
@@ -256,7 +256,7 @@ DEFECTS = (
         "return self._stop_of_others()",
         'return ""',
         "A script does not learn that another program stopped its motor.",
-        (f"{RUNNING}::test_a_stop_of_another_program_just_before_the_end_is_reported",),
+        (f"{RUNNING}::test_stop_by_another_program_just_before_the_end_is_reported",),
     ),
     Defect(
         "not-stopped-hidden-by-an-error",
@@ -264,7 +264,7 @@ DEFECTS = (
         "if error is None or isinstance(found, NotStopped):",
         "if error is None:",
         "A motor runs on after an error of a script, which shows that error alone.",
-        (f"{RUNNING}::test_a_motor_that_is_not_stopped_replaces_every_error",),
+        (f"{RUNNING}::test_not_stopped_replaces_every_other_error",),
     ),
     Defect(
         "line-closed-before-its-motor-rests",

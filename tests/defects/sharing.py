@@ -249,7 +249,7 @@ DEFECTS = (
         "set(self._departed) <= set(before)",
         "len(self._departed) <= len(before) + 1",
         "A panel that has just opened offers no takeover of a killed program's motor.",
-        ("tests/session/test_handover.py::test_program_present_earlier_is_missed_too",),
+        ("tests/session/test_handover.py::test_earlier_program_that_disappears_is_reported",),
     ),
     Defect(
         "motor-of-a-living-program-left",
@@ -500,7 +500,7 @@ DEFECTS = (
         "            await self._see_taken(step, error)",
         "            raise",
         "The owner of the line ends, and a block stays half written although the line continues.",
-        (f"{MAPPING}::test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once",),
+        (f"{MAPPING}::test_slot_without_a_reply_is_read_and_not_written_again",),
     ),
     Defect(
         "slots-written-before-not-told",
@@ -540,7 +540,7 @@ DEFECTS = (
         "except (*LOST_ANSWERS, LineLost) as error:",
         "except LOST_ANSWERS as error:",
         "The owner of the line ends, and another program's restore stops half way.",
-        (f"{APPLYING}::test_a_line_that_goes_on_at_another_owner_is_gone_on_with",),
+        (f"{APPLYING}::test_writing_continues_if_another_owner_takes_the_line",),
     ),
     Defect(
         "restore-not-seen-again-not-told",
@@ -556,7 +556,7 @@ DEFECTS = (
         "        for shared in self._shared():\n            try:",
         "        for shared in ():\n            try:",
         "Another user's service keeps a motor running whose program has exited.",
-        ("tests/session/test_guardian.py::test_the_motor_of_another_user_of_the_group_is_stopped",),
+        ("tests/session/test_guardian.py::test_motor_of_another_user_of_the_group_is_stopped",),
     ),
     Defect(
         "trend-of-another-drive",
@@ -566,7 +566,7 @@ DEFECTS = (
         "Monitor shows the trend of the drive that had the address before.",
         (
             "tests/session/test_trend_notes.py"
-            "::test_a_trend_of_another_family_at_the_same_address_is_not_taken",
+            "::test_trend_of_another_family_at_the_address_is_ignored",
         ),
     ),
     Defect(
@@ -584,7 +584,7 @@ DEFECTS = (
         "                self._events = deque(events, maxlen=EVENTS_KEPT)\n"
         "                self._newest = event\n",
         "The message line shows another program's message from minutes ago as new.",
-        ("tests/session/test_trend_notes.py::test_a_message_of_another_program_is_not_the_newest",),
+        ("tests/session/test_trend_notes.py::test_message_of_another_program_is_not_the_newest",),
     ),
     Defect(
         "stop-waits-for-a-hung-loop",
@@ -592,10 +592,7 @@ DEFECTS = (
         "            if now > direct_at:",
         "            if given and now > direct_at:",
         "The line's loop hangs in the panel, and its stop key takes effect after 2 s.",
-        (
-            "tests/session/test_hung_loop.py"
-            "::test_the_keeper_stops_drives_whose_stop_does_not_begin",
-        ),
+        ("tests/session/test_hung_loop.py::test_keeper_stops_drives_whose_stop_does_not_begin",),
     ),
     Defect(
         "direct-stop-without-its-end",
@@ -664,7 +661,7 @@ DEFECTS = (
         "After a container was killed, the motor of the next killed program keeps running.",
         (
             "tests/session/test_starts.py"
-            "::test_a_record_of_an_earlier_container_hides_no_later_start",
+            "::test_record_of_an_earlier_container_does_not_hide_a_later_start",
         ),
     ),
     Defect(
@@ -684,7 +681,7 @@ DEFECTS = (
         "                direct_at = now + STOP_REPEATED_EVERY\n",
         "                direct_at = now + 1e9\n",
         "The keeper is busy for half a second: a motor keeps running while the panel hangs.",
-        ("tests/session/test_hung_loop.py::test_a_keeper_that_does_not_answer_is_requested_again",),
+        ("tests/session/test_hung_loop.py::test_direct_stop_is_repeated_until_the_keeper_answers",),
     ),
     Defect(
         "rejected-stop-counts",

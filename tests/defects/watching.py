@@ -43,10 +43,7 @@ DEFECTS = (
         "if {code: raw.raw for code, raw in raws.items()} != check.slots:",
         "if not raws:",
         "After another program changed the scanner, one value is shown as another.",
-        (
-            "tests/session/test_slots.py"
-            "::test_a_scanner_changed_under_way_never_shows_one_value_as_another",
-        ),
+        ("tests/session/test_slots.py::test_scanner_changed_while_monitoring_never_mixes_values",),
     ),
     Defect(
         "older-reply-wins",
@@ -54,7 +51,7 @@ DEFECTS = (
         "if before is not None and before.time > reading.time:",
         "if before is not None and before.time < -1:",
         "An older value is shown as the current one.",
-        ("tests/session/test_owners.py::test_an_older_reply_never_takes_the_place_of_a_newer_one",),
+        ("tests/session/test_owners.py::test_older_reply_never_replaces_a_newer_one",),
     ),
     Defect(
         "trusted-across-a-reset",
@@ -62,7 +59,7 @@ DEFECTS = (
         "if held[c].time >= since}",
         "if held[c].time >= 0}",
         "A stop word is chosen by values from before another person set up the drive.",
-        ("tests/session/test_owners.py::test_possibly_changed_value_is_known_but_not_trusted",),
+        ("tests/session/test_owners.py::test_possibly_changed_value_is_kept_but_not_trusted",),
     ),
     Defect(
         "slots-of-before-the-block-believed",
@@ -70,7 +67,7 @@ DEFECTS = (
         "raws = await self._exchange(check.request, priority, since)",
         "raws = await self._exchange(check.request, priority)",
         "Slots changed by another program count as unchanged, and one value is shown as another.",
-        ("tests/session/test_slots.py::test_slots_that_were_read_before_the_block_are_read_again",),
+        ("tests/session/test_slots.py::test_slots_read_before_the_block_are_read_again",),
     ),
     Defect(
         "own-reading-taken-for-a-new-one",
@@ -78,7 +75,7 @@ DEFECTS = (
         "        return max((since, *(image.changed(place.code) for place in request.places)))\n",
         "        return since\n",
         "A value from the previous cycle is reported as not read in this one.",
-        ("tests/session/test_slots.py::test_own_value_is_read_again_and_foreign_is_not",),
+        ("tests/session/test_slots.py::test_own_values_are_read_again_but_shared_ones_are_not",),
     ),
     Defect(
         "block-of-before-its-slots-believed",
@@ -86,7 +83,7 @@ DEFECTS = (
         "since = self._slots.learned if self._block_of(request) else -math.inf",
         "since = -math.inf",
         "Words of slots that changed in the meantime are decoded by the new slots.",
-        ("tests/session/test_slots.py::test_a_block_that_was_read_before_its_slots_is_read_again",),
+        ("tests/session/test_slots.py::test_block_read_before_its_slots_is_read_again",),
     ),
     Defect(
         "equal-zeros-prove-a-slot",
@@ -110,7 +107,7 @@ DEFECTS = (
         "self._slots.distrust()",
         "self._slots.heard()",
         "After a reset of the drive its block returns other values than shown.",
-        ("tests/session/test_slots.py::test_a_fault_ends_the_trust_in_what_counts_until_a_reset",),
+        ("tests/session/test_slots.py::test_fault_discards_the_confirmed_slots",),
     ),
     Defect(
         "stale-ten-times-later",

@@ -48,7 +48,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_the_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
+def test_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
     assert not bench.take({1: RUNS, 3: RUNS, 17: RUNS})
     assert bench.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
     assert not bench.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
@@ -60,7 +60,7 @@ def test_the_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
     assert bench.kept == [(17, "OLF", "tripped"), (3, "ObF", "tripped")]
 
 
-def test_looking_at_it_acknowledges_one_drive(bench: Bench) -> None:
+def test_acknowledging_applies_to_one_drive(bench: Bench) -> None:
     bench.take({3: tripped(OBF), 17: tripped(OLF)})
     bench.alarms.acknowledge(3)
     assert bench.alarms.unseen
@@ -69,7 +69,7 @@ def test_looking_at_it_acknowledges_one_drive(bench: Bench) -> None:
     assert len(bench.alarms.active) == 2
 
 
-def test_a_reset_ends_it_and_the_same_fault_again_is_new(bench: Bench) -> None:
+def test_same_fault_after_a_reset_is_new(bench: Bench) -> None:
     bench.take({3: tripped(OBF)})
     bench.alarms.acknowledge(3)
     assert not bench.take({3: RUNS})
@@ -79,7 +79,7 @@ def test_a_reset_ends_it_and_the_same_fault_again_is_new(bench: Bench) -> None:
     assert bench.alarms.unseen
 
 
-def test_a_drive_that_is_not_known_now_keeps_its_fault(bench: Bench) -> None:
+def test_drive_in_an_unknown_state_keeps_its_fault(bench: Bench) -> None:
     bench.take({3: tripped(OBF)})
     assert not bench.take({3: replace(RUNS, kind="unknown")})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]
@@ -87,19 +87,19 @@ def test_a_drive_that_is_not_known_now_keeps_its_fault(bench: Bench) -> None:
     assert bench.alarms.active == ()
 
 
-def test_a_code_that_comes_later_is_reported_and_rings_no_second_time(bench: Bench) -> None:
+def test_fault_code_read_later_is_reported_without_a_second_bell(bench: Bench) -> None:
     assert bench.take({3: tripped(None)})
     assert not bench.take({3: tripped(OBF)})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]
     assert bench.output[-1] == "3 fault: the fault is ObF Overbraking."
 
 
-def test_another_fault_of_the_same_drive_is_new(bench: Bench) -> None:
+def test_different_fault_of_the_same_drive_is_new(bench: Bench) -> None:
     bench.take({3: tripped(OBF)})
     assert bench.take({3: tripped(OLF)})
 
 
-def test_fault_present_at_the_first_look_is_seen_not_tripped(bench: Bench) -> None:
+def test_fault_present_at_the_first_read_is_not_a_trip(bench: Bench) -> None:
     bench.now = 30.0
     assert bench.take({3: tripped(OBF)})
     assert bench.kept == [(3, "ObF", "seen")]
@@ -115,7 +115,7 @@ def test_fault_present_at_the_first_look_is_seen_not_tripped(bench: Bench) -> No
     assert fault.when.startswith("tripped ")
 
 
-def test_trip_noted_before_the_look_keeps_its_own_time(bench: Bench) -> None:
+def test_trip_noted_before_the_read_keeps_its_time(bench: Bench) -> None:
     bench.take({3: RUNS})
     bench.now = 60.0
     bench.onsets.note(3, tripped(None), bench.now)
@@ -127,7 +127,7 @@ def test_trip_noted_before_the_look_keeps_its_own_time(bench: Bench) -> None:
     assert bench.log.events[-1].wall == 60.0
 
 
-def test_fault_not_noted_yet_waits_for_the_next_look(bench: Bench) -> None:
+def test_fault_not_noted_yet_waits_for_the_next_read(bench: Bench) -> None:
     bench.take({3: RUNS})
     assert not bench.alarms.take({3: tripped(OBF)}, bench.onsets.by_device)
     assert not bench.alarms.active
@@ -135,7 +135,7 @@ def test_fault_not_noted_yet_waits_for_the_next_look(bench: Bench) -> None:
     assert bench.alarms.active[0].tripped
 
 
-def test_same_trip_of_a_drive_that_comes_back_is_recorded_once(bench: Bench) -> None:
+def test_same_trip_of_a_returning_drive_is_recorded_once(bench: Bench) -> None:
     bench.take({3: RUNS})
     bench.take({3: tripped(OBF)})
     bench.take({})

@@ -30,7 +30,7 @@ class Lacking(OneDrive):
         return await super().read(device, address, count, **how)
 
 
-async def test_the_others_are_reported_and_the_silent_one_is_named() -> None:
+async def test_other_words_are_reported_and_the_unanswered_word_is_named() -> None:
     line = Lacking("powerdrive", "15.07")
     found = await read_apart(
         Reader(DriveSession(line, 1, line.profile)), ["15.06", "15.07", "10.40"]
@@ -46,7 +46,7 @@ async def test_the_others_are_reported_and_the_silent_one_is_named() -> None:
 @pytest.mark.parametrize(
     ("family", "silent"), [("powerdrive", ("15.07", "6.42")), ("atv312", ("ttO",))]
 )
-async def test_a_drive_that_is_not_there_is_no_drive_without_the_word(
+async def test_absent_drive_is_not_a_drive_without_the_word(
     family: str, silent: tuple[str, ...]
 ) -> None:
     line = Lacking(family, *silent)

@@ -50,7 +50,9 @@ def drive(line: DriveLine) -> Drive:
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_the_page_as_printed(example: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_examples_of_the_page_print_what_it_shows(
+    example: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     exec(compile(example, "api.md", "exec"), {})
     printed = capsys.readouterr().out
     assert printed
@@ -60,7 +62,7 @@ def test_the_page_as_printed(example: str, capsys: pytest.CaptureFixture[str]) -
         assert "would be held as 0.0 Hz" in printed
 
 
-def test_the_page_names_all_of_it() -> None:
+def test_page_names_every_part_of_the_api() -> None:
     text = PAGE.read_text("utf-8")
     for name in api.__all__:
         assert f"`{name}`" in text, name
@@ -74,9 +76,7 @@ def test_the_page_names_all_of_it() -> None:
     ("blocking", "awaited"),
     [(Drive, AsyncDrive), (DriveLine, AsyncDriveLine), (RunningMotor, AsyncRunningMotor)],
 )
-def test_async_calls_have_the_names_and_arguments_of_the_blocking_ones(
-    blocking: type, awaited: type
-) -> None:
+def test_async_calls_match_the_blocking_ones(blocking: type, awaited: type) -> None:
     names = [name for name in {*dir(blocking), *dir(awaited)} if not name.startswith("_")]
     for name in names:
         calls = getattr(blocking, name), getattr(awaited, name)
@@ -85,7 +85,7 @@ def test_async_calls_have_the_names_and_arguments_of_the_blocking_ones(
             assert list(arguments[0].values()) == list(arguments[1].values()), name
 
 
-def test_values_go_by_what_was_requested(drive: Drive) -> None:
+def test_values_are_keyed_by_the_requested_names(drive: Drive) -> None:
     found = drive.read("hsp", "W3201", "NMA1")
     assert list(found) == ["hsp", "W3201", "NMA1"]
     assert (found["hsp"].code, found["hsp"].number, found["hsp"].unit) == ("HSP", Decimal(50), "Hz")
@@ -93,7 +93,7 @@ def test_values_go_by_what_was_requested(drive: Drive) -> None:
     assert all(value.good and not value.error for value in found.values())
 
 
-def test_an_unknown_code_is_a_drive_error(drive: Drive) -> None:
+def test_unknown_code_raises_drive_error(drive: Drive) -> None:
     with pytest.raises(DriveError, match="NONE"):
         drive.read("NONE")
 
@@ -104,12 +104,12 @@ def test_watch_refuses_an_impossible_cycle_time(drive: Drive, every: float) -> N
         next(drive.watch("ETA", every=every))
 
 
-def test_nobody_at_an_address_is_a_line_error(line: DriveLine) -> None:
+def test_unused_address_raises_line_error(line: DriveLine) -> None:
     with pytest.raises(LineError, match="9 did not answer"):
         line.drive(9)
 
 
-def test_a_drive_is_what_it_says(line: DriveLine) -> None:
+def test_drive_has_its_reported_identity(line: DriveLine) -> None:
     other = line.drive(2)
     assert (other.address, other.profile) == (2, "atv312")
     assert other.reference.startswith("ATV312")
@@ -117,7 +117,7 @@ def test_a_drive_is_what_it_says(line: DriveLine) -> None:
         line.drive(2, profile="atv71")
 
 
-def test_one_that_says_nothing_needs_a_profile(line: DriveLine) -> None:
+def test_drive_without_identification_needs_a_profile(line: DriveLine) -> None:
     with pytest.raises(DriveError, match=r"name its profile: .*powerdrive"):
         line.drive(3)
     assert line.drive(3, profile="powerdrive").profile == "powerdrive"
@@ -141,7 +141,7 @@ def test_confirmed_write_is_read_back_and_recorded(drive: Drive) -> None:
     assert (found["HSP"].number, found["ACC"].number) == (Decimal("40.5"), Decimal("3.5"))
 
 
-def test_the_journal_has_what_a_script_wrote() -> None:
+def test_writes_of_a_script_are_in_the_journal() -> None:
     with open_drives("sim:atv71") as line:
         drive = line.drive()
         with drive.armed():
@@ -150,7 +150,7 @@ def test_the_journal_has_what_a_script_wrote() -> None:
     assert ['"HSP"' in entry and '"script"' in entry for entry in entries] == [True]
 
 
-def test_a_refused_value_is_reported_with_its_code(drive: Drive) -> None:
+def test_refused_value_is_reported_with_its_code(drive: Drive) -> None:
     with drive.armed(), pytest.raises(NotWritten) as refused:
         drive.write({"HSP": 700, "ACC": 4})
     assert list(refused.value.why) == ["HSP"]
@@ -158,7 +158,7 @@ def test_a_refused_value_is_reported_with_its_code(drive: Drive) -> None:
     assert (found["HSP"].number, found["ACC"].number) == (Decimal(50), Decimal(4))
 
 
-def test_a_value_that_would_be_another_is_refused(line: DriveLine) -> None:
+def test_value_that_would_be_rounded_is_refused(line: DriveLine) -> None:
     drive = line.drive(2)
     with drive.armed():
         with pytest.raises(WouldRound, match=r"LSP: 0\.04 would be held as 0\.0 Hz"):
@@ -166,12 +166,12 @@ def test_a_value_that_would_be_another_is_refused(line: DriveLine) -> None:
         assert drive.write({"LSP": 0.06}, rounded=True) == {"LSP": "LSP: 0.0 Hz -> 0.1 Hz"}
 
 
-def test_one_parameter_twice_is_refused(drive: Drive) -> None:
+def test_duplicate_parameter_is_refused(drive: Drive) -> None:
     with drive.armed(), pytest.raises(DriveError, match="more than once"):
         drive.write({"ACC": 3, "W9001": 4})
 
 
-def test_a_line_that_is_read_only_arms_nothing() -> None:
+def test_read_only_line_arms_no_drive() -> None:
     with open_drives("sim:atv71", read_only=True) as line:
         drive = line.drive()
         with pytest.raises(DriveError, match="read-only"), drive.armed():
@@ -191,7 +191,7 @@ def test_samples_follow_one_another(drive: Drive) -> None:
     assert times == sorted(set(times))
 
 
-def test_watching_ends_with_the_line() -> None:
+def test_watch_ends_with_the_line() -> None:
     line = open_drives("sim:atv71")
     samples = line.drive().watch("ETA", every=0.05)
     next(samples)
@@ -201,14 +201,14 @@ def test_watching_ends_with_the_line() -> None:
             pass
 
 
-def test_a_call_on_a_closed_line_ends() -> None:
+def test_call_on_a_closed_line_raises() -> None:
     with open_drives("sim:atv71") as line:
         drive = line.drive()
     with pytest.raises(LineError, match="closed"):
         drive.read("ETA")
 
 
-def test_a_stop_stands_and_ends_arming() -> None:
+def test_stop_lasts_and_ends_arming() -> None:
     with DriveLine(demo_line({"atv71": 20.0})) as line:
         drive = line.drive()
         assert drive.read("RFR")["RFR"].number
@@ -219,7 +219,7 @@ def test_a_stop_stands_and_ends_arming() -> None:
         assert drive.read("RFR")["RFR"].number == 0
 
 
-def test_a_stop_of_another_program_voids_what_follows_inside_the_block_alone(
+def test_stop_by_another_program_blocks_later_writes_in_the_block_only(
     line: DriveLine, drive: Drive
 ) -> None:
     """A script that lives on may arm again; one stop is told of more than once."""
@@ -238,6 +238,6 @@ def test_a_stop_of_another_program_voids_what_follows_inside_the_block_alone(
         assert "6" in drive.write({"ACC": 6})["ACC"]
 
 
-def test_a_motor_that_cannot_be_stopped_is_an_error() -> None:
+def test_motor_that_cannot_be_stopped_raises() -> None:
     with open_drives("sim:atv71", read_only=True) as line, pytest.raises(NotStopped):
         line.drive().stop()

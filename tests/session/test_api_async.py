@@ -54,7 +54,7 @@ def slow() -> Iterator[tuple[Simulation, OpenLine]]:
         opened.line.close()
 
 
-async def test_values_are_those_of_the_blocking_calls(line: AsyncDriveLine) -> None:
+async def test_values_equal_those_of_the_blocking_calls(line: AsyncDriveLine) -> None:
     drive, other = await asyncio.gather(line.drive(), line.drive(2))
     assert (drive.profile, drive.address, other.profile) == ("atv71", 1, "atv312")
     found, others = await asyncio.gather(drive.read("hsp", "W3201"), other.read("HSP"))
@@ -66,7 +66,7 @@ async def test_values_are_those_of_the_blocking_calls(line: AsyncDriveLine) -> N
         await line.drive(9)
 
 
-async def test_only_an_armed_drive_is_written_to(drive: AsyncDrive) -> None:
+async def test_only_an_armed_drive_is_written(drive: AsyncDrive) -> None:
     with pytest.raises(NotArmed, match=r"with drive\.armed"):
         await drive.write({"HSP": 40})
     with drive.armed():
@@ -95,7 +95,7 @@ async def test_watch_refuses_an_impossible_cycle_time(drive: AsyncDrive) -> None
         await anext(aiter(drive.watch("ETA", every=0)))
 
 
-async def test_the_loop_of_the_script_runs_on_while_a_call_waits() -> None:
+async def test_loop_of_the_script_runs_while_a_call_waits() -> None:
     line = AsyncDriveLine(demo_line({"atv71": 20.0}))
     drive = await line.drive()
     ticks = 0
@@ -116,7 +116,7 @@ async def test_the_loop_of_the_script_runs_on_while_a_call_waits() -> None:
         await drive.read("RFR")
 
 
-async def test_a_motor_that_cannot_be_stopped_is_an_error() -> None:
+async def test_motor_that_cannot_be_stopped_raises() -> None:
     async with open_drives_async("sim:atv71", read_only=True) as line:
         with pytest.raises(NotStopped):
             await (await line.drive()).stop()
@@ -140,7 +140,7 @@ async def test_calls_of_loops_in_several_threads_share_a_drive(drive: AsyncDrive
 # Cancelled callers
 
 
-async def test_an_exchange_in_flight_outlives_its_caller(
+async def test_exchange_in_flight_continues_after_its_caller(
     slow: tuple[Simulation, OpenLine],
 ) -> None:
     """A reply that comes late must be that of its own request, for each moment of the end."""
@@ -166,7 +166,7 @@ async def test_an_exchange_in_flight_outlives_its_caller(
     await line.close()
 
 
-async def test_nothing_more_of_a_cancelled_write_is_sent(
+async def test_cancelled_write_sends_no_more_frames(
     slow: tuple[Simulation, OpenLine],
 ) -> None:
     _, opened = slow
@@ -190,7 +190,7 @@ async def test_nothing_more_of_a_cancelled_write_is_sent(
     await line.close()
 
 
-async def test_a_stop_outlives_its_caller() -> None:
+async def test_stop_continues_after_its_caller() -> None:
     line = AsyncDriveLine(demo_line({"atv71": 20.0}))
     drive = await line.drive()
     with pytest.raises(TimeoutError):
@@ -202,7 +202,7 @@ async def test_a_stop_outlives_its_caller() -> None:
     await line.close()
 
 
-async def test_a_line_whose_opening_is_cancelled_is_closed(
+async def test_cancelled_open_closes_the_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     opened: list[OpenLine] = []
@@ -221,7 +221,7 @@ async def test_a_line_whose_opening_is_cancelled_is_closed(
         opened[0].line.spawn(asyncio.Event().wait, "late work")
 
 
-async def test_a_line_whose_block_is_cancelled_is_closed() -> None:
+async def test_cancelled_block_closes_the_line() -> None:
     entered, lines = asyncio.Event(), []
 
     async def work() -> None:
@@ -241,7 +241,7 @@ async def test_a_line_whose_block_is_cancelled_is_closed() -> None:
         await lines[0].drive()
 
 
-def test_a_blocking_line_is_not_affected_by_loops() -> None:
+def test_blocking_line_is_not_affected_by_loops() -> None:
     with DriveLine(demo_line({"atv71": 20.0})) as line:
         drive = line.drive()
 

@@ -66,7 +66,7 @@ def test_scripts_of_the_page_pass_strict_mypy(user: Path) -> None:
     assert f"no issues found in {len(EXAMPLES)} source files" in done.stdout
 
 
-def test_wrong_uses_of_the_api_are_found_by_mypy(user: Path) -> None:
+def test_mypy_finds_wrong_uses_of_the_api(user: Path) -> None:
     done = checked(user, "wrong.py")
     assert re.findall(r"^wrong\.py:(\d+): error: .*\[(.+)\]$", done.stdout, re.M) == [
         ("5", "arg-type"),
@@ -83,6 +83,6 @@ def test_script_of_the_page_runs_with_the_installed_package(user: Path, number: 
     assert not done.stderr
 
 
-def test_the_installed_package_is_the_one_checked(user: Path) -> None:
+def test_installed_package_is_the_one_checked(user: Path) -> None:
     done = run(user, python(user), "-c", "import tui; print(tui.__file__)")
     assert Path(done.stdout.strip()).is_relative_to(user), done.stderr

@@ -28,7 +28,7 @@ def text(applied: Applied, code: str) -> str:
     return next(result.text for result in applied.results if result.edit.code == code)
 
 
-async def test_edits_are_written_read_back_and_recorded() -> None:
+async def test_edits_are_written_verified_and_recorded() -> None:
     with bench("atv71") as made:
         reported: list[tuple[int, int, str]] = []
 
@@ -49,21 +49,21 @@ async def test_edits_are_written_read_back_and_recorded() -> None:
         ]
 
 
-async def test_a_scale_and_a_ramp_at_once() -> None:
+async def test_scale_and_ramp_are_written_together() -> None:
     with bench("atv312") as made:
         applied = await made.apply(ACC="2.55 s", Inr="0.01 s")
         assert outcomes(applied) == {"Inr": EditOutcome.DONE, "ACC": EditOutcome.DONE}
         assert made.drive.raw("ACC") == 255
 
 
-async def test_limits_are_moved_before_what_they_limit() -> None:
+async def test_limits_are_written_before_the_values_they_limit() -> None:
     with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
         applied = await made.apply(LSP="70", HSP="75", TFR="80")
         assert all(result.done for result in applied.results), applied.results
         assert [made.drive.raw(c) for c in ("LSP", "HSP", "TFR")] == [700, 750, 800]
 
 
-async def test_a_value_past_another_is_not_sent() -> None:
+async def test_value_beyond_another_parameter_is_not_sent() -> None:
     with bench("atv71", sets={"HSP": 500}) as made:
         applied = await made.apply(LSP="55", ACC="4")
         assert outcomes(applied) == {"LSP": EditOutcome.REFUSED, "ACC": EditOutcome.DONE}
@@ -101,7 +101,7 @@ async def test_edits_scaled_by_a_refused_one_are_held_back() -> None:
         assert made.drive.raw("ACC") == 30
 
 
-async def test_after_a_failure_the_rest_waits_for_an_answer_where_one_can_be_requested() -> None:
+async def test_remaining_edits_wait_for_confirmation_after_a_failure() -> None:
     with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
         edits = await made.stage(TFR="80", HSP="75", LSP="10", ACC="4 s")
         made.refuse("TFR")
@@ -113,7 +113,7 @@ async def test_after_a_failure_the_rest_waits_for_an_answer_where_one_can_be_req
         assert made.writes() == []
 
 
-async def test_a_change_by_somebody_else_is_not_overwritten() -> None:
+async def test_change_by_another_source_is_not_overwritten() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="7 s")
         made.drive.set("ACC", 90)
@@ -128,7 +128,7 @@ async def test_a_change_by_somebody_else_is_not_overwritten() -> None:
         assert made.drive.raw("ACC") == 50
 
 
-async def test_a_scale_that_somebody_else_changes_is_seen() -> None:
+async def test_scale_changed_by_another_source_is_detected() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.set("INR", 0)
@@ -149,7 +149,7 @@ async def test_unchanged_value_is_not_written() -> None:
         assert made.writes() == []
 
 
-async def test_stopped_only_is_checked_against_the_state_of_now() -> None:
+async def test_stopped_only_is_checked_against_the_current_state() -> None:
     with bench("atv312", run_hz=20.0) as made:
         applied = await made.apply(FrS="60", ACC="4")
         assert outcomes(applied) == {"FrS": EditOutcome.REFUSED, "ACC": EditOutcome.DONE}
@@ -161,7 +161,7 @@ async def test_stopped_only_is_checked_against_the_state_of_now() -> None:
         assert outcomes(again) == {"FrS": EditOutcome.DONE}
 
 
-async def test_unverified_ones_are_written_once_confirmed() -> None:
+async def test_unverified_parameters_are_written_if_confirmed() -> None:
     with bench("atv21") as made:
         edits = await made.stage(F111="Forced local")
         refused = await made.write(edits)
@@ -172,7 +172,7 @@ async def test_unverified_ones_are_written_once_confirmed() -> None:
         assert outcomes(done) == {"F111": EditOutcome.DONE}
 
 
-async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
+async def test_refusal_has_meaning_state_and_advice() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s")
         made.drive.busy = True
@@ -192,7 +192,7 @@ async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
         ]
 
 
-async def test_a_protected_parameter_is_not_written_blindly() -> None:
+async def test_protected_parameter_is_not_written_without_reading() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.registers.protect([made.profile["ACC"]])
@@ -202,7 +202,7 @@ async def test_a_protected_parameter_is_not_written_blindly() -> None:
         assert made.writes() == []
 
 
-async def test_a_silent_refusal_is_found_by_reading() -> None:
+async def test_refusal_without_an_exception_is_found_by_reading_back() -> None:
     with bench("powerdrive") as made:
         edits = await made.stage(**{"15.07": "5"})
         made.drive.busy = True
@@ -213,7 +213,7 @@ async def test_a_silent_refusal_is_found_by_reading() -> None:
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
-async def test_another_option_module_is_not_written(family: str) -> None:
+async def test_settings_of_another_option_module_are_not_written(family: str) -> None:
     """With another code in 15.01 the words of menu 15 mean something else."""
     with bench(family, sets={"15.01": 400}) as made:
         applied = await made.apply(**{"15.07": "5", "11.63": "4"})
@@ -222,7 +222,7 @@ async def test_another_option_module_is_not_written(family: str) -> None:
         assert made.drive.raw("15.07") == 0
 
 
-async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
+async def test_lost_line_ends_writing_and_keeps_the_rest() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
 
@@ -240,7 +240,7 @@ async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
 
 
 @pytest.mark.parametrize("taken", [True, False])
-async def test_a_line_that_goes_on_at_another_owner_is_gone_on_with(taken: bool) -> None:
+async def test_writing_continues_if_another_owner_takes_the_line(taken: bool) -> None:
     """The owner's end during a write ended a restore, though the line had a new owner at once."""
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
@@ -290,7 +290,7 @@ async def test_blocked_line_ends_writing_and_keeps_the_rest(end: str) -> None:
         assert len(made.writes()) == 1
 
 
-async def test_lost_replies_do_not_write_twice_nor_forget() -> None:
+async def test_lost_replies_neither_repeat_nor_drop_a_write() -> None:
     with bench("atv71", faults=FaultRates(lost=0.1)) as made:
         edits = await made.stage(ACC="5 s", DEC="6 s")
         applied = await made.write(edits)
@@ -302,14 +302,14 @@ async def test_lost_replies_do_not_write_twice_nor_forget() -> None:
         assert made.session.line.counters.timeouts > 0, "no reply was lost: nothing was shown"
 
 
-async def test_a_read_only_line_writes_nothing() -> None:
+async def test_read_only_line_writes_nothing() -> None:
     with bench("atv71", read_only=True) as made:
         edits = await made.stage(ACC="5 s")
         with pytest.raises(RequestRefused, match="read-only"):
             await made.write(edits)
 
 
-async def test_nobody_answers_before_anything_was_written(
+async def test_silent_drive_ends_before_anything_is_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(retrying_reader, "READ_TRIES", 1)
@@ -323,7 +323,7 @@ async def test_nobody_answers_before_anything_was_written(
 # Line settings
 
 
-async def test_an_address_at_once_is_sent_last_and_the_new_place_is_named() -> None:
+async def test_address_that_changes_immediately_is_written_last() -> None:
     with bench("atv21", serial=True) as made:
         applied = await made.apply(F802="7", F803="5", F800="9600")
         assert [result.edit.code for result in applied.results] == ["F803", "F800", "F802"]
@@ -338,7 +338,7 @@ async def test_an_address_at_once_is_sent_last_and_the_new_place_is_named() -> N
         assert made.drive.raw("F803") == 5
 
 
-async def test_after_a_change_of_the_line_nothing_more_is_sent_to_the_old_place() -> None:
+async def test_no_request_goes_to_the_old_address_after_a_line_change() -> None:
     with bench("atv71") as made:
         applied = await made.apply(TBR="9600 bit/s", ADD="5", TTO="5")
         assert outcomes(applied) == {
@@ -353,7 +353,7 @@ async def test_after_a_change_of_the_line_nothing_more_is_sent_to_the_old_place(
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312", "atv71"])
-async def test_saved_settings_outlast_a_power_off(family: str) -> None:
+async def test_saved_settings_survive_a_power_off(family: str) -> None:
     with bench(family) as made:
         code = next(p.code for p in made.profile.parameters if p.quantity == "acceleration")
         await made.apply(**{code: "5 s"})
@@ -367,7 +367,7 @@ async def test_saved_settings_outlast_a_power_off(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", ["atv21", "powerdrive", "proxidrive", "varmeca"])
-async def test_families_without_a_known_order_are_refused_with_words(family: str) -> None:
+async def test_family_without_a_save_command_is_refused_with_a_reason(family: str) -> None:
     with bench(family) as made:
         with pytest.raises(MemoryRefused, match=r"nothing is to be saved|keypad"):
             await save_to_eeprom(made.session, made.journal, made.permit())
@@ -377,7 +377,7 @@ async def test_families_without_a_known_order_are_refused_with_words(family: str
 
 
 @pytest.mark.parametrize(("family", "confirmed"), [("atv31", {"CMI"}), ("atv312", set())])
-async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> None:
+async def test_factory_reset_restores_factory_settings(family: str, confirmed: set[str]) -> None:
     with bench(family, sets={"ACC": 99, "HSP": 400, "SP2": 333}) as made:
         reported = await factory_reset(
             made.session, made.journal, made.permit(), confirmed=confirmed
@@ -390,14 +390,14 @@ async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> N
         assert made.drive.raw("ACC") == 99
 
 
-async def test_an_unverified_order_needs_to_be_confirmed() -> None:
+async def test_unverified_command_needs_confirmation() -> None:
     with bench("atv31") as made:
         with pytest.raises(MemoryRefused, match="unverified"):
             await factory_reset(made.session, made.journal, made.permit())
         assert made.writes() == []
 
 
-async def test_an_altivar_71_recalls_the_groups_that_were_chosen() -> None:
+async def test_altivar_71_factory_reset_applies_to_selected_groups() -> None:
     with bench("atv71", sets={"ACC": 99}) as made:
         with pytest.raises(MemoryRefused, match="FRY selects no group"):
             await factory_reset(made.session, made.journal, made.permit())
@@ -407,7 +407,7 @@ async def test_an_altivar_71_recalls_the_groups_that_were_chosen() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv312", "atv71"])
-async def test_neither_is_ordered_while_the_motor_runs(family: str) -> None:
+async def test_save_and_factory_reset_need_a_stopped_motor(family: str) -> None:
     with bench(family, run_hz=20.0, sets={} if family == "atv312" else {"FRY": 1}) as made:
         for order in (save_to_eeprom, factory_reset):
             with pytest.raises(MemoryRefused, match="Stop the motor first"):
@@ -422,7 +422,7 @@ async def rest(made: Bench) -> None:
         await asyncio.sleep(0.05)
 
 
-async def test_a_drive_that_refuses_to_save_says_why() -> None:
+async def test_refused_save_has_its_reason() -> None:
     with bench("atv71") as made:
         made.drive.busy = True
         with pytest.raises(DeviceException, match="Check if the parameter can be written"):

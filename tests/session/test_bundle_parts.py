@@ -47,7 +47,7 @@ PARTS = (
 )
 
 
-async def test_failed_part_ends_no_other() -> None:
+async def test_failed_part_does_not_end_others() -> None:
     steps: list[tuple[int, int, str]] = []
     results = await collect_parts(PARTS, lambda *step: steps.append(step))
     assert [result.missing for result in results] == [
@@ -66,7 +66,7 @@ async def test_cancellation_ends_the_collection() -> None:
         await work
 
 
-async def test_blocked_thread_does_not_hold_the_program() -> None:
+async def test_blocked_thread_does_not_block_the_exit() -> None:
     free = threading.Event()
 
     async def blocked() -> PartFile:

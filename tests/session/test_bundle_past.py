@@ -62,7 +62,7 @@ async def test_past_of_a_line_of_another_program_is_collected() -> None:
     assert found["screens"].missing.startswith("Screens are in a bundle only")
 
 
-async def test_frames_from_before_the_bundle_are_not_displaced_by_it() -> None:
+async def test_bundle_does_not_displace_earlier_frames() -> None:
     line = FakeLine({1: {}}, link=parse_link("/dev/nosuch"))
     frames = [Frame(float(number), "out", sealed(bytes([1, 3, 0, number]))) for number in range(6)]
     line.trace = tuple(frames[:4])
@@ -76,7 +76,7 @@ async def test_frames_from_before_the_bundle_are_not_displaced_by_it() -> None:
     assert file.note.startswith("6 frames")
 
 
-async def test_line_that_no_process_holds_has_no_past() -> None:
+async def test_line_without_a_holder_has_no_past() -> None:
     found = await collected("tcp:127.0.0.1:9")
     assert "No process holds the line" in found["frames.pcapng"].missing
     assert "No process holds the line" in found["messages.txt"].missing

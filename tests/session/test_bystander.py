@@ -59,12 +59,12 @@ class Bench:
         self.latest = SimpleNamespace(state=state, error=error, time=self.time)
 
 
-def test_a_drive_that_nobody_commands_is_requested() -> None:
+def test_drive_without_a_commander_is_polled() -> None:
     bench = Bench()
     assert all(bench.asks() for _ in range(5))
 
 
-def test_a_drive_is_requested_a_while_after_each_sign_of_its_commander() -> None:
+def test_drive_is_polled_for_a_while_after_each_heartbeat_of_its_commander() -> None:
     bench = Bench()
     bench.saw("running")
     for _ in range(3):
@@ -78,7 +78,7 @@ def test_a_drive_is_requested_a_while_after_each_sign_of_its_commander() -> None
     assert not bench.asks()
 
 
-def test_a_slow_commander_has_its_drive_requested_once_for_each_sign() -> None:
+def test_drive_of_a_slow_commander_is_polled_once_per_heartbeat() -> None:
     bench = Bench()
     bench.saw("running")
     for _ in range(3):
@@ -87,7 +87,7 @@ def test_a_slow_commander_has_its_drive_requested_once_for_each_sign() -> None:
         assert not bench.asks()
 
 
-def test_a_motor_that_was_seen_to_stand_is_still_polled() -> None:
+def test_motor_at_standstill_is_still_polled() -> None:
     bench = Bench()
     bench.sign = bench.time
     assert bench.asks()
@@ -109,21 +109,19 @@ def test_a_motor_that_was_seen_to_stand_is_still_polled() -> None:
     ("timeout", "silence"),
     [(None, UNKNOWN_TIMEOUT_ACTED), (Timeout(known=False), UNKNOWN_TIMEOUT_ACTED)],
 )
-def test_a_time_out_that_is_not_known_is_taken_for_long(
-    timeout: Timeout | None, silence: float
-) -> None:
+def test_unknown_timeout_counts_as_long(timeout: Timeout | None, silence: float) -> None:
     bench = Bench(timeout=timeout, sign=0.0)
     assert not bench.asks(silence - 1.0)
     assert bench.asks(2.0)
 
 
-def test_a_drive_without_a_time_out_is_still_polled() -> None:
+def test_drive_without_a_timeout_is_still_polled() -> None:
     bench = Bench(timeout=Timeout(known=True), sign=0.0)
     assert bench.asks()
     assert bench.asks()
 
 
-def test_a_motor_that_an_ended_program_left_is_not_fed() -> None:
+def test_motor_left_by_an_exited_program_is_not_kept_alive() -> None:
     bench = Bench()
     bench.looks_on.orphan = True
     bench.saw("running")

@@ -74,14 +74,14 @@ async def check(session: DriveSession) -> None:
 @pytest.mark.parametrize(
     ("family", "kind"), [*product(FAMILIES, ["tcp"]), *product(["atv71"], LINES)]
 )
-async def test_swapped_bytes_are_reported_at_the_connection(family: str, kind: str) -> None:
+async def test_swapped_bytes_are_reported_on_connecting(family: str, kind: str) -> None:
     with line_to(DriveSpec(family, 2), kind=kind) as (_, _, session):
         with pytest.raises(BytesSwapped, match="The bytes of each word of device 2 arrive swapped"):
             await check(session)
         assert "byte order setting of the gateway" in session.byte_order.text
 
 
-async def test_swapped_bytes_refuse_arming_and_what_was_armed_before() -> None:
+async def test_swapped_bytes_refuse_arming_and_disarm() -> None:
     with line_to(DriveSpec("atv71", 2)) as (_, line, session):
         session.arming.arm()
         permit = Permit(session.work, session.work.stops)
@@ -122,7 +122,7 @@ async def wait_for_order(session: DriveSession) -> None:
     assert session.byte_order.error is None
 
 
-async def test_values_read_anyway_show_that_bytes_are_swapped_from_now_on() -> None:
+async def test_regular_reads_detect_bytes_that_become_swapped() -> None:
     with line_to(DriveSpec("atv31", 2), HEALTHY) as (simulation, _, session):
         await check(session)
         assert not session.byte_order.is_doubtful
@@ -134,7 +134,7 @@ async def test_values_read_anyway_show_that_bytes_are_swapped_from_now_on() -> N
             await check(session)
 
 
-async def test_line_that_was_lost_is_checked_again_before_a_command() -> None:
+async def test_recovered_line_is_checked_again_before_a_command() -> None:
     with line_to(DriveSpec("atv71", 2), HEALTHY) as (simulation, line, session):
         await check(session)
         session.arming.arm()
@@ -151,7 +151,7 @@ async def test_line_that_was_lost_is_checked_again_before_a_command() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_stop_goes_out_on_swapped_bytes_and_is_never_reported_as_done(family: str) -> None:
+async def test_stop_with_swapped_bytes_is_sent_but_never_reported_as_done(family: str) -> None:
     spec = DriveSpec(family, 1)
     with line_to(spec) as (_, line, session):
         stopper = Stopper(line, Journal())
@@ -166,7 +166,7 @@ async def test_stop_goes_out_on_swapped_bytes_and_is_never_reported_as_done(fami
         }
 
 
-async def test_stop_on_swapped_bytes_never_takes_the_word_of_another_chart() -> None:
+async def test_stop_with_swapped_bytes_never_uses_the_word_of_another_chart() -> None:
     """16#0300 is CHCF 3 swapped: no chart; the words of Drivecom run a motor in the I/O profile."""
     with line_to(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0})) as (simulation, line, session):
         stopper = Stopper(line, Journal())
@@ -176,7 +176,7 @@ async def test_stop_on_swapped_bytes_never_takes_the_word_of_another_chart() -> 
         assert simulation.drive(1).motor.frequency == 0
 
 
-def test_a_value_of_no_chart_decides_nothing() -> None:
+def test_unknown_chart_value_selects_no_chart() -> None:
     profile = library.load("atv71")
     assert chart_in_force(profile, {"CHCF": 0x0300}) is None
     found = chart_in_force(profile, {"CHCF": 3})
@@ -186,7 +186,7 @@ def test_a_value_of_no_chart_decides_nothing() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_stop_word_that_arrives_swapped_runs_no_motor(family: str) -> None:
+async def test_swapped_stop_word_runs_no_motor(family: str) -> None:
     """A gateway that swaps what is written too: each stop word, at rest."""
     with line_to(DriveSpec(family, 1), HEALTHY) as (simulation, line, session):
         words = {
@@ -225,7 +225,7 @@ async def test_healthy_drive_shows_no_swapped_word(family: str, state: str) -> N
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_value_in_its_documented_range_is_never_one_swapped(family: str) -> None:
+def test_value_in_its_range_is_never_taken_as_swapped(family: str) -> None:
     profile = library.load(family)
     judged = 0
     for parameter in profile.parameters:
@@ -249,7 +249,7 @@ def test_value_in_its_documented_range_is_never_one_swapped(family: str) -> None
     assert judged > 100
 
 
-def test_words_that_are_as_good_both_ways_say_nothing() -> None:
+def test_words_valid_in_both_orders_decide_nothing() -> None:
     profile = library.load("atv71")
     baud = profile["TBR"]
     assert only_swapped(profile, baud, 32) is False
@@ -260,11 +260,11 @@ def test_words_that_are_as_good_both_ways_say_nothing() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_family_has_settings_that_show_the_order(family: str) -> None:
+def test_every_family_has_settings_that_show_the_byte_order(family: str) -> None:
     assert len(telling_codes(library.load(family))) >= 5
 
 
-async def test_three_odd_words_of_a_healthy_drive_change_nothing() -> None:
+async def test_three_odd_words_of_a_healthy_drive_are_tolerated() -> None:
     sets = {"TBR": 32 << 8, "TFO": 3 << 8, "TTO": 100 << 8}
     with line_to(DriveSpec("atv71", 2, sets=sets), HEALTHY) as (_, _, session):
         await check(session)

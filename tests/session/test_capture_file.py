@@ -31,7 +31,7 @@ class FullDisk:
         self._file.close()
 
 
-def test_a_packet_that_does_not_fit_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+def test_packet_that_does_not_fit_leaves_the_file_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "x.pcapng"
     file = CaptureFile(path, "line")
     file.add_frame(1, READ, 1.0, request=True)
@@ -44,7 +44,7 @@ def test_a_packet_that_does_not_fit_leaves_the_file_as_it_was(tmp_path: Path) ->
     assert file.packets == 1
 
 
-def test_noise_is_a_packet_of_the_raw_form_only(tmp_path: Path) -> None:
+def test_noise_is_a_packet_in_the_raw_form_only(tmp_path: Path) -> None:
     raw, tcp = CaptureFile(tmp_path / "a", "line", raw=True), CaptureFile(tmp_path / "b", "line")
     for file in (raw, tcp):
         file.add_noise(b"\x00", 1.0)
@@ -54,7 +54,7 @@ def test_noise_is_a_packet_of_the_raw_form_only(tmp_path: Path) -> None:
     assert b"before it, no frame: 00" in (tmp_path / "b").read_bytes()
 
 
-def test_file_whose_head_does_not_fit_is_closed_and_reported(
+def test_file_whose_header_does_not_fit_is_closed_and_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[Any] = []

@@ -48,12 +48,12 @@ def arm(bench: Bench, device: int, family: str) -> None:
 
 
 @pytest.mark.parametrize("family", [listing.id for listing in library.listings()])
-def test_a_profile_arrives_as_it_was_sent(family: str) -> None:
+def test_profile_survives_packing(family: str) -> None:
     profile = library.load(family)
     assert unpacked_profile(profile.packed).data == profile.data
 
 
-def test_a_damaged_profile_is_an_error_of_its_own() -> None:
+def test_damaged_profile_has_its_own_error() -> None:
     packed = library.load("atv71").packed
     for data in (b"", b"no profile", packed[:-9], packed[:200] + bytes(9) + packed[209:]):
         with pytest.raises(ProfileError, match="Another program sent a damaged profile"):
@@ -61,7 +61,7 @@ def test_a_damaged_profile_is_an_error_of_its_own() -> None:
     assert 10 * len(msgspec.json.encode(library.load("atv71").data)) < LONGEST_UNPACKED
 
 
-def test_care_that_stops_nothing_is_refused(
+def test_stop_instructions_without_a_stop_are_refused(
     kept: tuple[DrivesInCare, FakeLine, Journal],
 ) -> None:
     care, line, _ = kept
@@ -79,7 +79,7 @@ def replace_profile(data: CareData, packed: bytes) -> CareData:
     return msgspec.structs.replace(data, profile=packed)
 
 
-def test_a_guessed_family_stays_one(kept: tuple[DrivesInCare, FakeLine, Journal]) -> None:
+def test_guessed_family_is_kept_as_guessed(kept: tuple[DrivesInCare, FakeLine, Journal]) -> None:
     care, line, _ = kept
     session = DriveSession(line, 1, library.load("varmeca"))
     session.guessed = True
@@ -89,7 +89,7 @@ def test_a_guessed_family_stays_one(kept: tuple[DrivesInCare, FakeLine, Journal]
     assert found.guessed
 
 
-def test_writes_left_by_a_program_are_in_the_journal_with_their_answers(
+def test_pending_writes_of_a_program_are_journaled_with_their_replies(
     kept: tuple[DrivesInCare, FakeLine, Journal],
 ) -> None:
     _, line, journal = kept
@@ -114,7 +114,7 @@ def test_writes_left_by_a_program_are_in_the_journal_with_their_answers(
     assert {e.why for e in journal.sent} == {f"sent for {GONE.text}, which has ended"}
 
 
-async def test_a_stop_that_is_due_is_carried_out(bench: Bench) -> None:
+async def test_due_stop_is_carried_out(bench: Bench) -> None:
     for device in (1, 2):
         bench.simulation.drive(device).run(20.0)
     await come(lambda: bench.turns(1) and bench.turns(2))
@@ -131,7 +131,7 @@ async def test_a_stop_that_is_due_is_carried_out(bench: Bench) -> None:
     assert bench.turns(2)
 
 
-async def test_the_motor_of_a_program_that_is_gone_is_stopped_by_its_own_profile(
+async def test_motor_of_an_exited_program_is_stopped_by_its_profile(
     bench: Bench,
 ) -> None:
     bench.started(1)
@@ -145,7 +145,7 @@ async def test_the_motor_of_a_program_that_is_gone_is_stopped_by_its_own_profile
     assert not bench.says("Stop it at the machine")
 
 
-async def test_a_drive_that_nobody_has_armed_is_not_stopped_by_a_start_on_record(
+async def test_recorded_start_does_not_stop_a_disarmed_drive(
     bench: Bench,
 ) -> None:
     """Another family may have its address since: the word of the one could start the other."""

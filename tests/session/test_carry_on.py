@@ -25,7 +25,7 @@ def test_internal_error_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     assert isinstance(record.exc_info[1], ZeroDivisionError)
 
 
-def test_log_that_fails_ends_no_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failing_log_does_not_end_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(carry_on, "log", FailingLog("tests"))
     carried_on(raising(ZeroDivisionError()))
 

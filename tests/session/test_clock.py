@@ -51,7 +51,7 @@ def real_times(tree: ast.Module) -> Iterator[str]:
                 yield f"line {node.lineno}: asyncio.sleep"
 
 
-def test_a_session_counts_by_the_clock_that_it_was_given() -> None:
+def test_session_modules_use_the_injected_clock() -> None:
     found = {
         name: list(real_times(ast.parse(path.read_text("utf-8"))))
         for path in sorted(SESSION.rglob("*.py"))
@@ -84,7 +84,7 @@ def clock_of(session: DriveSession) -> FakeClock:
     return session.clock
 
 
-def test_arming_ends_after_a_minute_without_a_key(session: DriveSession) -> None:
+def test_arming_ends_one_minute_after_the_last_key(session: DriveSession) -> None:
     clock = clock_of(session)
     session.arming.arm()
     clock.advance(ARMED_FOR - 5)
@@ -97,7 +97,7 @@ def test_arming_ends_after_a_minute_without_a_key(session: DriveSession) -> None
     assert "no key pressed for 60 s" in session.arming.why_disarmed
 
 
-def test_known_value_grows_stale(session: DriveSession) -> None:
+def test_known_value_becomes_stale(session: DriveSession) -> None:
     clock = clock_of(session)
     session.image.confirm("ACC", 30, clock.line_time(time.monotonic()))
     assert session.image.fresh(5.0) == {"ACC": 30}
@@ -109,7 +109,7 @@ def test_known_value_grows_stale(session: DriveSession) -> None:
     assert session.image.age("DEC") < 60
 
 
-def test_a_moment_has_one_time_of_day_unless_the_clock_is_set() -> None:
+def test_time_of_day_is_stable_unless_the_clock_is_set() -> None:
     class Notified(Clock):
         now, ahead = 100.0, 5000.0
 
@@ -128,7 +128,7 @@ def test_a_moment_has_one_time_of_day_unless_the_clock_is_set() -> None:
     assert clock.wall_of(99.0) == 4099.0
 
 
-async def test_a_sleeper_wakes_when_the_clock_is_moved_on() -> None:
+async def test_fake_sleep_ends_when_the_clock_advances() -> None:
     clock = FakeClock()
     sleeper = asyncio.create_task(clock.sleep(3600))
     await asyncio.sleep(0.02)

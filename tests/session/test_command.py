@@ -164,13 +164,13 @@ STARTS = {
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_start_sequences_are_those_of_the_manuals(family: str) -> None:
+async def test_start_sequences_match_the_manuals(family: str) -> None:
     async with bench(family, sets=ready(family)) as made:
         await made.order("forward")
         assert made.writes() == STARTS[family]
 
 
-async def test_the_journal_keeps_every_word() -> None:
+async def test_every_command_word_is_in_the_journal() -> None:
     async with bench("atv71") as made:
         made.commander.refer("12.5")
         await made.done()
@@ -195,7 +195,7 @@ async def test_nothing_is_commanded_before_arming() -> None:
         assert made.writes() == []
 
 
-async def test_arming_ends_by_itself() -> None:
+async def test_arming_expires() -> None:
     async with bench("atv71") as made:
         made.clock.advance(ARMED_FOR - 20)
         made.session.arming.touch()
@@ -208,27 +208,27 @@ async def test_arming_ends_by_itself() -> None:
             made.commander.order("forward")
 
 
-async def test_a_lost_line_disarms() -> None:
+async def test_lost_line_disarms() -> None:
     async with bench("atv71") as made:
         made.simulation.unplug()
         await made.until(lambda: made.commander.armed_for is None)
         assert "line was lost" in made.session.arming.why_disarmed
 
 
-async def test_a_read_only_line_is_not_armed() -> None:
+async def test_drive_on_a_read_only_line_is_not_armed() -> None:
     async with bench("atv71", armed=False, read_only=True) as made:
         with pytest.raises(OrderRefused, match="read-only"):
             made.commander.arm()
 
 
-async def test_a_drive_whose_state_is_unknown_is_not_armed() -> None:
+async def test_drive_in_an_unknown_state_is_not_armed() -> None:
     async with bench("atv71", armed=False, sets={"CHCF": 0}) as made:
         made.commander.arm()
         assert "state of the drive is not known" in await made.done(OutcomeKind.REFUSED)
         assert made.commander.armed_for is None
 
 
-async def test_a_stop_while_the_state_is_read_leaves_the_drive_disarmed() -> None:
+async def test_stop_while_the_state_is_read_prevents_arming() -> None:
     async with bench("atv71", armed=False) as made:
         made.console.monitor.stop()
         made.session.image.forget()
@@ -240,7 +240,7 @@ async def test_a_stop_while_the_state_is_read_leaves_the_drive_disarmed() -> Non
             made.commander.order("forward")
 
 
-async def test_a_stop_since_the_key_that_arms_leaves_the_drive_disarmed() -> None:
+async def test_stop_after_the_arming_key_prevents_arming() -> None:
     async with bench("atv71", armed=False) as made:
         typed = made.session.work.stops
         made.stopper.stop([made.session])
@@ -250,7 +250,7 @@ async def test_a_stop_since_the_key_that_arms_leaves_the_drive_disarmed() -> Non
         assert made.commander.armed_for is not None
 
 
-async def test_a_stop_ends_arming() -> None:
+async def test_stop_ends_arming() -> None:
     async with bench("atv71") as made:
         made.stopper.stop([made.session])
         assert made.commander.armed_for is None
@@ -273,7 +273,9 @@ REFUSALS = [
 
 
 @pytest.mark.parametrize(("family", "sets", "order", "text"), REFUSALS)
-async def test_refusals(family: str, sets: dict[str, int], order: str, text: str) -> None:
+async def test_refused_command_has_its_reason(
+    family: str, sets: dict[str, int], order: str, text: str
+) -> None:
     codes = {p.code.casefold(): p.code for p in library.load(family).parameters}
     named = {codes[code.casefold()]: raw for code, raw in sets.items()}
     async with bench(family, sets=named) as made:
@@ -294,14 +296,14 @@ async def test_refusals(family: str, sets: dict[str, int], order: str, text: str
         ("9000rpm", "above HSP"),
     ],
 )
-async def test_references_that_are_refused(typed: str, text: str) -> None:
+async def test_invalid_reference_is_refused(typed: str, text: str) -> None:
     async with bench("atv71", sets={"LSP": 50, "HSP": 500}) as made:
         made.commander.refer(typed)
         assert text in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == []
 
 
-async def test_references_by_number_step_and_speed() -> None:
+async def test_reference_is_given_by_number_step_or_speed() -> None:
     async with bench("atv71", sets={"HSP": 500, "FRS": 500, "NSP": 1450}) as made:
         made.commander.refer("30,25")
         assert "rounded" in await made.done()
@@ -314,7 +316,7 @@ async def test_references_by_number_step_and_speed() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv71"])
-async def test_a_fault_is_reset_and_starts_nothing(family: str) -> None:
+async def test_reset_clears_the_fault_and_starts_nothing(family: str) -> None:
     async with bench(family) as made:
         if family in ALTIVARS:
             made.commander.refer("20")
@@ -344,7 +346,7 @@ async def test_reset_without_the_command_channel_says_so() -> None:
         assert made.drive.fault is not None
 
 
-async def test_options_of_an_altivar_21_stay_from_order_to_order() -> None:
+async def test_options_of_an_altivar_21_persist_between_commands() -> None:
     async with bench("atv21") as made:
         chart = made.session.profile.data.charts[0]
         options = {option.id: option for option in chart.options}
@@ -361,7 +363,7 @@ async def test_options_of_an_altivar_21_stay_from_order_to_order() -> None:
         assert made.drive.raw("FA00") == 0xC040
 
 
-async def test_priorities_that_fall_are_noticed() -> None:
+async def test_lost_priority_bits_are_detected() -> None:
     """FA00 is in the memory that a power-off empties."""
     async with bench("atv21") as made:
         await made.order("forward")
@@ -371,7 +373,7 @@ async def test_priorities_that_fall_are_noticed() -> None:
         assert "FA00 16#C400 is now 16#0000" in made.commander.given.lost_orders()
 
 
-async def test_a_stop_ends_an_order_on_its_way() -> None:
+async def test_stop_ends_a_command_in_progress() -> None:
     async with bench("atv71") as made:
         made.commander.refer("20")
         await made.done()
@@ -383,7 +385,7 @@ async def test_a_stop_ends_an_order_on_its_way() -> None:
         assert made.writes()[-1] == (8501, 7)
 
 
-async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path) -> None:
+async def test_unwritable_journal_does_not_block_commands(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     journal = Journal(tmp_path / "file")
     async with bench("atv71") as made:
@@ -397,7 +399,7 @@ async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path)
         assert len(journal.recent) == 3
 
 
-async def test_a_motor_that_starts_the_other_way_is_stopped() -> None:
+async def test_motor_that_starts_in_the_wrong_direction_is_stopped() -> None:
     # bit 12 of CMI is a second source of the direction; an unassigned bit 11 shows the same
     async with bench("atv71", sets={"CMI": 1 << 12}) as made:
         made.commander.refer("20Hz")

@@ -49,7 +49,7 @@ def profile_of_kinds(*prefixes: str) -> Profile:
         ("ATV12H018M2", "atv312"),
     ],
 )
-def test_another_kind_is_reported_by_both_names(reference: str, profile: str) -> None:
+def test_contradicting_family_is_reported_with_both_names(reference: str, profile: str) -> None:
     reported = contradiction(output(reference), library.load(profile))
     assert reported.startswith(f"Device 1 says it is {reference}")
     assert library.load(profile).name in reported
@@ -68,12 +68,12 @@ def test_another_kind_is_reported_by_both_names(reference: str, profile: str) ->
         ("VFD055CP43B", "powerdrive"),  # names no kinds: nothing to compare
     ],
 )
-def test_possible_identity_is_no_contradiction(reference: str, profile: str) -> None:
+def test_possible_identity_is_not_a_contradiction(reference: str, profile: str) -> None:
     assert contradiction(output(reference), library.load(profile)) == ""
     assert contradiction(None, library.load(profile)) == ""
 
 
-def test_a_profile_of_the_users_own_is_compared_by_what_it_claims() -> None:
+def test_own_profile_is_compared_by_its_references() -> None:
     assert contradiction(output("PUMP 7"), profile_of_kinds("PUMP")) == ""
     assert contradiction(output("FAN 7"), profile_of_kinds("PUMP"))
     assert contradiction(output("FAN 7"), profile_of_kinds()) == ""
@@ -103,7 +103,7 @@ class Answering(OneDrive):
 
 
 @pytest.mark.parametrize("error", [NoAnswer(1, 43, 0), DeviceException(1, 43, 0, code=1)])
-async def test_silent_identity_is_requested_once_and_believed(error: Exception) -> None:
+async def test_unanswered_identification_is_requested_once(error: Exception) -> None:
     line = Answering(error)
     assert await own_words(line, 1, library.load("powerdrive")) is None
     assert line.priorities == [Priority.BACKGROUND], "a silent family is not waited for long"
@@ -120,20 +120,20 @@ async def test_damaged_identification_is_requested_again_and_decides_nothing(
     assert len(line.priorities) == 3
 
 
-async def test_silence_of_a_drive_that_answers_its_status_is_no_contradiction() -> None:
+async def test_drive_without_identification_does_not_contradict() -> None:
     line = Answering(NoAnswer(1, 43, 0))
     profile = library.load("atv71")
     assert await own_words(line, 1, profile) is None
     assert len(line.priorities) == 2
 
 
-async def test_a_lost_line_is_reported() -> None:
+async def test_lost_line_is_reported() -> None:
     with pytest.raises(LineLost):
         await own_words(Answering(LineLost("unplugged")), 1, library.load("atv71"))
 
 
 @pytest.mark.parametrize("family", ["atv71", "powerdrive"])
-def test_a_contradicted_drive_is_never_armed(family: str) -> None:
+def test_contradicting_drive_is_never_armed(family: str) -> None:
     identity = output("ATV312HU09M3")
     session = DriveSession(OneDrive({}), 1, library.load(family), identity)
     with pytest.raises(OrderRefused, match="says it is ATV312HU09M3, Altivar 312"):
@@ -144,14 +144,14 @@ def test_a_contradicted_drive_is_never_armed(family: str) -> None:
     assert not session.arming.armed
 
 
-def test_a_drive_that_fits_is_armed() -> None:
+def test_matching_drive_is_armed() -> None:
     identity = replace(output("ATV312HU09M3"), device=1)
     session = DriveSession(OneDrive({}), 1, library.load("atv312"), identity)
     assert session.contradiction == ""
     session.arming.arm()
 
 
-async def test_a_contradicted_drive_is_stopped_as_what_it_says_it_is(
+async def test_contradicting_drive_is_stopped_by_its_own_family(
     start: Start, journal: Journal
 ) -> None:
     """16#0007, the ramp stop of an Altivar 312, runs an Altivar 71 in the I/O profile."""

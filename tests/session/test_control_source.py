@@ -11,7 +11,7 @@ from .test_command import ALTIVARS, bench
 
 
 @pytest.mark.parametrize("family", ALTIVARS)
-async def test_every_configuration_is_written_and_read_back(family: str) -> None:
+async def test_every_configuration_is_written_and_verified(family: str) -> None:
     async with bench(family) as made:
         profile = made.session.profile
         for source in profile.data.control_sources:
@@ -21,7 +21,7 @@ async def test_every_configuration_is_written_and_read_back(family: str) -> None
                 assert made.drive.raw(setting.parameter) == setting.value, setting.parameter
 
 
-async def test_only_what_differs_is_written() -> None:
+async def test_only_differing_values_are_written() -> None:
     async with bench("atv71") as made:
         source = made.session.profile.data.control_sources[1]
         made.commander.configure(source)
@@ -30,7 +30,7 @@ async def test_only_what_differs_is_written() -> None:
         assert "no change was necessary" in await made.done()
 
 
-async def test_never_while_the_motor_turns() -> None:
+async def test_control_source_is_not_changed_while_the_motor_turns() -> None:
     async with bench("atv71") as made:
         made.commander.refer("20Hz")
         await made.done()
@@ -41,7 +41,7 @@ async def test_never_while_the_motor_turns() -> None:
         assert made.writes() == before
 
 
-async def test_a_word_that_cannot_be_read_changes_nothing() -> None:
+async def test_unreadable_word_changes_nothing() -> None:
     async with bench("atv71", protects=frozenset({"RFC"})) as made:
         before = made.writes()
         made.commander.configure(made.session.profile.data.control_sources[1])

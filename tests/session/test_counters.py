@@ -89,7 +89,7 @@ def test_uncertain_difference_is_not_reported() -> None:
     assert reported(before, late) == {"not-answered": 6}
 
 
-def test_a_program_that_takes_the_line_over_counts_anew_and_no_difference_is_reported() -> None:
+def test_new_owner_restarts_counts_without_reporting_a_difference() -> None:
     first = count(100, 0, sent=500, answered=500)
     found = Comparison(first, first).with_look(count(140, 0, sent=2, answered=2))
     assert differences(found) == []
@@ -100,7 +100,7 @@ def test_a_program_that_takes_the_line_over_counts_anew_and_no_difference_is_rep
     start=st.integers(0, 65535),
     steps=st.lists(st.tuples(st.integers(1, 90_000), st.integers(0, 500)), max_size=8),
 )
-def test_roll_overs_are_undone_whatever_was_sent_between(
+def test_roll_overs_are_corrected_whatever_was_sent(
     start: int, steps: list[tuple[int, int]]
 ) -> None:
     first = count(start)
@@ -113,13 +113,13 @@ def test_roll_overs_are_undone_whatever_was_sent_between(
     assert kinds == ({"not-from-here": seen - sent} if seen > sent else {})
 
 
-def test_a_count_that_fell_by_less_than_was_sent_has_rolled_over() -> None:
+def test_count_that_fell_by_less_than_was_sent_rolled_over() -> None:
     assert frames_since(60_000, 1_000, exactly(6_536)) == 6_536
     assert frames_since(60_000, 1_000, exactly(10)) == 6_536
     assert frames_since(500, 10, exactly(20)) is None
 
 
-def test_ours_since_a_moment() -> None:
+def test_own_counts_are_subtracted_since_a_moment() -> None:
     before = DeviceCounters(10, 8, 2, exceptions={2: 1}, turnarounds=(1, 2))
     now = DeviceCounters(15, 12, 3, exceptions={2: 1, 4: 2}, turnarounds=(1, 6))
     assert device_since(now, before) == DeviceCounters(
@@ -129,7 +129,7 @@ def test_ours_since_a_moment() -> None:
     assert device_since(before, now) == before
 
 
-def test_the_load_of_the_line() -> None:
+def test_load_is_busy_time_per_interval() -> None:
     before, now = LineCounters(busy_seconds=1.0), LineCounters(busy_seconds=2.5)
     assert load_of(now, before, 3.0) == 0.5
     assert load_of(before, now, 3.0) is None
@@ -156,7 +156,7 @@ async def ask(line: Line, times: int) -> None:
 
 
 @pytest.mark.parametrize("tcp", [False, True], ids=["serial", "tcp"])
-async def test_frames_that_the_drive_saw_and_we_did_not_get(tcp: bool) -> None:
+async def test_replies_lost_on_the_way_back_are_reported(tcp: bool) -> None:
     with simulated(tcp=tcp) as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         await watch.look()
@@ -180,7 +180,7 @@ async def test_frames_that_the_drive_saw_and_we_did_not_get(tcp: bool) -> None:
 
 
 @pytest.mark.parametrize("tcp", [False, True], ids=["serial", "tcp"])
-async def test_frames_that_answer_no_request_are_explained(tcp: bool) -> None:
+async def test_frames_without_a_request_are_explained(tcp: bool) -> None:
     with simulated(tcp=tcp) as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         await watch.look()
@@ -198,7 +198,7 @@ async def test_frames_that_answer_no_request_are_explained(tcp: bool) -> None:
         assert watch.now().agree
 
 
-def test_strays_name_another_master_and_none_without_strays() -> None:
+def test_stray_frames_indicate_another_master() -> None:
     request = frame(5, bytes.fromhex("030C810001"))
     frames = [Frame(1.0, "in", request, "late or repeated, device 5")]
     (found,) = stray_difference(1, frames, 0.5, 2, tcp=False)
@@ -209,7 +209,7 @@ def test_strays_name_another_master_and_none_without_strays() -> None:
     assert stray_difference(0, frames, 0.5, 2, tcp=False) == []
 
 
-async def test_damaged_frames_and_those_of_another_master() -> None:
+async def test_damaged_and_foreign_frames_are_reported() -> None:
     with simulated() as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         await watch.look()
@@ -221,7 +221,7 @@ async def test_damaged_frames_and_those_of_another_master() -> None:
         assert kinds == {"damaged-there": 1, "not-from-here": 2}
 
 
-async def test_the_drives_counters_are_reset_and_compared_from_there(tmp_path: Path) -> None:
+async def test_drive_counters_are_reset_and_compared_from_zero(tmp_path: Path) -> None:
     with simulated() as (_, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         await ask(line, 7)
@@ -242,7 +242,7 @@ async def test_the_drives_counters_are_reset_and_compared_from_there(tmp_path: P
         assert now.total.requests > now.since.requests
 
 
-async def test_counters_that_somebody_else_reset_are_reported() -> None:
+async def test_counters_reset_by_another_source_are_reported() -> None:
     with simulated() as (_, line):
         session = DriveSession(line, 2, library.load("atv71"))
         watch = CounterWatch(session)
@@ -257,7 +257,7 @@ async def test_counters_that_somebody_else_reset_are_reported() -> None:
         assert watch.now().agree
 
 
-async def test_a_read_only_line_resets_no_drive(tmp_path: Path) -> None:
+async def test_read_only_line_resets_no_counters(tmp_path: Path) -> None:
     with Simulation([DriveSpec("atv71", 2)]) as simulation:
         line = Line(SerialLink(simulation.serve_pty()), timing=QUICK, read_only=True)
         try:
@@ -272,7 +272,7 @@ async def test_a_read_only_line_resets_no_drive(tmp_path: Path) -> None:
             line.close()
 
 
-async def test_a_drive_without_counters_has_ours_alone() -> None:
+async def test_drive_without_counters_shows_own_counts_only() -> None:
     with simulated("atv312") as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv312")))
         assert await watch.echo(5) == 5
@@ -287,7 +287,7 @@ async def test_a_drive_without_counters_has_ours_alone() -> None:
         assert now.drive == ()
 
 
-async def test_a_silent_drive_is_reported_and_hides_nothing() -> None:
+async def test_silent_drive_is_reported_with_own_counts() -> None:
     with simulated() as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         simulation.faults.rates = FaultRates(lost=1.0)

@@ -108,7 +108,7 @@ def heard(**seen: Any) -> DiagnosticEvidence:
     return DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=3, **seen))
 
 
-def test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed() -> None:
+def test_garbage_at_the_same_baud_suggests_another_format() -> None:
     same = of(heard(garbage=12, compared=(12, 14)))
     assert "the speed is right" in same.text
     assert "another format: 8O1, 8N1 or 8N2." in same.steps[0]
@@ -126,7 +126,7 @@ def test_answering_drive_has_correct_wires() -> None:
     assert "Pins" not in output
 
 
-def test_first_suspects_differ_from_factory_settings() -> None:
+def test_first_suspects_are_settings_that_differ_from_factory() -> None:
     other = replace(heard(), link=SerialLink(PORT, 9600, "8E1"))
     assert "this line has 9600 8E1" in of(other).steps[0]
     assert of(heard()).steps[0].startswith("Address")
@@ -136,7 +136,7 @@ def test_first_suspects_differ_from_factory_settings() -> None:
 @pytest.mark.parametrize(
     ("code", "step"), [(2, "what was asked is not known"), (6, "Ask again"), (4, "has a trouble")]
 )
-def test_a_refusal_is_reported_by_its_code(code: int, step: str) -> None:
+def test_refusal_is_reported_with_its_code(code: int, step: str) -> None:
     found = of(heard(exceptions=(code,)))
     assert found.rung == "exception"
     assert step in found.steps[0]
@@ -145,7 +145,7 @@ def test_a_refusal_is_reported_by_its_code(code: int, step: str) -> None:
 # The port
 
 
-def test_no_port(tmp_path: Path) -> None:
+def test_missing_port_is_the_cause(tmp_path: Path) -> None:
     path = str(tmp_path / "ttyUSB7")
     with pytest.raises(PortMissing) as caught:
         Line(SerialLink(path)).open(wait=5.0)
@@ -161,7 +161,7 @@ def remembered(adapters: Adapters, name: str, serial: str) -> str:
     return port
 
 
-def test_an_adapter_that_has_another_number_now(adapters: Adapters) -> None:
+def test_renumbered_adapter_is_the_cause(adapters: Adapters) -> None:
     port = remembered(adapters, "ttyUSB0", "A5")
     adapters.unplug("ttyUSB0")
     moved = adapters.plug("ttyUSB3", "1.2", serial="A5")
@@ -172,7 +172,7 @@ def test_an_adapter_that_has_another_number_now(adapters: Adapters) -> None:
     assert "by-id" in found.steps[0]
 
 
-def test_another_adapter_has_the_name_now(adapters: Adapters) -> None:
+def test_replaced_adapter_is_the_cause(adapters: Adapters) -> None:
     port = remembered(adapters, "ttyUSB0", "A5")
     adapters.unplug("ttyUSB0")
     adapters.plug("ttyUSB0", "1.2", serial="B7")
@@ -183,12 +183,12 @@ def test_another_adapter_has_the_name_now(adapters: Adapters) -> None:
     assert f"is {moved} now." in of(evidence_of_port(SerialLink(port), 2)).text
 
 
-def test_an_adapter_in_its_place_is_no_rung(adapters: Adapters) -> None:
+def test_unchanged_adapter_is_not_a_cause(adapters: Adapters) -> None:
     port = remembered(adapters, "ttyUSB0", "A5")
     assert evidence_of_port(SerialLink(port), 2).adapter.was == ""
 
 
-def test_a_port_that_a_program_has() -> None:
+def test_port_in_use_is_the_cause() -> None:
     with PtyPeer(honest) as peer:
         first = Line(SerialLink(peer.path))
         first.open(wait=5.0)
@@ -210,7 +210,7 @@ def test_a_port_that_a_program_has() -> None:
     assert "kill -9" in frozen.steps[0]
 
 
-def test_a_program_that_listens_on_the_same_port() -> None:
+def test_program_listening_on_the_port_is_named() -> None:
     seen = DiagnosticEvidence(
         LINK, 2, PROFILE, port=PortSeen(PORT, others="cat (pid 3)"), heard=Heard(requested=2)
     )
@@ -238,20 +238,20 @@ def test_a_program_that_listens_on_the_same_port() -> None:
         ),
     ],
 )
-def test_no_permission(seen: PortSeen, text: str, step: str) -> None:
+def test_missing_permission_is_the_cause(seen: PortSeen, text: str, step: str) -> None:
     found = of(DiagnosticEvidence(LINK, 2, trouble=PortRefused(PORT, "no."), port=seen))
     assert found.rung == "no-permission"
     assert text in found.text
     assert step in found.steps[0]
 
 
-def test_a_port_that_takes_no_such_format() -> None:
+def test_unsupported_format_of_the_port_is_the_cause() -> None:
     trouble = PortRefused(PORT, "it does not take parity E.")
     found = of(DiagnosticEvidence(LINK, 2, trouble=trouble, port=PortSeen(PORT)))
     assert (found.rung, "parity E" in found.text) == ("port-refused", True)
 
 
-def test_a_host_that_is_not_reached() -> None:
+def test_unreachable_host_is_the_cause() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     link = TcpLink("127.0.0.1", port)
@@ -270,7 +270,7 @@ def test_a_host_that_is_not_reached() -> None:
     [(16, 0.017, "slow-adapter"), (1, 0.017, "answers"), (16, 0.005, "answers"),
      (None, 0.017, "answers")],
 )  # fmt: skip
-def test_latency_is_reported_where_it_is_set_and_measured(
+def test_latency_is_reported_if_set_and_measured(
     latency: int | None, turnaround: float, rung: str
 ) -> None:
     heard = Heard(requested=5, answered=5)
@@ -290,7 +290,7 @@ async def test_the_latency_is_measured_on_the_line(line: OpenedLine) -> None:
     assert found.sight.turnaround >= 0.02
 
 
-async def test_only_the_echo_comes_back(line: OpenedLine) -> None:
+async def test_echo_without_a_reply_is_the_cause(line: OpenedLine) -> None:
     with PtyPeer(silent, echo=True) as peer:
         found = await why(line(peer.path))
     assert found.rung == "echo"
@@ -312,7 +312,7 @@ def at(baud: int, format_: str) -> Script:
 
 
 @pytest.mark.parametrize("baud", [4800, 9600, 38400])
-async def test_bytes_that_came_at_another_baud_tell_which(baud: int, line: OpenedLine) -> None:
+async def test_bytes_at_another_baud_show_which(baud: int, line: OpenedLine) -> None:
     with PtyPeer(at(baud, "8E1")) as peer:
         found = await why(line(peer.path))
     assert found.rung == "wrong-settings"
@@ -321,14 +321,14 @@ async def test_bytes_that_came_at_another_baud_tell_which(baud: int, line: Opene
     assert any(f",{baud},8E1." in step for step in found.steps)
 
 
-def test_the_counts_of_a_real_port_tell_it() -> None:
+def test_error_counts_of_a_port_show_wrong_settings() -> None:
     errors = PortErrors(framing=3, parity=1, breaks=2, overruns=0)
     found = of(DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=2), errors=errors))
     assert found.rung == "wrong-settings"
     assert "3 without a stop bit and 1 with a wrong parity and 2 breaks" in found.text
 
 
-async def test_the_counts_come_from_the_line() -> None:
+async def test_error_counts_are_read_from_the_line() -> None:
     made = FakeLine(link=TcpLink("gateway"))
     made.counters = replace(made.counters, framing=40)
 
@@ -344,7 +344,7 @@ async def test_the_counts_come_from_the_line() -> None:
 
 
 @pytest.mark.parametrize("family", ["proxidrive", "varmeca"])
-def test_a_speed_that_the_family_has_not(family: str) -> None:
+def test_unsupported_baud_of_the_family_is_the_cause(family: str) -> None:
     profile = library.load(family)
     found = of(
         DiagnosticEvidence(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(requested=2))
@@ -357,7 +357,7 @@ def test_a_speed_that_the_family_has_not(family: str) -> None:
 # The drive
 
 
-async def test_silence(line: OpenedLine) -> None:
+async def test_silence_lists_the_checks_of_the_family(line: OpenedLine) -> None:
     with PtyPeer(silent) as peer:
         opened = line(peer.path)
         found = await why(opened)
@@ -369,7 +369,7 @@ async def test_silence(line: OpenedLine) -> None:
     assert "while 3, 4 on this line does" in of(neighbor).text
 
 
-async def test_damaged_answers_beside_good_ones(line: OpenedLine) -> None:
+async def test_some_damaged_replies_indicate_a_poor_line(line: OpenedLine) -> None:
     def script(request: bytes, count: int) -> list[bytes | float]:
         good = reply(request)
         return [good[:-3] + bytes([good[-3] ^ 0x40]) + good[-2:]] if count in (1, 3) else [good]
@@ -381,7 +381,7 @@ async def test_damaged_answers_beside_good_ones(line: OpenedLine) -> None:
     assert any("termination" in step for step in found.steps)
 
 
-async def test_another_address_answers(line: OpenedLine) -> None:
+async def test_reply_from_another_address_is_the_cause(line: OpenedLine) -> None:
     with PtyPeer(lambda request, _: [frame(7, honest_pdu(request[1:-2]))]) as peer:
         found = await why(line(peer.path))
     assert (found.rung, found.text) == (
@@ -389,7 +389,7 @@ async def test_another_address_answers(line: OpenedLine) -> None:
     )  # fmt: skip
 
 
-async def test_another_function_answers(line: OpenedLine) -> None:
+async def test_reply_to_another_function_is_reported(line: OpenedLine) -> None:
     with PtyPeer(lambda request, _: [frame(request[0], bytes([4, 2, 0, 0]))]) as peer:
         found = await why(line(peer.path))
     assert (found.rung, "function 4." in found.text) == ("wrong-function", True)
@@ -402,7 +402,7 @@ async def test_another_function_answers(line: OpenedLine) -> None:
     assert (found.rung, "not as many registers" in found.text) == ("wrong-function", True)
 
 
-async def test_a_drive_that_refuses(line: OpenedLine) -> None:
+async def test_refusing_drive_is_reported(line: OpenedLine) -> None:
     with PtyPeer(lambda request, _: [frame(request[0], bytes([request[1] | 0x80, 2]))]) as peer:
         found = await why(line(peer.path))
     assert found.rung == "exception"
@@ -411,9 +411,7 @@ async def test_a_drive_that_refuses(line: OpenedLine) -> None:
 
 
 @pytest.mark.parametrize(("code", "says"), [(10, "0A, it has no way"), (11, "0B, the drive did")])
-async def test_a_gateway_answers_in_the_drives_place(
-    code: int, says: str, line: OpenedLine
-) -> None:
+async def test_gateway_exception_is_the_cause(code: int, says: str, line: OpenedLine) -> None:
     def script(request: bytes, _count: int) -> list[bytes | float]:
         return [tcp_reply(request, bytes([request[7] | 0x80, code]))]
 
@@ -424,7 +422,7 @@ async def test_a_gateway_answers_in_the_drives_place(
     assert "gateway" in found.steps[0]
 
 
-async def test_a_unit_that_is_another_over_tcp(line: OpenedLine) -> None:
+async def test_wrong_unit_over_tcp_is_the_cause(line: OpenedLine) -> None:
     def script(request: bytes, _count: int) -> list[bytes | float]:
         answer = tcp_reply(request)
         return [answer[:6] + b"\x09" + answer[7:]]
@@ -434,14 +432,14 @@ async def test_a_unit_that_is_another_over_tcp(line: OpenedLine) -> None:
     assert (found.rung, found.sight.heard.others) == ("other-address", (9,))
 
 
-async def test_an_answer_after_its_time(line: OpenedLine) -> None:
+async def test_late_reply_is_the_cause(line: OpenedLine) -> None:
     with PtyPeer(lambda request, _: [0.36, reply(request)]) as peer:
         found = await why(line(peer.path), family="powerdrive")
     assert found.rung == "late"
     assert "timeout=2" in found.steps[0]
 
 
-async def test_a_drive_that_is_left_alone_on_purpose(line: OpenedLine) -> None:
+async def test_paused_polling_is_the_cause(line: OpenedLine) -> None:
     with PtyPeer(honest) as peer:
         opened = line(peer.path)
         opened.facts.pause_polling(2, "A proof is going on.")
@@ -450,14 +448,14 @@ async def test_a_drive_that_is_left_alone_on_purpose(line: OpenedLine) -> None:
         assert peer.requests == []
 
 
-async def test_a_line_that_is_not_as_it_was(line: OpenedLine) -> None:
+async def test_changed_line_is_the_cause(line: OpenedLine) -> None:
     with PtyPeer(honest) as peer:
         seen = await sight_of_drive(line(peer.path), 2, PROFILE, changed="Device 2 was a pump.")
     found = of(seen)
     assert (found.rung, found.text) == ("changed", "Device 2 was a pump.")
 
 
-async def test_a_drive_that_answers(line: OpenedLine) -> None:
+async def test_healthy_drive_is_reported(line: OpenedLine) -> None:
     with PtyPeer(honest) as peer:
         found = await why(line(peer.path))
         assert found.well
@@ -469,7 +467,7 @@ async def test_a_drive_that_answers(line: OpenedLine) -> None:
         assert {request[1] for request in peer.requests} == {43}
 
 
-async def test_nothing_is_ever_written(line: OpenedLine) -> None:
+async def test_diagnosis_writes_nothing(line: OpenedLine) -> None:
     for script in (silent, honest, at(9600, "8E1")):
         for family in ("atv71", "powerdrive", None):
             with PtyPeer(script) as peer:
@@ -477,7 +475,7 @@ async def test_nothing_is_ever_written(line: OpenedLine) -> None:
                 assert {request[1] for request in peer.requests} <= {3, 4, 43}, family
 
 
-async def test_it_asks_as_an_operator_does() -> None:
+async def test_diagnosis_uses_operator_priority() -> None:
     seen: list[Priority] = []
 
     class Listening(FakeLine):
@@ -511,7 +509,7 @@ async def test_it_asks_as_an_operator_does() -> None:
         (None, "answers"),
     ],
 )
-def test_the_ends_of_requests_tell_it_too(error: LineError | None, rung: str) -> None:
+def test_results_of_requests_lead_to_their_check(error: LineError | None, rung: str) -> None:
     heard = heard_by_errors([error, error], 2)
     assert of(DiagnosticEvidence(LINK, 2, PROFILE, heard=heard)).rung == rung
 
@@ -550,13 +548,13 @@ def test_manual_advice_on_communication_loss(family: str, says: str) -> None:
     assert says in steps_in_silence(family)
 
 
-def test_an_address_that_no_drive_has() -> None:
+def test_invalid_address_of_the_family_is_the_cause() -> None:
     assert "Address 10 calls a group of drives" in steps_in_silence("powerdrive", 10)
     assert "calls a group" not in steps_in_silence("powerdrive", 11)
     assert "calls a group" not in steps_in_silence("atv71", 10)
 
 
-def test_a_format_that_the_family_has_not() -> None:
+def test_unsupported_format_of_the_family_is_the_cause() -> None:
     link = SerialLink(PORT, 19200, "8O2")
     found = of(DiagnosticEvidence(link, 2, PROFILE, heard=Heard(requested=2)))
     assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
@@ -610,12 +608,12 @@ def test_evidence_leads_to_its_check(rung: str) -> None:
     assert of(EXAMPLES[rung]).rung == rung
 
 
-def test_every_rung_has_an_example() -> None:
+def test_every_check_has_an_example() -> None:
     assert {rung.id for rung in LADDER} | {"answers", "not-open"} == set(EXAMPLES)
 
 
 @pytest.mark.parametrize(("lost", "certainty"), [(1, "possible"), (2, "likely"), (5, "certain")])
-def test_certainty_grows_with_what_was_seen(lost: int, certainty: str) -> None:
+def test_certainty_increases_with_the_evidence(lost: int, certainty: str) -> None:
     found = of(replace(EVIDENCE, measure=Measure(requested=200, answered=200 - lost, lost=lost)))
     assert found.certainty == certainty
     assert bool(found.others) is (certainty != "certain")
@@ -632,9 +630,7 @@ CODES = st.lists(st.sampled_from([1, 2, 10, 11]), max_size=2).map(tuple)
     ),
     st.sampled_from([*map(library.load, ("atv71", "powerdrive")), None]),
 )  # fmt: skip
-def test_a_drive_that_has_not_answered_is_never_reported_to_be_well(
-    heard: Heard, profile: Profile | None
-) -> None:
+def test_silent_drive_is_never_reported_as_healthy(heard: Heard, profile: Profile | None) -> None:
     found = of(DiagnosticEvidence(LINK, 2, profile, heard=heard))
     assert found.rung not in ("answers", "not-open")
     assert found.steps

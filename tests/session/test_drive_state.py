@@ -66,44 +66,44 @@ def readings(profile: Profile, quality: Quality = Quality.GOOD, **raws: int) -> 
         (0x0000, "unknown state", False),
     ],
 )
-def test_headline(word: int, headline: str, reached: bool) -> None:
+def test_status_word_has_its_headline(word: int, headline: str, reached: bool) -> None:
     state = drive_state(drive(), readings(drive(), ETA=word))
     assert (state.headline, state.reached) == (headline, reached)
 
 
-def test_a_fault_is_named_and_its_number_kept() -> None:
+def test_fault_has_its_name_and_number() -> None:
     state = drive_state(drive(), readings(drive(), ETA=0x0228, LFT=18))
     assert state.headline == "fault ObF"
     assert state.fault is not None
     assert state.fault.name == "Overbraking"
 
 
-def test_a_fault_the_profile_does_not_know_shows_its_number() -> None:
+def test_unknown_fault_shows_its_number() -> None:
     state = drive_state(drive(), readings(drive(), ETA=0x0008, LFT=99))
     assert state.headline == "fault code 99"
 
 
-def test_the_last_fault_of_a_running_drive_is_no_present_fault() -> None:
+def test_last_fault_of_a_running_drive_is_not_current() -> None:
     state = drive_state(drive(), readings(drive(), ETA=0x0027, LFT=18))
     assert (state.fault, state.fault_raw, state.kind) == (None, 18, "running")
 
 
-def test_stale_words_tell_nothing() -> None:
+def test_stale_words_give_no_state() -> None:
     state = drive_state(drive(), readings(drive(), Quality.STALE, ETA=0x0027))
     assert (state.kind, state.direction) == ("unknown", None)
 
 
-def test_the_chart_follows_the_control_profile() -> None:
+def test_chart_follows_the_control_profile() -> None:
     state = drive_state(drive(), readings(drive(), ETA=0x0004, CHCF=3))
     assert state.id == "run"
 
 
-def test_alarms_are_the_set_bits_marked_as_such() -> None:
+def test_alarms_are_the_set_alarm_bits() -> None:
     state = drive_state(drive(), readings(drive(), ETA=0x00A1))
     assert [bit.name for bit in state.alarms] == ["warning"]
 
 
-def test_a_channel_word_is_reported_by_its_bits() -> None:
+def test_channel_word_is_decoded_by_its_bits() -> None:
     bits = [{"bit": 0, "name": "terminals"}, {"bit": 3, "name": "Modbus"}]
     profile = profile_of(parameter("CCC", 8442, bits=bits))
     reading = readings(profile, CCC=8)["CCC"]
@@ -111,5 +111,5 @@ def test_a_channel_word_is_reported_by_its_bits() -> None:
     assert channel_text(profile["CCC"], reading.value) == "Modbus"
 
 
-def test_values_without_the_status_word_tell_no_state() -> None:
+def test_values_without_the_status_word_give_no_state() -> None:
     assert drive_state(drive(), readings(drive(), LFT=18)).headline == ""

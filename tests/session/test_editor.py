@@ -48,7 +48,7 @@ NUMBERS = {"atv21": "ACC", "atv31": "ACC", "atv312": "ACC", "atv71": "ACC"}
 
 
 @pytest.mark.parametrize("family", NUMBERS)
-async def test_find_edit_apply_undo(family: str) -> None:
+async def test_parameter_is_found_edited_applied_and_undone(family: str) -> None:
     async with editing(family) as (made, editor):
         code = NUMBERS[family]
         assert code in rows(editor.facts, "settings", "acc")
@@ -69,7 +69,7 @@ async def test_find_edit_apply_undo(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_everything_is_read_what_is_looked_at_first(family: str) -> None:
+async def test_selected_parameters_are_read_first(family: str) -> None:
     async with editing(family) as (made, editor):
         last = [p.code for p in editor.session.profile.parameters if p.access != "w"][-1]
         values = editor.values
@@ -83,7 +83,7 @@ async def test_everything_is_read_what_is_looked_at_first(family: str) -> None:
             rows(editor.facts, chosen, "a")
 
 
-async def test_a_refused_edit_stays_staged_and_says_why() -> None:
+async def test_refused_edit_stays_staged_with_its_reason() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "HSP", "LSP", "TFR")
         editor.staging.stage("HSP", "70")
@@ -95,7 +95,7 @@ async def test_a_refused_edit_stays_staged_and_says_why() -> None:
         assert made.drive.raw("HSP") == 500
 
 
-async def test_a_running_motor_locks_what_needs_standstill() -> None:
+async def test_running_motor_locks_parameters_that_need_standstill() -> None:
     async with editing("atv71") as (made, editor):
         made.commander.refer("20Hz")
         await made.done()
@@ -122,7 +122,7 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         assert made.drive.raw("TFR") == 600
 
 
-async def test_foreign_change_is_noticed_and_not_overwritten() -> None:
+async def test_foreign_change_is_detected_and_not_overwritten() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "ACC")
         editor.staging.stage("ACC", "7")
@@ -138,7 +138,7 @@ async def test_foreign_change_is_noticed_and_not_overwritten() -> None:
         assert made.drive.raw("ACC") == 70
 
 
-async def test_a_ramp_keeps_its_seconds_when_its_increment_changes() -> None:
+async def test_ramp_keeps_its_seconds_if_its_increment_changes() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "ACC", "INR")
         editor.staging.stage("ACC", "7.5")
@@ -151,7 +151,7 @@ async def test_a_ramp_keeps_its_seconds_when_its_increment_changes() -> None:
         assert value.display == "7.50 s"
 
 
-async def test_an_unverified_one_is_confirmed_once() -> None:
+async def test_unverified_parameter_is_confirmed_once() -> None:
     async with editing("atv21") as (made, editor):
         await read(made, editor, "F112")
         refused = editor.refusal("F112")
@@ -175,7 +175,7 @@ async def test_nothing_is_staged_while_something_is_written() -> None:
         editor.staging.stage("DEC", "5")
 
 
-async def test_save_to_eeprom_and_factory_settings() -> None:
+async def test_settings_are_saved_and_reset_to_factory() -> None:
     async with editing("atv312") as (made, editor):
         await read(made, editor, "ACC")
         editor.staging.stage("ACC", "9")
@@ -191,7 +191,7 @@ async def test_save_to_eeprom_and_factory_settings() -> None:
         assert "factory settings are restored" in await written(made, editor)
 
 
-async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
+async def test_set_is_compared_and_staged(tmp_path: Path) -> None:
     async with editing("atv71") as (made, editor):
         session = made.session
         upload = Upload(session, ["ACC", "DEC", "HSP", "INR"])
@@ -264,7 +264,7 @@ async def write(made: Bench, editor: Editor, code: str, text: str) -> None:
     assert "Wrote 1" in await written(made, editor)
 
 
-async def test_a_setting_written_back_to_its_saved_value_is_saved() -> None:
+async def test_setting_restored_to_its_saved_value_counts_as_saved() -> None:
     async with editing("atv71") as (made, editor):
         await write(made, editor, "ACC", "7.5 s")
         await write(made, editor, "DEC", "8 s")
@@ -281,7 +281,7 @@ async def test_a_setting_written_back_to_its_saved_value_is_saved() -> None:
         assert editor.unsaved == set()
 
 
-async def test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved() -> None:
+async def test_setting_changed_by_another_source_counts_as_unsaved() -> None:
     async with editing("atv71") as (made, editor):
         await write(made, editor, "ACC", "7.5 s")
         made.drive.set("ACC", 55)  # at the keypad, which may have saved it
@@ -290,7 +290,7 @@ async def test_a_setting_that_another_source_changed_meanwhile_counts_as_unsaved
         assert editor.unsaved == {"ACC"}
 
 
-async def test_after_the_factory_settings_no_value_is_known_to_be_saved() -> None:
+async def test_no_value_is_known_as_saved_after_a_factory_reset() -> None:
     async with editing("atv71") as (made, editor):
         await write(made, editor, "DEC", "8 s")
         await write(made, editor, "DEC", "3 s")
@@ -303,7 +303,7 @@ async def test_after_the_factory_settings_no_value_is_known_to_be_saved() -> Non
         assert "ACC" in editor.unsaved
 
 
-async def test_a_family_that_saves_each_write_has_nothing_unsaved() -> None:
+async def test_family_that_saves_each_write_has_nothing_unsaved() -> None:
     async with editing("atv21") as (made, editor):
         await write(made, editor, "ACC", "7.5 s")
         assert editor.unsaved == set()

@@ -67,7 +67,7 @@ def counted(steps: Sequence[Step]) -> Measure:
         ([EVIDENCE, WIDE, (REPLY, OLD)], "", {"behind": 1}),
     ],
 )
-def test_frames_are_counted_by_their_trouble(
+def test_frames_are_counted_by_their_fault(
     steps: list[Step], worst: str, counts: Mapping[str, int]
 ) -> None:
     found = counted(steps)
@@ -75,7 +75,7 @@ def test_frames_are_counted_by_their_trouble(
     assert {kind: found.count(kind) for kind in counts} == counts
 
 
-def test_two_drives_are_distinguished_from_a_value_that_changes() -> None:
+def test_two_drives_are_distinguished_from_a_changing_value() -> None:
     assert not counted([EVIDENCE, REPLY, EVIDENCE, OTHER, EVIDENCE, OTHER]).two_drives
     assert counted([EVIDENCE, REPLY, (OTHER, STRAY), EVIDENCE, REPLY, (OTHER, STRAY)]).two_drives
     turned = Measure(damaged=2, turns=2)
@@ -83,7 +83,7 @@ def test_two_drives_are_distinguished_from_a_value_that_changes() -> None:
     assert not Measure(turns=2).two_drives
 
 
-def test_a_copy_during_the_next_request_is_no_second_drive() -> None:
+def test_copy_during_the_next_request_is_not_a_second_drive() -> None:
     """Taken for the reply to another setting, it leaves that one's own reply over."""
     first, second = read_of(1), read_of(2)
     values = {first: REPLY, second: OTHER}
@@ -118,7 +118,7 @@ def test_a_copy_during_the_next_request_is_no_second_drive() -> None:
         ([EVIDENCE, *[b"\0"] * 20, WIDE, (REPLY, OLD), LONG], {"behind": 0}),
     ],
 )  # fmt: skip
-def test_an_older_reply_is_counted_by_what_else_came(
+def test_older_reply_is_classified_by_the_other_replies(
     steps: list[Step], counts: Mapping[str, int]
 ) -> None:
     found = counted(steps)
@@ -127,7 +127,7 @@ def test_an_older_reply_is_counted_by_what_else_came(
 
 
 @pytest.mark.parametrize(("after", "kind"), [(0.05, "behind"), (0.3, "late")])
-def test_one_behind_is_at_once_and_a_late_reply_is_not(after: float, kind: str) -> None:
+def test_reply_one_behind_is_immediate_unlike_a_late_one(after: float, kind: str) -> None:
     frames = [Frame(0, "out", EVIDENCE), Frame(1, "out", WIDE), Frame(1 + after, "in", REPLY, OLD)]
     found = measure_of(frames, 2)
     assert {text: found.count(text) for text in ("behind", "late")} == {
@@ -142,14 +142,14 @@ def test_replies_of_other_polled_drives_are_not_foreign() -> None:
     assert counted([other, frame(7, REPLY[1:-2]), EVIDENCE, frame(7, REPLY[1:-2])]).foreign == 0
 
 
-def test_a_gateway_that_misses_the_drive_is_counted() -> None:
+def test_gateway_exceptions_are_counted() -> None:
     refused = frame(2, bytes([0x83, 11]))
     frames = [Frame(0, "out", EVIDENCE), Frame(0.1, "in", refused)]
     assert measure_of(frames, 2, unreached={10, 11}).worst == "unreached"
     assert measure_of(frames, 2).answered == 1
 
 
-def test_a_missing_reply_of_a_slow_drive_is_late() -> None:
+def test_missing_reply_of_a_slow_drive_counts_as_late() -> None:
     frames = [Frame(0, "out", EVIDENCE), Frame(0.6, "in", REPLY), Frame(1, "out", EVIDENCE)]
     assert (measure_of(frames, 2).late, measure_of(frames, 2).lost) == (1, 0)
 
@@ -177,7 +177,7 @@ async def found_on(line: Line, family: str | None = "atv71", reads: int = 80) ->
     return diagnosed(await examine_line(line, 2, profile, reads=reads))
 
 
-async def test_nothing_is_sent_while_another_master_is_heard() -> None:
+async def test_nothing_is_sent_while_another_master_is_active() -> None:
     with opened({"master": 0.1}, "rtu-tcp") as line:
         found = await found_on(line)
         assert found.rung == "other-master"
@@ -185,7 +185,7 @@ async def test_nothing_is_sent_while_another_master_is_heard() -> None:
         assert any("address 2" in step for step in found.steps)
 
 
-async def test_swapped_bytes_are_found_and_straight_ones_are_not() -> None:
+async def test_only_swapped_bytes_are_reported() -> None:
     with opened({"swapped": 1}, "tcp") as line:
         assert (await found_on(line)).rung == "swapped"
     with opened({}, "tcp") as line:
@@ -196,7 +196,7 @@ async def test_swapped_bytes_are_found_and_straight_ones_are_not() -> None:
 
 
 @pytest.mark.parametrize(("scheme", "served"), [("tcp", "rtu-tcp"), ("rtu-tcp", "tcp")])
-async def test_the_other_protocol_is_tried(scheme: str, served: str) -> None:
+async def test_other_protocol_is_tried(scheme: str, served: str) -> None:
     with opened({}, scheme, served) as line:
         found = await found_on(line)
         assert found.rung == "wrong-protocol"
@@ -204,7 +204,7 @@ async def test_the_other_protocol_is_tried(scheme: str, served: str) -> None:
 
 
 @pytest.mark.parametrize("unit", [255, 0])
-async def test_the_only_unit_of_a_gateway_is_found(unit: int) -> None:
+async def test_only_unit_of_a_gateway_is_found(unit: int) -> None:
     with opened({"only-unit": unit}, "tcp") as line:
         found = await found_on(line)
     assert (found.rung, f"unit {unit}," in found.text) == ("other-unit", True)
@@ -213,7 +213,7 @@ async def test_the_only_unit_of_a_gateway_is_found(unit: int) -> None:
     assert opens[1] == str(unit), "the line that works"
 
 
-async def test_no_connection_is_made_beside_a_line_that_answers(
+async def test_answering_line_gets_no_second_connection(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Many gateways take one client: a second one ends the connection of the line."""
@@ -230,7 +230,7 @@ async def test_no_connection_is_made_beside_a_line_that_answers(
         assert (found.rung, beside) == ("silence", [])
 
 
-async def test_an_idle_timeout_is_found() -> None:
+async def test_idle_timeout_is_found() -> None:
     with opened({"idle-close": 1}, "tcp") as line:
         assert (await found_on(line)).rung == "idle-close"
 
@@ -258,7 +258,7 @@ def test_clean_reads_are_fewer_only_after_a_minute_without_trouble() -> None:
 
 
 @pytest.mark.parametrize("trouble", ["corrupted", "duplicated"])
-async def test_one_sick_reply_keeps_the_reads_going(trouble: str) -> None:
+async def test_one_bad_reply_continues_the_reads(trouble: str) -> None:
     with opened({trouble: 0.02}, "rtu-tcp", seed=3) as line:
         measure = (await found_on(line, reads=200)).sight.measure
         assert measure is not None
@@ -266,19 +266,19 @@ async def test_one_sick_reply_keeps_the_reads_going(trouble: str) -> None:
         assert measure.requested > 149
 
 
-async def test_well_gateway_names_the_idle_time_that_was_tried() -> None:
+async def test_healthy_gateway_reports_the_idle_time_tested() -> None:
     with opened({"idle-close": 30}, "tcp") as line:
         found = await found_on(line)
     assert found.well
     assert "for 3 s without a request" in found.text
 
 
-async def test_each_second_request_lost_is_not_well() -> None:
+async def test_loss_of_each_second_request_is_not_healthy() -> None:
     with opened({"lost-every": 2}, "rtu-tcp") as line:
         assert (await found_on(line, reads=12)).rung == "lost"
 
 
-async def test_two_drives_are_not_named_as_one_behind() -> None:
+async def test_two_drives_are_not_reported_as_one_behind() -> None:
     with opened({"twin": 1}, "rtu-tcp", seed=8) as line:
         assert (await found_on(line, None)).rung == "two-drives"
 
@@ -291,7 +291,7 @@ def test_surplus_replies_contradict_a_line_one_behind(second: int, rung: str) ->
     assert diagnosed(sight).rung == rung
 
 
-async def test_a_line_one_behind_is_named() -> None:
+async def test_line_one_behind_is_reported() -> None:
     with opened({"behind": 1}, "rtu-tcp") as line:
         assert (await found_on(line, None, 12)).rung == "behind"
 

@@ -101,7 +101,7 @@ async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
         ({"ACC": 70000}, ValueRefused, "does not fit|out of range"),
     ],
 )
-async def test_an_exchange_that_is_refused_here(
+async def test_invalid_exchange_is_refused_before_sending(
     wanted: Mapping[str, int], error: type[Exception], says: str
 ) -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
@@ -111,7 +111,7 @@ async def test_an_exchange_that_is_refused_here(
         assert sent(here, 23) == []
 
 
-async def test_an_exchange_needs_arming_and_the_interlocks_of_an_order() -> None:
+async def test_exchange_needs_arming_and_the_interlocks_of_a_command() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
         with pytest.raises(AssignmentRefused, match="Not armed"):
@@ -146,7 +146,7 @@ async def test_outputs_moved_during_an_exchange_are_reported() -> None:
             await exchange(here, outputs, {"ACC": 40}, inputs)
 
 
-async def test_only_what_was_named_is_written() -> None:
+async def test_only_named_values_are_written() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
         done = await exchange(here, outputs, {"ACC": 45, "DEC": 55}, inputs)
@@ -158,7 +158,7 @@ async def test_only_what_was_named_is_written() -> None:
         assert reported == {("ACC", "4.5 s"), ("DEC", "5.5 s")}
 
 
-async def test_value_between_two_named_ones_is_kept() -> None:
+async def test_value_between_two_named_values_is_kept() -> None:
     with bench("atv71", sets={"CHCF": 1, "LSP": 41}) as here:
         _, outputs = await both(here)
         assert reach(here.profile, outputs, ["ACC", "HSP"]) == range(2, 5)
@@ -168,7 +168,7 @@ async def test_value_between_two_named_ones_is_kept() -> None:
         assert sent(here, 16)[-1].endswith("31db00030601c20029002d")
 
 
-async def test_a_start_is_on_record_before_its_frame_and_counts_from_it_on(
+async def test_start_is_recorded_before_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A look at the rest before the frame must not end the record."""
@@ -191,7 +191,7 @@ async def test_a_start_is_on_record_before_its_frame_and_counts_from_it_on(
         keeper.close()
 
 
-async def test_nothing_named_is_nothing_written() -> None:
+async def test_exchange_without_values_writes_nothing() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         with pytest.raises(AssignmentRefused, match="no output was named"):
@@ -199,7 +199,7 @@ async def test_nothing_named_is_nothing_written() -> None:
         assert sent(here, 16) == []
 
 
-async def test_a_value_that_the_drive_does_not_keep_is_reported() -> None:
+async def test_value_not_kept_by_the_drive_is_reported() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         honest = here.session.line.write
@@ -215,7 +215,7 @@ async def test_a_value_that_the_drive_does_not_keep_is_reported() -> None:
         assert here.journal.recent[-1].answer == "holds another value"
 
 
-async def test_a_read_only_line_exchanges_nothing() -> None:
+async def test_read_only_line_exchanges_nothing() -> None:
     with bench("atv71", read_only=True) as here:
         outputs = plan_of(here, "write", ["ACC"])
         with pytest.raises(RequestRefused):
@@ -228,7 +228,7 @@ EXAMPLE_21 = {"F870": 1, "F871": 3}
 """Command word 1 and frequency reference, as in manual 7.8."""
 
 
-async def test_the_manuals_two_words_through_the_write_block() -> None:
+async def test_two_words_of_the_manual_are_written_through_the_write_block() -> None:
     with bench("atv21", sets=EXAMPLE_21) as here:
         outputs = plan_of(here, "write", ["FA00", "FA01"])
         wanted = {"FA00": 0xC400, "FA01": 6000}
@@ -241,7 +241,7 @@ async def test_the_manuals_two_words_through_the_write_block() -> None:
         assert here.drive.raw("FA01") == 6000
 
 
-async def test_one_named_word_of_the_write_block_brings_the_other_along() -> None:
+async def test_one_named_word_of_the_write_block_writes_both() -> None:
     with bench("atv21", sets=EXAMPLE_21) as here:
         here.drive.set("FA00", 0x8000)
         outputs = plan_of(here, "write", ["FA00", "FA01"])
@@ -249,7 +249,7 @@ async def test_one_named_word_of_the_write_block_brings_the_other_along() -> Non
         assert sent(here, 16) == ["011018700002048000" + "0bb8"]
 
 
-async def test_a_write_block_that_stands_for_something_else_is_found_out() -> None:
+async def test_remapped_write_block_is_detected() -> None:
     with bench("atv21", sets={"F870": 4, "F871": 5}) as here:
         for slot, raw in {"F870": 4, "F871": 3}.items():
             address = here.profile[slot].address
@@ -305,7 +305,7 @@ async def settled(block_editor: BlockEditor) -> str:
     raise AssertionError("it does not end")
 
 
-async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
+async def test_stop_ends_an_exchange_before_its_words_are_sent() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         await both(here)
         monitor = Monitor(here.session)
@@ -327,7 +327,7 @@ async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
         monitor.stop()
 
 
-async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None:
+async def test_stop_ends_the_writing_of_slots_and_later_commands() -> None:
     with bench("atv71") as here:
         monitor = Monitor(here.session)
         monitor.start(period=0.1)
@@ -403,7 +403,7 @@ async def test_nothing_written_reports_nothing_remaining() -> None:
             assert here.writes() == []
 
 
-async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
+async def test_partly_written_slots_still_wait_for_a_reset() -> None:
     with bench("atv21", sets=EXAMPLE_21) as here:
         monitor = Monitor(here.session)
         monitor.start(period=0.1)
@@ -436,7 +436,7 @@ def intended_of(
     return intended(here.profile, 1, outputs, inputs, {"INR": 1, "LFRD": 900}, text)
 
 
-def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
+def test_values_and_frame_are_shown_before_sending() -> None:
     with bench("atv71") as here:
         inputs, outputs = plan_of(here, "read", EXAMPLE_IN), plan_of(here, "write", EXAMPLE_OUT)
         reported = intended_of(here, outputs, "cmd=16#000F hsp=45", inputs)
@@ -450,7 +450,7 @@ def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
         )
 
 
-def test_a_value_whose_scale_is_not_known_is_reported_raw() -> None:
+def test_value_with_an_unknown_scale_is_shown_raw() -> None:
     with bench("atv71") as here:
         outputs = plan_of(here, "write", EXAMPLE_OUT)
         reported = intended(here.profile, 1, outputs, None, {"LFRD": 900}, "acc=16#0032")
@@ -475,7 +475,7 @@ def test_impossible_output_is_reported(text: str, says: str) -> None:
         intended_of(here, plan_of(here, "write", EXAMPLE_OUT), text)
 
 
-def test_slots_that_wait_for_a_reset_are_not_written_through() -> None:
+def test_slots_waiting_for_a_reset_are_not_used_for_writing() -> None:
     with bench("atv21") as here:
         outputs = plan_of(here, "write", ["FA00", "FA01"])
         with pytest.raises(MappingError, match="Not in effect yet: F871"):

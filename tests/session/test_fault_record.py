@@ -22,7 +22,7 @@ def speed(made: Bench) -> float:
     return reading_of(made.console.latest.readings["RFR"]).number or 0.0
 
 
-async def test_a_trip_freezes_values_and_writes_of_the_seconds_before() -> None:
+async def test_trip_records_values_and_writes_of_the_preceding_seconds() -> None:
     async with bench("atv71") as made:
         recorder = watched(made)
         made.commander.refer("10Hz")
@@ -54,7 +54,7 @@ async def test_a_trip_freezes_values_and_writes_of_the_seconds_before() -> None:
         assert recorder.seen
 
 
-async def test_a_drive_found_in_fault_has_not_tripped_now() -> None:
+async def test_drive_found_in_fault_is_not_recorded_as_a_trip() -> None:
     async with bench("atv71", armed=False) as made:
         made.drive.provoke("ObF")
         monitor = made.console.monitor
@@ -66,7 +66,7 @@ async def test_a_drive_found_in_fault_has_not_tripped_now() -> None:
         assert recorder.seen
 
 
-async def test_the_record_as_a_text() -> None:
+async def test_fault_record_is_formatted_as_text() -> None:
     async with bench("atv21") as made:
         recorder = watched(made)
         await made.order("forward")
@@ -87,7 +87,7 @@ async def test_the_record_as_a_text() -> None:
         assert record_name(session, recorder.latest).endswith("-E.md")
 
 
-async def test_a_fault_that_is_read_after_the_state_comes_into_the_record() -> None:
+async def test_fault_read_after_the_state_is_in_the_record() -> None:
     async with bench("atv71") as made:
         monitor = made.console.monitor
         await made.until(lambda: monitor.latest is not None and not monitor.latest.error)

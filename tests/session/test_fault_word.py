@@ -80,7 +80,7 @@ def access(line: OwnDrive, profile: Profile | None = None) -> CommandAccess:
 
 
 @pytest.mark.parametrize("status", [READY, RUNNING, 0])
-async def test_a_fault_word_is_a_fault_whatever_the_status_word(status: int) -> None:
+async def test_fault_word_means_a_fault_whatever_the_status_word(status: int) -> None:
     made = access(OwnDrive(held(status, 5)))
     profile = made.session.profile
     state = drive_state(profile, await Reader(made.session).read(watched_codes(profile)))
@@ -91,14 +91,14 @@ async def test_a_fault_word_is_a_fault_whatever_the_status_word(status: int) -> 
 
 
 @pytest.mark.parametrize(("faults", "trip"), [({"shows_last": True}, 5), ({"none": 9}, 9), ({}, 0)])
-async def test_the_last_fault_and_none_are_no_faults(faults: dict[str, object], trip: int) -> None:
+async def test_last_fault_and_no_fault_are_not_faults(faults: dict[str, object], trip: int) -> None:
     made = access(OwnDrive(held(READY, trip)), own(**faults))
     readings = await Reader(made.session).read(["STAT", "TRIP"])
     state = drive_state(made.session.profile, readings)
     assert (state.kind, state.fault) == ("ready", None)
 
 
-async def test_a_tripped_drive_is_not_run_and_can_be_reset() -> None:
+async def test_tripped_drive_cannot_run_but_can_be_reset() -> None:
     line = OwnDrive(held(READY, 5))
     made = access(line)
     with pytest.raises(OrderRefused, match="in fault: reset it first"):
@@ -108,7 +108,7 @@ async def test_a_tripped_drive_is_not_run_and_can_be_reset() -> None:
     assert await give_order(made, "forward") == "Run: Running"
 
 
-def test_status_and_run_refuse_alike() -> None:
+def test_status_and_run_report_the_same_refusal() -> None:
     profile = own()
     chart = profile.data.charts[0]
     assert state_refusal(profile, chart, "forward", {"STAT": READY, "TRIP": 5}) == IN_FAULT
@@ -121,7 +121,7 @@ def test_status_and_run_refuse_alike() -> None:
     assert state_refusal(atv21, chart, "forward", {"FD01": 0x4000, "FC90": 24}) == IN_FAULT
 
 
-async def test_a_fault_word_stops_no_motor() -> None:
+async def test_fault_word_does_not_block_a_stop() -> None:
     """What needs standstill goes by the status word where that says that the motor is enabled."""
     made = access(OwnDrive(held(RUNNING, 5)))
     session = made.session
@@ -130,7 +130,7 @@ async def test_a_fault_word_stops_no_motor() -> None:
     assert session.rest_seen == -math.inf, "no rest was seen"
 
 
-async def test_a_fault_that_was_read_long_ago_is_not_that_of_now() -> None:
+async def test_fault_read_long_ago_is_not_current() -> None:
     line, clock = OwnDrive(held(READY, 5)), FakeClock()
     session = DriveSession(line, 1, own(), clock=clock)
     await Reader(session).read(["STAT", "TRIP"], priority=Priority.POLL)
@@ -140,7 +140,7 @@ async def test_a_fault_that_was_read_long_ago_is_not_that_of_now() -> None:
     assert session.state(STATE_FRESH).kind == "ready"
 
 
-def test_it_is_read_as_often_as_the_state_that_it_tells() -> None:
+def test_fault_word_is_read_as_often_as_the_state() -> None:
     rates = rates_of(own())
     assert "TRIP" in rates.fast
     assert "TRIP" not in rates_of(own(shows_last=True)).fast

@@ -30,7 +30,7 @@ async def found(line: FakeLine, probes: tuple[PresenceProbe, ...] = PROBES) -> S
     )
 
 
-async def test_nobody_is_requested_by_one_read() -> None:
+async def test_silent_address_costs_one_read() -> None:
     line = FakeLine()
     with pytest.raises(NoAnswer):
         await found(line)
@@ -80,7 +80,7 @@ async def test_drive_that_only_refuses_is_present_and_unknown() -> None:
     assert (result.identity.candidates, result.by) == ((), "")
 
 
-async def test_families_at_several_words_are_still_pollede_after_the_other() -> None:
+async def test_families_with_different_probes_are_probed_in_turn() -> None:
     line = FakeLine({1: {7: 0}})
     line.fail_identify(1, 1)
     result = await found(line, (*PROBES, PresenceProbe(7, ("mine",))))
@@ -88,7 +88,7 @@ async def test_families_at_several_words_are_still_pollede_after_the_other() -> 
     assert result.identity.candidates == ("mine",)
 
 
-async def test_function_43_finds_drive_without_sure_refusal() -> None:
+async def test_function_43_finds_a_drive_that_refuses_no_probe() -> None:
     line = FakeLine({1: {}})
     line.devices[1].identity = {1: b"ATV71HU15M3"}
     line.fail_read(1, None, NoAnswer(1, 3, STATUS))
@@ -164,7 +164,7 @@ class Damaging(FakeLine):
         return await super().identify(device, **how)
 
 
-async def test_silence_on_a_line_that_damages_frames_infers_no_family() -> None:
+async def test_silence_on_a_damaging_line_infers_no_family() -> None:
     line = Damaging({1: {STATUS: 0}})
     line.fail_identify(1, LOST)
     result = await found(line)
@@ -173,7 +173,7 @@ async def test_silence_on_a_line_that_damages_frames_infers_no_family() -> None:
     assert "No identification of device 1 came through" in result.error
 
 
-async def test_damaged_reply_to_the_first_read_shows_that_somebody_is_there() -> None:
+async def test_damaged_reply_to_the_first_read_shows_a_drive() -> None:
     line = altivar_with_every_word()
     line.fail_read(1, STATUS, ChecksumFault(1, 3, STATUS))
     result = await found(line)
@@ -195,7 +195,7 @@ async def test_identification_of_one_drive_fails_after_three_damaged_replies(
     assert (await identify_drive(line, 1)).profile == "atv71"
 
 
-async def test_operator_request_to_a_family_without_function_43_gets_the_likely_ones() -> None:
+async def test_family_without_function_43_has_likely_candidates() -> None:
     line = FakeLine({1: {STATUS: 0}})
     line.fail_identify(1, LOST)
     assert set((await identify_drive(line, 1)).candidates) >= {"powerdrive", "varmeca"}
@@ -211,7 +211,7 @@ async def test_silence_after_damage_identifies_nothing() -> None:
     "minute",
     [LastMinute(damaged=1), LastMinute(foreign=1), LastMinute(strays=1), LastMinute(lost=1)],
 )
-async def test_silence_after_a_sick_minute_infers_no_family(minute: LastMinute) -> None:
+async def test_silence_after_a_minute_with_errors_infers_no_family(minute: LastMinute) -> None:
     line = FakeLine({1: {STATUS: 0}})
     line.counters = LineCounters(minute=minute)
     line.fail_identify(1, LOST)

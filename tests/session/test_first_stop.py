@@ -41,7 +41,7 @@ def frames(line: Line) -> list[bytes]:
         ("atv21", "atv71"),
     ],
 )
-async def test_it_stops_each_family_before_that_was_requested_what_it_is(
+async def test_first_stop_stops_each_family_before_identification(
     start: Start, journal: Journal, family: str, named: str
 ) -> None:
     simulation, line = start(running(family))
@@ -76,9 +76,7 @@ async def test_a_ramp_stop_of_the_family_named_does_not_start_another(
     await wait_for(lambda: drive.motor.frequency == 0)
 
 
-async def test_it_is_in_the_journal_with_what_was_reported_to_it(
-    start: Start, journal: Journal
-) -> None:
+async def test_first_stop_is_in_the_journal(start: Start, journal: Journal) -> None:
     _, line = start(running("atv31"))
     await first(line, journal)
     (entry,) = journal.recent
@@ -90,7 +88,7 @@ def silence(simulation: Simulation) -> None:
     simulation.faults.rates = FaultRates(lost=1.0)
 
 
-async def test_nothing_is_sent_blind_to_who_was_not_named(start: Start, journal: Journal) -> None:
+async def test_no_blind_word_is_sent_without_a_named_family(start: Start, journal: Journal) -> None:
     simulation, line = start(running("atv71"))
     silence(simulation)
     sent = await first(line, journal)
@@ -112,7 +110,7 @@ async def test_named_drive_is_stopped_by_a_word_that_starts_no_other(
     await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
 
 
-async def test_nothing_goes_to_a_place_that_the_drive_does_not_have(
+async def test_first_stop_uses_no_register_the_drive_does_not_have(
     start: Start, journal: Journal
 ) -> None:
     _, line = start(running("atv21"))

@@ -101,7 +101,7 @@ async def bench(start: Start, journal: Journal) -> AsyncIterator[Make]:
         await gateway.close()
 
 
-async def test_reads_pass_and_a_drive_that_is_not_there_is_exception_11(bench: Make) -> None:
+async def test_reads_pass_and_an_absent_drive_is_exception_11(bench: Make) -> None:
     made = bench()
     drive = made.simulation.drive(1)
     assert await made.read(ACC, 2) == (drive.raw("ACC"), drive.raw("DEC"))
@@ -111,7 +111,7 @@ async def test_reads_pass_and_a_drive_that_is_not_there_is_exception_11(bench: M
     assert made.written() == []
 
 
-async def test_a_drive_that_is_not_there_does_not_take_the_line(bench: Make) -> None:
+async def test_absent_drive_does_not_block_the_line(bench: Make) -> None:
     made = bench()
     for _ in range(20):
         assert await made.read(ACC, unit=9) == 11
@@ -119,7 +119,7 @@ async def test_a_drive_that_is_not_there_does_not_take_the_line(bench: Make) -> 
     assert len(requested) < 4
 
 
-async def test_a_stop_while_the_drive_is_requested_who_it_is_voids_the_command(bench: Make) -> None:
+async def test_stop_during_identification_cancels_the_command(bench: Make) -> None:
     made = bench(commands=True)
     under_way = asyncio.create_task(made.write(LFR, 300))
     await asyncio.sleep(0)
@@ -129,7 +129,7 @@ async def test_a_stop_while_the_drive_is_requested_who_it_is_voids_the_command(b
     assert await made.write(LFR, 300) == 0
 
 
-async def test_nothing_is_written_unless_it_was_allowed(bench: Make) -> None:
+async def test_only_allowed_codes_are_written(bench: Make) -> None:
     made = bench()
     before = made.simulation.drive(1).raw("ACC")
     assert await made.write(ACC, before + 5) == 1
@@ -141,7 +141,7 @@ async def test_nothing_is_written_unless_it_was_allowed(bench: Make) -> None:
     assert made.journal.recent == ()
 
 
-async def test_a_setting_that_is_allowed_is_written_and_in_the_journal(bench: Make) -> None:
+async def test_allowed_setting_is_written_and_journaled(bench: Make) -> None:
     made = bench(writes=allowed_codes("ACC"))
     before = made.simulation.drive(1).raw("ACC")
     assert await made.write(ACC, 57) == 0
@@ -173,14 +173,14 @@ async def test_write_cut_by_end_of_serve_is_not_recorded_as_done(
     assert (entry.code, entry.answer) == ("ACC", ENDED_BEFORE_ANSWER)
 
 
-def test_codes_are_those_of_a_family_in_any_case() -> None:
+def test_codes_are_accepted_in_any_case() -> None:
     assert as_written(allowed_codes("acc, ALL")) == {"ACC", "all"}
     assert as_written(allowed_codes("f803")) == {"F803"}
     with pytest.raises(RulesError, match="No family has a parameter NOPE, nor"):
         as_written(allowed_codes("ACC,nor,NOPE"))
 
 
-async def test_all_is_no_command(bench: Make) -> None:
+async def test_allow_all_excludes_commands(bench: Make) -> None:
     made = bench(writes=allowed_codes("all"))
     assert await made.write(CMD, 0x000F) == 1
     assert await made.write(LFR, 300) == 1
@@ -189,7 +189,7 @@ async def test_all_is_no_command(bench: Make) -> None:
     assert made.written() == []
 
 
-async def test_a_stop_word_passes_without_any_leave_and_voids_what_waits(bench: Make) -> None:
+async def test_stop_word_needs_no_permission_and_cancels_pending_writes(bench: Make) -> None:
     made = bench()
     made.simulation.drive(1).run(30.0)
     stops = made.line.facts.stops.stamp(1)
@@ -201,7 +201,7 @@ async def test_a_stop_word_passes_without_any_leave_and_voids_what_waits(bench: 
     assert entry.why.startswith("stop of Modbus TCP")
 
 
-async def test_a_stop_word_passes_while_a_panel_commands_and_a_run_word_does_not(
+async def test_stop_word_passes_while_a_panel_commands_but_a_run_word_does_not(
     bench: Make,
 ) -> None:
     made = bench(commands=True)
@@ -215,7 +215,7 @@ async def test_a_stop_word_passes_while_a_panel_commands_and_a_run_word_does_not
     assert made.written() == [(CMD, 0x0007)]
 
 
-async def test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them(
+async def test_stop_overtakes_and_cancels_writes_of_its_connection(
     bench: Make,
 ) -> None:
     """They may wait for a drive that is silent for many seconds."""
@@ -241,7 +241,7 @@ async def test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them(
     assert made.written() == [(ACC, 57), (CMD, 0x0007), (LFR, 200)]
 
 
-async def test_a_word_that_stops_by_what_was_set_before_it_waits_for_that(bench: Make) -> None:
+async def test_stop_word_that_depends_on_an_earlier_write_waits_for_it(bench: Make) -> None:
     """16#0007 stops in one profile of commands, and runs the motor in another."""
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}), writes=allowed_codes("CHCF"))
     silent = asyncio.Event()
@@ -266,21 +266,21 @@ async def test_a_word_that_stops_by_what_was_set_before_it_waits_for_that(bench:
     assert [(await task)[:2].hex() for task in tasks] == ["0620", "8601"]
 
 
-async def test_a_stop_among_words_that_are_not_allowed_goes_out_alone(bench: Make) -> None:
+async def test_stop_among_forbidden_words_is_sent_alone(bench: Make) -> None:
     """Controllers write command and reference together."""
     made = bench()
     assert await made.write(CMD, 0x0007, 0) == 1
     assert made.written() == [(CMD, 0x0007)]
 
 
-async def test_in_the_io_profile_the_stop_word_of_the_other_does_not_pass(bench: Make) -> None:
+async def test_drivecom_stop_word_does_not_pass_in_the_io_profile(bench: Make) -> None:
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
     assert await made.write(CMD, 0x0007) == 1
     assert made.written() == []
     assert await made.write(CMD, 0x0000) == 0
 
 
-async def test_commands_that_are_allowed_run_the_motor_and_claim_it(bench: Make) -> None:
+async def test_allowed_commands_run_and_claim_the_motor(bench: Make) -> None:
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
     drive = made.simulation.drive(1)
     facts = made.line.facts
@@ -305,7 +305,7 @@ def recorded() -> int:
     return len(list(Path(os.environ["DRIVEPANEL_STATE"], "starts").iterdir()))
 
 
-async def test_a_motor_that_a_client_started_is_on_record_until_it_stands(bench: Make) -> None:
+async def test_motor_started_by_a_client_is_recorded_until_standstill(bench: Make) -> None:
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
     await start_motor(made)
     assert recorded() == 1
@@ -314,7 +314,7 @@ async def test_a_motor_that_a_client_started_is_on_record_until_it_stands(bench:
     assert made.simulation.drive(1).motor.frequency == 0
 
 
-async def test_the_end_of_the_gateway_stops_what_its_clients_started(bench: Make) -> None:
+async def test_gateway_stops_motors_of_its_clients_at_its_end(bench: Make) -> None:
     made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
     await start_motor(made)
     (reported,) = await made.gateway.close()
@@ -323,7 +323,7 @@ async def test_the_end_of_the_gateway_stops_what_its_clients_started(bench: Make
     assert made.simulation.drive(1).fault is None
 
 
-async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Make) -> None:
+async def test_repeated_run_word_does_not_undo_a_stop(bench: Make) -> None:
     """A controller that writes its word every second would start the motor again."""
     made = bench(commands=True)
     assert await made.write(LFR, 300) == 0
@@ -337,7 +337,7 @@ async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Ma
     assert await made.write(LFR, 100) == 0
 
 
-async def test_a_client_that_is_gone_commands_nothing_and_all_are_reported(bench: Make) -> None:
+async def test_disconnected_client_commands_nothing_and_is_reported(bench: Make) -> None:
     made = bench(commands=True)
     output: list[str] = []
     on_event(made.line.facts, NoticeReceived, lambda event: output.append(event.text))
@@ -347,7 +347,7 @@ async def test_a_client_that_is_gone_commands_nothing_and_all_are_reported(bench
     assert "10.0.0.9:5000, which commanded this drive, has disconnected" in output[0]
 
 
-async def test_a_command_of_a_client_that_is_gone_is_not_sent_and_its_stop_is(
+async def test_stop_of_a_disconnected_client_is_sent_but_no_command(
     bench: Make,
 ) -> None:
     """Nobody would stop the motor: it waited behind another write, or for the drive."""
@@ -361,7 +361,7 @@ async def test_a_command_of_a_client_that_is_gone_is_not_sent_and_its_stop_is(
     assert await made.write(ACC, 57) == 0
 
 
-async def test_a_client_that_goes_while_its_start_is_put_on_record_starts_nothing(
+async def test_client_that_disconnects_during_recording_starts_nothing(
     bench: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = bench(commands=True)
@@ -377,7 +377,7 @@ async def test_a_client_that_goes_while_its_start_is_put_on_record_starts_nothin
     assert made.written() == [(LFR, 300)]
 
 
-async def test_requests_from_a_suspension_only_stop(bench: Make) -> None:
+async def test_requests_queued_during_a_suspension_can_only_stop(bench: Make) -> None:
     """A client that has given up long ago would have its motor started."""
     made = bench(commands=True, writes=allowed_codes("ACC"))
 
@@ -391,7 +391,7 @@ async def test_requests_from_a_suspension_only_stop(bench: Make) -> None:
     assert (await late(CMD, 0x0007))[0] == 6
 
 
-async def test_a_second_client_that_commands_the_drive_is_reported(bench: Make) -> None:
+async def test_second_client_that_commands_the_drive_is_reported(bench: Make) -> None:
     made = bench(commands=True)
     output: list[str] = []
     on_event(made.line.facts, NoticeReceived, lambda event: output.append(event.text))
@@ -404,7 +404,7 @@ async def test_a_second_client_that_commands_the_drive_is_reported(bench: Make) 
     assert "10.0.0.10:5000 commands this drive now, as client 10.0.0.9:5000 did" in text
 
 
-async def test_a_client_that_repeats_its_run_word_does_not_undo_the_stop_of_another(
+async def test_repeated_run_word_does_not_undo_a_stop_of_another_client(
     bench: Make,
 ) -> None:
     made = bench(commands=True)
@@ -429,7 +429,7 @@ async def test_a_client_that_repeats_its_run_word_does_not_undo_the_stop_of_anot
     assert await made.write(LFR, 120) == 0
 
 
-async def test_a_drive_without_a_profile_is_only_read(bench: Make) -> None:
+async def test_drive_without_a_profile_is_only_read(bench: Make) -> None:
     leroy = DriveSpec("powerdrive", 1)
     made = bench(leroy, writes=allowed_codes("all"), commands=True)
     assert isinstance(await made.read(library.load("powerdrive")["10.40"].address), tuple)
@@ -438,7 +438,7 @@ async def test_a_drive_without_a_profile_is_only_read(bench: Make) -> None:
     assert made.written() == []
 
 
-async def test_a_nameless_drive_takes_the_word_that_stops_all_it_may_be(bench: Make) -> None:
+async def test_unidentified_drive_accepts_the_stop_word_of_all_candidates(bench: Make) -> None:
     made = bench(DriveSpec("powerdrive", 1))
     assert await made.write(641, 0) == 0
     assert made.written() == [(641, 0)]
@@ -446,14 +446,14 @@ async def test_a_nameless_drive_takes_the_word_that_stops_all_it_may_be(bench: M
     assert made.written() == [(641, 0)]
 
 
-async def test_a_profile_that_a_person_has_named_lets_its_stop_pass(bench: Make) -> None:
+async def test_named_profile_lets_its_stop_word_pass(bench: Make) -> None:
     made = bench(DriveSpec("powerdrive", 1), profiles={1: "powerdrive"})
     assert await made.write(641, 3) == 1
     assert await made.write(641, 0) == 0
     assert made.written() == [(641, 0)]
 
 
-async def test_a_profile_that_the_drive_contradicts_writes_nothing(bench: Make) -> None:
+async def test_contradicted_profile_writes_nothing(bench: Make) -> None:
     made = bench(writes=allowed_codes("all"), commands=True, profiles={1: "atv31"})
     assert await made.write(ACC, 57) == 1
     assert made.written() == []
@@ -469,7 +469,7 @@ async def test_recent_value_is_not_read_again(bench: Make) -> None:
     assert not [frame for frame in made.line.trace[count:] if frame.data[1] == 3]
 
 
-async def test_identification_and_functions_that_no_drive_has(bench: Make) -> None:
+async def test_identification_passes_and_unknown_functions_are_refused(bench: Make) -> None:
     made = bench(writes=allowed_codes("all"))
     answer = await made.ask(bytes.fromhex("2B0E0100"))
     assert answer[:2] == b"\x2b\x0e"
@@ -482,7 +482,7 @@ async def test_identification_and_functions_that_no_drive_has(bench: Make) -> No
 # Ids and codes
 
 
-def test_ids_of_several_lines() -> None:
+def test_unit_ids_cover_several_lines() -> None:
     units = unit_map(2, ["1-31=1", "101-131=2@1", "200=2@40"])
     assert units[1] == (0, 1)
     assert units[31] == (0, 31)
@@ -505,14 +505,14 @@ def test_ids_of_several_lines() -> None:
         (1, ["one=1"]),
     ],
 )
-def test_ids_that_make_no_sense_are_refused(lines: int, texts: list[str]) -> None:
+def test_invalid_unit_ids_are_refused(lines: int, texts: list[str]) -> None:
     with pytest.raises(RulesError):
         unit_map(lines, texts)
     with pytest.raises(RulesError):
         allowed_codes(" , ")
 
 
-async def test_a_broadcast_reaches_nobody(bench: Make) -> None:
+async def test_broadcast_is_not_forwarded(bench: Make) -> None:
     made = bench(writes=allowed_codes("all"), commands=True)
     assert await made.read(ETA, unit=1) != 10
     before = len(made.line.trace)
@@ -522,9 +522,7 @@ async def test_a_broadcast_reaches_nobody(bench: Make) -> None:
     assert len(made.line.trace) == before
 
 
-async def test_a_sign_of_life_is_that_of_the_client_that_commands(
-    start: Start, journal: Journal
-) -> None:
+async def test_heartbeat_follows_the_commanding_client(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 1}))
     gate = GatewayLine(line, journal)
     gateway = Gateway([gate], unit_map(1, ()), GatewayRules(commands=True))

@@ -8,7 +8,7 @@ from tui.bus.requests import Identify
 from tui.session.gateway.drives import GatewayDrives
 
 
-async def test_drive_identified_while_line_was_lost_is_identified_again() -> None:
+async def test_drive_is_identified_again_after_a_lost_line() -> None:
     line = FakeLine({1: {}})
     noted: list[int] = []
 

@@ -45,7 +45,7 @@ async def left_for(made: Bench, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_drive_stays_alive_after_stop_and_departure(bench: Make, family: str) -> None:
+async def test_drive_stays_alive_after_a_stop_and_a_disconnect(bench: Make, family: str) -> None:
     spec, register, word = FAMILIES[family]
     made = bench(spec, commands=True)
     assert await made.write(register, word) == 0
@@ -62,7 +62,7 @@ async def test_drive_stays_alive_after_a_run(bench: Make) -> None:
     assert fault(made) is None
 
 
-async def test_start_ends_keeping_its_drive_alive(bench: Make) -> None:
+async def test_start_ends_the_keep_alive(bench: Make) -> None:
     made = bench(ALTIVAR_71, commands=True)
     facts = made.line.facts
     assert await made.write(CMD, 0x0007) == 0
@@ -81,7 +81,7 @@ async def test_running_motor_is_not_kept_alive(bench: Make) -> None:
 
 
 @pytest.mark.parametrize("where", ["on record", "on the line"])
-async def test_refused_start_leaves_a_resting_drive_alive(
+async def test_refused_start_keeps_a_resting_drive_alive(
     bench: Make, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
     made = bench(ALTIVAR_71, commands=True)
@@ -98,7 +98,7 @@ async def test_refused_start_leaves_a_resting_drive_alive(
     assert fault(made) is None
 
 
-async def test_motor_that_another_source_starts_is_not_kept_alive(bench: Make) -> None:
+async def test_motor_started_by_another_source_is_not_kept_alive(bench: Make) -> None:
     made = bench(ALTIVAR_71, commands=True)
     assert await made.write(CMD, 0x0007) == 0
     await left_for(made, TIMEOUT)
@@ -106,7 +106,7 @@ async def test_motor_that_another_source_starts_is_not_kept_alive(bench: Make) -
     await wait_for(lambda: fault(made) is not None)
 
 
-async def test_motor_that_does_not_obey_its_stop_is_not_kept_alive(bench: Make) -> None:
+async def test_motor_that_ignores_its_stop_is_not_kept_alive(bench: Make) -> None:
     """The stop was answered, and another source runs the motor: the drive's timeout acts."""
     made = bench(ALTIVAR_71, commands=True)
     drive = made.simulation.drive(1)
@@ -116,7 +116,7 @@ async def test_motor_that_does_not_obey_its_stop_is_not_kept_alive(bench: Make) 
     await wait_for(lambda: fault(made) is not None)
 
 
-async def test_drive_that_has_not_answered_its_stop_is_not_kept_alive(
+async def test_drive_without_a_reply_to_its_stop_is_not_kept_alive(
     bench: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = bench(ALTIVAR_71, commands=True)

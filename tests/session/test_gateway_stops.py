@@ -82,14 +82,14 @@ async def wire(simulation: tuple[Simulation, Recording], journal: Journal) -> As
     line.close()
 
 
-async def test_stop_of_asking_client_is_next_request_on_wire(wire: Wire) -> None:
+async def test_stop_of_a_polling_client_is_sent_next(wire: Wire) -> None:
     await wire.known()
     before = len(wire.requests())
     assert await wire.ask(STOP) == STOP
     assert wire.requests()[before:] == [STOP]
 
 
-async def test_stop_passes_waiting_reads(wire: Wire) -> None:
+async def test_stop_overtakes_waiting_reads(wire: Wire) -> None:
     await wire.known()
     polls = [
         asyncio.create_task(wire.line.read(1, 3000 + number, priority=Priority.OPERATOR_READ))
@@ -102,7 +102,7 @@ async def test_stop_passes_waiting_reads(wire: Wire) -> None:
     await asyncio.gather(*polls, return_exceptions=True)
 
 
-async def test_read_of_client_passes_waiting_polls(wire: Wire) -> None:
+async def test_read_of_a_client_overtakes_waiting_polls(wire: Wire) -> None:
     await wire.known()
     polls = [asyncio.create_task(wire.line.read(1, 3000 + number)) for number in range(50)]
     await asyncio.sleep(0)
@@ -112,7 +112,7 @@ async def test_read_of_client_passes_waiting_polls(wire: Wire) -> None:
     await asyncio.gather(*polls, return_exceptions=True)
 
 
-async def test_polls_wait_for_next_read_of_client(
+async def test_polls_wait_for_the_next_read_of_a_client(
     wire: Wire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However long a busy machine takes for its way."""
@@ -146,7 +146,7 @@ async def test_stop_word_is_checked_after_write_of_another_program(wire: Wire) -
     assert STOP not in wire.requests(), "it runs the motor in this profile"
 
 
-async def test_chart_is_read_now_and_then_only(wire: Wire) -> None:
+async def test_chart_is_read_only_occasionally(wire: Wire) -> None:
     await wire.known()
     chart = struct.pack(">BHH", 3, CHCF, 1)
     begun, count = asyncio.get_running_loop().time(), wire.requests().count(chart)
@@ -156,7 +156,7 @@ async def test_chart_is_read_now_and_then_only(wire: Wire) -> None:
     assert wire.requests().count(chart) - count <= 1 + span / CHART_READ_EACH
 
 
-async def test_stops_of_one_host_do_not_hold_up_that_of_another(wire: Wire) -> None:
+async def test_stops_of_one_host_do_not_delay_another_host(wire: Wire) -> None:
     await wire.known()
     wire.client.host = "10.0.0.9"
     other = TcpClient(2, "10.0.0.8:5000", "10.0.0.8")
@@ -170,7 +170,7 @@ async def test_stops_of_one_host_do_not_hold_up_that_of_another(wire: Wire) -> N
     await asyncio.gather(*flood)
 
 
-async def test_stop_waits_for_no_read_before_another_stop() -> None:
+async def test_stop_does_not_wait_for_the_read_of_another_stop() -> None:
     """Each goes out as soon as its own read has come."""
     turns = HostTurns()
     order: list[tuple[str, int]] = []
@@ -197,7 +197,7 @@ async def test_stop_waits_for_no_read_before_another_stop() -> None:
     assert order == [("stop", 9), *pairs]
 
 
-async def test_flood_of_words_that_are_no_stop_leaves_line_to_polls_and_stops(wire: Wire) -> None:
+async def test_flood_of_other_words_leaves_time_for_polls_and_stops(wire: Wire) -> None:
     """What is read for each of them goes before polls only as long as few were in vain."""
     await wire.known()
     wire.client.host = "10.0.0.9"
@@ -220,7 +220,7 @@ async def test_flood_of_words_that_are_no_stop_leaves_line_to_polls_and_stops(wi
     assert halt not in wire.requests()
 
 
-async def test_like_stops_that_wait_are_sent_once(wire: Wire) -> None:
+async def test_equal_waiting_stops_are_sent_once(wire: Wire) -> None:
     await wire.known()
     before = len(wire.requests())
     answers = await asyncio.gather(*(wire.ask(STOP) for _ in range(50)))
@@ -228,7 +228,7 @@ async def test_like_stops_that_wait_are_sent_once(wire: Wire) -> None:
     assert wire.requests()[before:].count(STOP) <= 3
 
 
-async def test_reads_of_one_host_do_not_hold_up_those_of_another(wire: Wire) -> None:
+async def test_reads_of_one_host_do_not_delay_another_host(wire: Wire) -> None:
     await wire.known()
     wire.client.host = "10.0.0.9"
     other = TcpClient(2, "10.0.0.8:5000", "10.0.0.8")

@@ -153,7 +153,7 @@ async def bench() -> AsyncIterator[Bench]:
     await asyncio.to_thread(made.close)
 
 
-async def test_the_motors_of_a_killed_program_are_stopped_at_once_and_no_others(
+async def test_motors_of_a_killed_program_are_stopped_immediately(
     bench: Bench,
 ) -> None:
     bench.started(1)
@@ -169,7 +169,7 @@ async def test_the_motors_of_a_killed_program_are_stopped_at_once_and_no_others(
     assert bench.line.facts.stops.stamp(2) == 0
 
 
-async def test_the_motor_of_another_user_of_the_group_is_stopped(
+async def test_motor_of_another_user_of_the_group_is_stopped(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A service owns the line as a user of its own, and asks the drive on."""
@@ -187,7 +187,7 @@ async def test_the_motor_of_another_user_of_the_group_is_stopped(
     assert theirs.close(5.0)
 
 
-async def test_a_motor_that_should_run_on_runs_on(bench: Bench) -> None:
+async def test_motor_left_running_on_purpose_is_not_stopped(bench: Bench) -> None:
     bench.started(1, left_running=True)
     bench.guardian()
     bench.gone()
@@ -198,14 +198,14 @@ async def test_a_motor_that_should_run_on_runs_on(bench: Bench) -> None:
     assert bench.line.facts.stops.stamp(1) == 0
 
 
-async def test_a_program_that_ended_well_leaves_nothing_to_look_after(bench: Bench) -> None:
+async def test_program_that_exited_normally_leaves_no_motor_to_stop(bench: Bench) -> None:
     bench.guardian()
     bench.gone()
     await asyncio.sleep(0.3)
     assert bench.reported == []
 
 
-async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None:
+async def test_ending_process_is_awaited(bench: Bench) -> None:
     """Its socket closes before its number is free: its start would be a living program's."""
     bench.started(1)
     living = {"100"}
@@ -223,7 +223,7 @@ async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None
 @pytest.mark.parametrize(
     ("timeout", "grace"), [(None, TAKEN_OVER_WITHIN), (4.0, 4.0), (300.0, LONGEST_GRACE)]
 )
-async def test_a_person_has_the_drives_own_time_out_to_take_the_motor_over(
+async def test_person_has_the_drive_timeout_to_take_a_motor_over(
     bench: Bench, timeout: float | None, grace: float
 ) -> None:
     bench.started(1, timeout=timeout)
@@ -238,7 +238,7 @@ async def test_a_person_has_the_drives_own_time_out_to_take_the_motor_over(
     await bench.stopped(1)
 
 
-async def test_a_motor_that_was_taken_over_runs_on(bench: Bench) -> None:
+async def test_motor_taken_over_is_not_stopped(bench: Bench) -> None:
     bench.started(1)
     bench.guardian(person=True)
     bench.gone()
@@ -254,7 +254,7 @@ async def test_a_motor_that_was_taken_over_runs_on(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize(("other", "waits"), [(PANEL, True), (WATCH, False)])
-async def test_a_recorder_waits_for_the_person_of_an_attached_panel_only(
+async def test_recorder_waits_for_an_attached_panel_only(
     bench: Bench, other: Program, waits: bool
 ) -> None:
     facts = bench.line.facts
@@ -282,7 +282,7 @@ async def frozen(bench: Bench, *, person: bool = True, **started: bool) -> None:
     bench.clock.advance(ENDS_WITHIN + 0.1)
 
 
-async def test_the_motor_of_a_frozen_program_is_stopped_where_nobody_can_take_it_over(
+async def test_motor_of_a_frozen_program_is_stopped_without_a_panel(
     bench: Bench,
 ) -> None:
     await frozen(bench, person=False)
@@ -294,7 +294,7 @@ async def test_the_motor_of_a_frozen_program_is_stopped_where_nobody_can_take_it
     )
 
 
-async def test_a_person_has_the_drives_own_time_out_to_take_over_from_a_frozen_program(
+async def test_person_has_the_drive_timeout_to_take_over_from_a_frozen_program(
     bench: Bench,
 ) -> None:
     await frozen(bench)
@@ -314,7 +314,7 @@ async def test_a_person_has_the_drives_own_time_out_to_take_over_from_a_frozen_p
     assert "run (pid 900001) is no longer on the line" in bench.line.facts.stops.by[1]
 
 
-async def test_the_motor_of_a_program_that_comes_back_in_time_runs_on(bench: Bench) -> None:
+async def test_motor_of_a_program_that_recovers_in_time_runs(bench: Bench) -> None:
     await frozen(bench)
     await come(lambda: bench.says("unless it comes back"))
     bench.line.facts.set_programs((bench.line.facts.me, FROZEN))
@@ -324,7 +324,7 @@ async def test_the_motor_of_a_program_that_comes_back_in_time_runs_on(bench: Ben
     assert bench.line.facts.stops.stamp(1) == 0
 
 
-async def test_one_that_was_let_go_for_a_moment_only_is_not_reported(bench: Bench) -> None:
+async def test_program_disconnected_briefly_is_not_reported(bench: Bench) -> None:
     bench.started(1, pid=LIVING)
     bench.guardian()
     bench.gone(FROZEN)
@@ -336,7 +336,7 @@ async def test_one_that_was_let_go_for_a_moment_only_is_not_reported(bench: Benc
     assert bench.line.facts.stops.stamp(1) == 0
 
 
-async def test_the_motor_of_a_frozen_program_may_be_taken_over(bench: Bench) -> None:
+async def test_motor_of_a_frozen_program_may_be_taken_over(bench: Bench) -> None:
     await frozen(bench)
     await come(lambda: bench.says("unless it comes back"))
     # as an attached panel finds it
@@ -350,7 +350,7 @@ async def test_the_motor_of_a_frozen_program_may_be_taken_over(bench: Bench) -> 
     assert bench.line.facts.stops.stamp(1) == 0
 
 
-async def test_a_motor_that_a_frozen_program_means_to_leave_running_runs_on(bench: Bench) -> None:
+async def test_motor_a_frozen_program_leaves_running_is_not_stopped(bench: Bench) -> None:
     await frozen(bench, left_running=True)
     bench.clock.advance(20)
     await asyncio.sleep(0.3)
@@ -361,7 +361,7 @@ async def test_a_motor_that_a_frozen_program_means_to_leave_running_runs_on(benc
 # Trouble
 
 
-async def test_a_drive_whose_profile_is_not_here_is_reported(bench: Bench) -> None:
+async def test_drive_without_a_profile_is_reported(bench: Bench) -> None:
     bench.started(1)
     guardian = bench.guardian()
     guardian._session_of = lambda _: None
@@ -371,7 +371,7 @@ async def test_a_drive_whose_profile_is_not_here_is_reported(bench: Bench) -> No
     await come(lambda: bench.says("Stop it at the machine"))
 
 
-async def test_after_the_line_was_closed_nothing_is_looked_after(bench: Bench) -> None:
+async def test_closed_line_stops_no_motor(bench: Bench) -> None:
     bench.started(1)
     bench.guardian()
     await asyncio.to_thread(bench.line.close)
@@ -379,7 +379,7 @@ async def test_after_the_line_was_closed_nothing_is_looked_after(bench: Bench) -
     assert bench.reported == []
 
 
-async def test_a_guardian_that_was_closed_hears_nothing(bench: Bench) -> None:
+async def test_closed_guard_stops_no_motor(bench: Bench) -> None:
     bench.started(1)
     bench.guardian().close()
     bench.gone()
@@ -387,7 +387,7 @@ async def test_a_guardian_that_was_closed_hears_nothing(bench: Bench) -> None:
     assert bench.reported == []
 
 
-async def test_a_line_that_comes_and_goes_is_given_up_like_one_that_stays_lost(
+async def test_unstable_line_is_abandoned_like_a_lost_one(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A number of a port that others get, a gateway that hangs up: connected for a moment."""

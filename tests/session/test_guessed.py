@@ -79,7 +79,7 @@ def other_family() -> str:
     return "quiet-pump"
 
 
-async def test_stop_of_a_silent_drive_of_unlike_families_sends_the_word_of_all(
+async def test_silent_drive_of_several_families_is_sent_the_common_stop_word(
     other_family: str, journal: Journal
 ) -> None:
     line = FakeLine({1: {}})
@@ -101,7 +101,7 @@ async def test_stop_of_a_silent_drive_of_unlike_families_sends_the_word_of_all(
 
 
 @pytest.mark.parametrize("several", [False, True])
-async def test_a_guess_among_families_that_stop_otherwise_sends_what_stops_them_all(
+async def test_guess_among_families_sends_the_word_that_stops_all(
     other_family: str, several: bool, journal: Journal
 ) -> None:
     """16#0001, the ramp stop of the family that it is taken for, would run the other."""
@@ -126,7 +126,7 @@ async def test_a_guess_among_families_that_stop_otherwise_sends_what_stops_them_
     assert sent == [(COMMAND, 0x0000)] * len(sessions)
 
 
-def test_a_start_by_a_guess_is_on_record_as_one(tmp_path: Path) -> None:
+def test_start_of_a_guessed_family_is_recorded_as_a_guess(tmp_path: Path) -> None:
     starts = Starts(tmp_path)
     session = DriveSession(FakeLine(), 1, library.load("powerdrive"), nameless(*LEROY_SOMER))
     for guessed in (False, True):

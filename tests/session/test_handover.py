@@ -116,7 +116,7 @@ async def expires(bench: Bench) -> None:
 # Arming is a claim
 
 
-async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench) -> None:
+async def test_arming_claims_the_drive_and_disarming_releases_it(bench: Bench) -> None:
     bench.session.arming.arm()
     assert bench.facts.commanders == {1: bench.facts.me.id}
     bench.session.arming.disarm()
@@ -129,7 +129,7 @@ async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench)
     ]
 
 
-async def test_a_drive_commanded_elsewhere_is_not_armed_and_names_that_program(
+async def test_drive_of_another_commander_is_not_armed_and_names_it(
     bench: Bench,
 ) -> None:
     commanded_there(bench)
@@ -139,14 +139,14 @@ async def test_a_drive_commanded_elsewhere_is_not_armed_and_names_that_program(
     assert bench.voice.output == []
 
 
-async def test_an_arming_that_ends_by_itself_gives_the_drive_back(bench: Bench) -> None:
+async def test_expired_arming_releases_the_drive(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.clock.advance(ARMED_FOR + 1)
     assert not bench.session.arming.armed
     assert bench.voice.output[-2:] == [("claim", 1, False), ("armed", 1, False)]
 
 
-async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Bench) -> None:
+async def test_denied_claim_disarms_with_its_reason(bench: Bench) -> None:
     bench.session.arming.arm()
     commanded_there(bench)
     bench.facts.events.emit(ControlDenied(1, "Drive 1 is commanded by panel on pts/9 (pid 77)."))
@@ -159,7 +159,7 @@ async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Benc
     assert bench.session.arming.armed
 
 
-async def test_a_stop_of_another_program_ends_arming_and_work_and_is_reported(bench: Bench) -> None:
+async def test_stop_by_another_program_ends_arming_and_work_and_is_reported(bench: Bench) -> None:
     bench.session.arming.arm()
     before = bench.session.work.stops
     bench.facts.events.emit(DevicesStopped((1,), "the stop key", REMOTE))
@@ -174,7 +174,7 @@ async def test_a_stop_of_another_program_ends_arming_and_work_and_is_reported(be
 # Asked here
 
 
-async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> None:
+async def test_request_is_shown_and_answered_by_a_person(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.events.emit(ControlRequested(1, REMOTE))
     request = bench.handover.requests[1]
@@ -193,7 +193,7 @@ async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> Non
     assert bench.reported[-1] == "Not given: panel on pts/9 (pid 77) requests it no longer."
 
 
-async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
+async def test_request_may_be_refused_by_a_person(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(bench.handover.requests[1], yes=False)
@@ -204,7 +204,7 @@ async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("status", "yes"), [(0x0233, True), (0x0637, False), (None, False)], ids=str
 )
-async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
+async def test_unanswered_request_is_refused_unless_the_motor_is_at_standstill(
     bench: Bench, status: int | None, yes: bool
 ) -> None:
     bench.session.arming.arm()
@@ -218,7 +218,7 @@ async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
     assert bench.session.arming.armed is False or not yes
 
 
-async def test_an_answered_question_does_not_expire_into_another_answer(bench: Bench) -> None:
+async def test_answered_request_does_not_expire(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.events.emit(ControlRequested(1, REMOTE))
     bench.handover.answer(bench.handover.requests[1], yes=False)
@@ -229,7 +229,7 @@ async def test_an_answered_question_does_not_expire_into_another_answer(bench: B
 
 
 @pytest.mark.parametrize(("status", "yes"), [(0x0233, True), (0x0637, False), (None, False)])
-async def test_a_command_without_a_person_decides_at_once(
+async def test_program_without_a_person_answers_immediately(
     bench: Bench, status: int | None, yes: bool
 ) -> None:
     bench.handover.person = False
@@ -239,13 +239,13 @@ async def test_a_command_without_a_person_decides_at_once(
     assert bench.answers == [("reply", 1, REMOTE.id, yes)]
 
 
-async def test_a_question_about_a_drive_that_is_not_known_here_is_a_no(bench: Bench) -> None:
+async def test_request_for_an_unknown_drive_is_refused(bench: Bench) -> None:
     bench.handover.person = False
     bench.facts.events.emit(ControlRequested(4, REMOTE))
     assert bench.answers == [("reply", 4, REMOTE.id, False)]
 
 
-async def test_the_question_of_a_program_that_has_gone_is_over(bench: Bench) -> None:
+async def test_request_of_an_exited_program_ends(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.events.emit(ControlRequested(1, REMOTE))
     request = bench.handover.requests[1]
@@ -272,7 +272,7 @@ async def given_while_it_runs(bench: Bench) -> None:
     assert not bench.session.arming.armed
 
 
-async def test_a_motor_that_is_given_away_is_not_stopped_by_the_end_of_this_program(
+async def test_motor_given_away_is_not_stopped_at_the_exit(
     bench: Bench,
 ) -> None:
     await given_while_it_runs(bench)
@@ -286,7 +286,7 @@ async def test_a_motor_that_is_given_away_is_not_stopped_by_the_end_of_this_prog
     assert not bench.session.commanded
 
 
-async def test_a_motor_that_nobody_took_stays_this_programs_to_stop(bench: Bench) -> None:
+async def test_motor_nobody_took_is_stopped_at_the_exit(bench: Bench) -> None:
     await given_while_it_runs(bench)
     await asyncio.sleep(0.05)
     bench.clock.advance(TAKEN_WITHIN + TAKEN_LOOK)
@@ -318,7 +318,7 @@ async def test_drive_of_another_commander_does_not_run(
     assert not bench.session.commanded
 
 
-async def test_asking_is_reported_there_and_the_answer_here(bench: Bench) -> None:
+async def test_request_is_sent_and_its_answer_reported(bench: Bench) -> None:
     commanded_there(bench)
     bench.handover.ask_for(1)
     assert bench.voice.output == [("ask", 1)]
@@ -330,14 +330,14 @@ async def test_asking_is_reported_there_and_the_answer_here(bench: Bench) -> Non
     bench.session.arming.arm()
 
 
-async def test_asking_for_a_free_drive_says_so(bench: Bench) -> None:
+async def test_request_for_a_free_drive_is_refused_with_a_reason(bench: Bench) -> None:
     bench.handover.ask_for(1)
     assert bench.voice.output == []
     assert "No other program commands this drive" in bench.reported[-1]
 
 
 @pytest.mark.parametrize(("status", "adopted"), [(0x0637, 1), (0x0233, 0)])
-async def test_a_motor_that_runs_is_this_programs_once_it_was_given(
+async def test_granted_running_motor_belongs_to_this_program(
     bench: Bench, status: int, adopted: int
 ) -> None:
     """From then on its end stops it, and a kill of it is found."""
@@ -361,7 +361,7 @@ async def test_arrivals_and_commanders_are_reported_once(bench: Bench) -> None:
     ]
 
 
-async def test_program_present_earlier_is_missed_too(
+async def test_earlier_program_that_disappears_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The motor that it leaves is looked for, whoever came to the line first."""
@@ -379,7 +379,7 @@ async def test_program_present_earlier_is_missed_too(
     fleet.forget()
 
 
-async def test_a_fleet_comes_to_a_line_on_which_another_program_commands() -> None:
+async def test_new_fleet_knows_the_current_commander() -> None:
     line = FakeLine({1: {}})
     line.facts.set_programs((line.facts.me, REMOTE))
     line.facts.note_commander(1, REMOTE.id)
@@ -389,7 +389,7 @@ async def test_a_fleet_comes_to_a_line_on_which_another_program_commands() -> No
 
 
 @pytest.mark.parametrize(("after", "yes"), [(1.5, True), (2.5, False)])
-async def test_standstill_counts_for_two_seconds_if_no_person_answers(
+async def test_observed_standstill_is_valid_for_two_seconds(
     bench: Bench, after: float, yes: bool
 ) -> None:
     bench.handover.person = False

@@ -56,12 +56,12 @@ async def direct_stop(voice: Heard) -> tuple[object, ...] | None:
     return None
 
 
-async def test_the_keeper_stops_drives_whose_stop_does_not_begin() -> None:
+async def test_keeper_stops_drives_whose_stop_does_not_begin() -> None:
     voice = stopped(HungLine({drive: {} for drive in DRIVES}))
     assert await direct_stop(voice) == ("directly", DRIVES)
 
 
-async def test_a_keeper_that_does_not_answer_is_requested_again(
+async def test_direct_stop_is_repeated_until_the_keeper_answers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(under_way, "STOP_REPEATED_EVERY", 0.05)
@@ -85,11 +85,11 @@ async def test_a_keeper_that_does_not_answer_is_requested_again(
     assert tries == [DRIVES] * 3
 
 
-async def test_a_loop_that_works_needs_no_other_way(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_working_loop_sends_no_direct_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(under_way, "HANGS_AFTER", 3.0)
     voice = stopped(FakeLine({drive: {} for drive in DRIVES}))
     assert await direct_stop(voice) is None
 
 
-def test_a_loop_counts_as_hung_before_a_person_presses_again() -> None:
+def test_hung_loop_is_detected_before_a_second_key_press() -> None:
     assert HANGS_AFTER <= 0.3

@@ -102,7 +102,7 @@ def kept(journal: Journal) -> list[int]:
     return [json.loads(line)["new_raw"] for line in lines]
 
 
-def test_unused_events_leave_nothing(disk: Disk, tmp_path: Path) -> None:
+def test_unused_journal_creates_no_file(disk: Disk, tmp_path: Path) -> None:
     made = Journal(tmp_path / "state")
     assert made.flush(0)
     assert made.close(0)
@@ -110,7 +110,7 @@ def test_unused_events_leave_nothing(disk: Disk, tmp_path: Path) -> None:
     assert not (tmp_path / "state").exists()
 
 
-def test_nobody_waits_for_a_disk_that_hangs(journal: Journal, disk: Disk) -> None:
+def test_hung_disk_delays_no_caller(journal: Journal, disk: Disk) -> None:
     disk.works.clear()
     for number in range(20):
         journal.add(entry(number))
@@ -124,7 +124,7 @@ def test_nobody_waits_for_a_disk_that_hangs(journal: Journal, disk: Disk) -> Non
     assert kept(journal) == list(range(21))
 
 
-def test_an_entry_that_comes_once_the_thread_has_ended_is_kept_too(
+def test_entry_after_the_end_of_the_thread_is_kept(
     journal: Journal, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "IDLE_ENDS_AFTER", 0.01)
@@ -135,7 +135,7 @@ def test_an_entry_that_comes_once_the_thread_has_ended_is_kept_too(
     assert kept(journal) == [0, 1, 2]
 
 
-def test_a_disk_that_hangs_is_reported(
+def test_hung_disk_is_reported(
     journal: Journal, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "SLOW", 0.01)
@@ -148,7 +148,7 @@ def test_a_disk_that_hangs_is_reported(
     wait_until(lambda: "the disk took" in caplog.text, "it is logged")
 
 
-async def test_a_stop_does_not_wait_for_the_disk(disk: Disk) -> None:
+async def test_stop_does_not_wait_for_the_disk(disk: Disk) -> None:
     with bench("atv71", run_hz=20.0) as here:
         await asyncio.to_thread(wait_until, lambda: here.drive.motor.frequency > 5, "it runs")
         disk.works.clear()
@@ -168,7 +168,7 @@ async def test_a_stop_does_not_wait_for_the_disk(disk: Disk) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="without kill -9")
-def test_a_kill_takes_what_was_not_flushed_and_no_more(tmp_path: Path) -> None:
+def test_kill_loses_only_unflushed_entries(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path)], timeout=PATIENCE, check=False
     )
@@ -190,7 +190,7 @@ def test_entries_of_several_threads_keep_their_order(journal: Journal) -> None:
     assert kept(journal) == order
 
 
-def test_a_folder_that_cannot_be_written(
+def test_unwritable_folder_is_reported(
     disk: Disk, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "file").touch()
@@ -233,7 +233,7 @@ def full(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[], N
 
 
 @pytest.mark.parametrize("how", [refusing, full])
-def test_a_disk_that_comes_back_gets_what_it_missed(
+def test_recovered_disk_gets_the_missed_entries(
     journal: Journal,
     disk: Disk,
     tmp_path: Path,
@@ -278,7 +278,7 @@ def test_events_beyond_the_limit_are_lost_and_counted(
     assert "7 lost" in caplog.text
 
 
-def test_old_files_make_room(journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_files_are_removed(journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
     journal.add(entry(0))
     assert journal.flush(PATIENCE)
     size = journal.path.stat().st_size
@@ -295,7 +295,7 @@ def test_old_files_make_room(journal: Journal, monkeypatch: pytest.MonkeyPatch) 
     assert held == [number % 10 for number in range(10, 30)]
 
 
-def test_a_line_that_was_cut_off_damages_no_other(journal: Journal) -> None:
+def test_truncated_line_does_not_damage_others(journal: Journal) -> None:
     journal.path.parent.mkdir()
     journal.path.write_text('{"time": "a power cut')
     journal.add(entry(1))

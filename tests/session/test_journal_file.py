@@ -97,7 +97,7 @@ def numbers(journal: Journal) -> list[int]:
 
 
 @pytest.mark.parametrize("half", [b'{"time": "2026-01-01T00:00:00.000+00:00", "li', b"\0" * 700])
-def test_half_a_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
+def test_partial_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
     journal.path.parent.mkdir()
     whole = json.dumps({"kind": "whatever"}).encode() + b"\n"
     journal.path.write_bytes(whole + half)
@@ -115,7 +115,7 @@ def test_half_a_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
     assert half.startswith(damaged[1].text.encode()[:10])
 
 
-def test_several_programs_lose_nothing_and_mix_no_lines(tmp_path: Path) -> None:
+def test_several_programs_write_whole_lines_without_loss(tmp_path: Path) -> None:
     command = [sys.executable, "-c", SEVERAL, str(tmp_path / "state")]
     programs = [
         subprocess.Popen(
@@ -146,7 +146,7 @@ def test_several_programs_lose_nothing_and_mix_no_lines(tmp_path: Path) -> None:
 
 
 @posix
-def test_files_are_moved_by_one_program_at_a_time(
+def test_files_are_rotated_by_one_program_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two that moved them at a time would move one over the other."""
@@ -179,14 +179,14 @@ def test_partial_line_on_full_disk_is_removed(tmp_path: Path) -> None:
     assert len(reported(journal)) == 2
 
 
-def test_a_program_that_ends_puts_its_last_entries_down(tmp_path: Path) -> None:
+def test_last_entries_are_written_at_the_exit(tmp_path: Path) -> None:
     done = program(LEFT, tmp_path / "state")
     assert (done.returncode, done.stderr) == (0, "")
     assert numbers(Journal(tmp_path / "state")) == [1, 2]
 
 
 @posix
-def test_the_journal_is_its_owners_alone(tmp_path: Path) -> None:
+def test_journal_is_private_to_its_owner(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
         journal = Journal(tmp_path / "some" / "state")
@@ -211,7 +211,7 @@ def nowhere(*_: object, **__: object) -> Path:
 
 
 @posix
-def test_invalid_file_is_reported_and_blocks_nobody(tmp_path: Path) -> None:
+def test_invalid_file_is_reported_and_does_not_block(tmp_path: Path) -> None:
     state = tmp_path / "state"
     state.mkdir()
     os.mkfifo(state / JOURNAL_NAME)
@@ -225,7 +225,7 @@ def test_invalid_file_is_reported_and_blocks_nobody(tmp_path: Path) -> None:
         os.close(reader)
 
 
-def test_trouble_is_reported_at_once_and_once(tmp_path: Path) -> None:
+def test_trouble_is_reported_immediately_and_once(tmp_path: Path) -> None:
     output: list[str] = []
     (tmp_path / "state").touch()
     journal = Journal(tmp_path / "state", on_trouble=output.append)
@@ -239,7 +239,7 @@ def test_trouble_is_reported_at_once_and_once(tmp_path: Path) -> None:
     assert journal.unkept == 2
 
 
-def test_unreportable_trouble_costs_no_entry(tmp_path: Path) -> None:
+def test_unreportable_trouble_loses_no_entry(tmp_path: Path) -> None:
     def gone(text: str) -> None:
         raise OSError(text)
 
@@ -253,7 +253,7 @@ def test_unreportable_trouble_costs_no_entry(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("home", [lambda *_, **__: Path("~/.local/state"), nowhere])
-def test_without_a_home_nothing_is_strewn_about(
+def test_without_a_home_no_file_is_created(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Callable[..., Path]
 ) -> None:
     """A user without an entry in the system's list: `~` stays, or platformdirs gives it up."""
@@ -273,7 +273,7 @@ def test_without_a_home_nothing_is_strewn_about(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_line_that_could_not_be_flushed_is_not_put_down_twice(
+def test_unflushed_line_is_not_written_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = JournalFile(tmp_path / "state")

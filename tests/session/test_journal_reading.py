@@ -28,7 +28,7 @@ def reported(file: Path) -> list[Entry | DamagedLine]:
 
 
 @given(garbage=st.lists(st.binary(max_size=80).filter(lambda b: b.strip()), max_size=6))
-def test_whole_entries_are_found_among_anything(
+def test_whole_entries_are_found_among_garbage(
     garbage: list[bytes], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     file = tmp_path_factory.mktemp("journal") / "journal.jsonl"
@@ -55,7 +55,7 @@ ODD = {
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_odd_lines_are_reported_and_hide_nothing(name: str, tmp_path: Path) -> None:
+def test_odd_lines_are_reported_and_hide_no_entry(name: str, tmp_path: Path) -> None:
     file = tmp_path / "journal.jsonl"
     file.write_bytes(line_of(entry(1)) + ODD[name] + b"\n" + line_of(entry(2)) + b"half")
     item, odd, two, half = reported(file)
@@ -66,7 +66,7 @@ def test_odd_lines_are_reported_and_hide_nothing(name: str, tmp_path: Path) -> N
     assert len(odd.text) <= journal_reading.DAMAGE_SHOWN
 
 
-def test_half_a_character_in_a_name_is_no_damage(tmp_path: Path) -> None:
+def test_lone_surrogate_in_a_name_is_not_damage(tmp_path: Path) -> None:
     file = tmp_path / "journal.jsonl"
     odd = replace(entry(1), line="\ud83d\x1b]0;x\x07")
     file.write_bytes(line_of(odd))
@@ -81,9 +81,7 @@ def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
     assert reported(file) == [entry(1), entry(2)]
 
 
-def test_a_file_without_end_is_read_at_its_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_endless_file_is_read_at_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(journal_reading, "READ_MOST", 1000)
     file = tmp_path / "journal.jsonl"
     file.write_bytes(b"".join(line_of(entry(number)) for number in range(50)))
@@ -93,7 +91,7 @@ def test_a_file_without_end_is_read_at_its_end(
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
-def test_a_pipe_in_its_place_holds_nobody_up(tmp_path: Path) -> None:
+def test_pipe_instead_of_the_file_does_not_block(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "journal.jsonl")
     with pytest.raises(OSError, match="not a regular file"):
         reported(tmp_path / "journal.jsonl")
@@ -111,7 +109,7 @@ def test_read_back_completes_only_its_own_write() -> None:
     ]
 
 
-def test_a_drive_a_line_and_a_time_are_selected() -> None:
+def test_entries_are_selected_by_drive_line_and_time() -> None:
     here = [
         replace(entry(1), time="2026-03-01T08:00:00.000+00:00", line="tcp:Host:502"),
         replace(entry(2), time="2026-03-01T09:00:00.000+00:00", line="tcp:host:502", device=2),

@@ -59,7 +59,7 @@ def known(line: FakeLine, *drives: DriveIdentity, profile: str = "") -> KnownLin
     return found
 
 
-def test_a_line_that_is_as_it_was_is_not_held(adapters: Adapters) -> None:
+def test_unchanged_line_is_not_held(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     line = on(port)
@@ -67,7 +67,7 @@ def test_a_line_that_is_as_it_was_is_not_held(adapters: Adapters) -> None:
     assert line.held == ""
 
 
-def test_another_adapter_under_the_same_name_holds_the_line(adapters: Adapters) -> None:
+def test_other_adapter_under_the_same_name_holds_the_line(adapters: Adapters) -> None:
     known(on(adapters.plug("ttyUSB0", "1.1", serial="A5")))
     adapters.unplug("ttyUSB0")
     line = on(adapters.plug("ttyUSB0", "1.1", serial="B7"))
@@ -85,7 +85,7 @@ def test_another_adapter_under_the_same_name_holds_the_line(adapters: Adapters) 
     assert known(on(adapters.port("ttyUSB0"))).changed == ()
 
 
-def test_the_same_adapter_under_another_number_is_the_same_line(adapters: Adapters) -> None:
+def test_renumbered_adapter_is_the_same_line(adapters: Adapters) -> None:
     known(on(adapters.plug("ttyUSB0", "1.1", serial="A5")), PUMP)
     adapters.unplug("ttyUSB0")
     port = adapters.plug("ttyUSB4", "1.3", serial="A5")
@@ -93,7 +93,7 @@ def test_the_same_adapter_under_another_number_is_the_same_line(adapters: Adapte
     assert known(on(port), FAN).changed != ()
 
 
-def test_a_shared_by_id_name_that_leads_to_the_other_adapter_holds_the_line(
+def test_shared_by_id_name_of_the_other_adapter_holds_the_line(
     adapters: Adapters,
 ) -> None:
     adapters.plug("ttyUSB0", "1.1")
@@ -105,7 +105,7 @@ def test_a_shared_by_id_name_that_leads_to_the_other_adapter_holds_the_line(
     assert "1.2" in reported
 
 
-def test_another_adapter_in_the_same_socket_holds_the_line(adapters: Adapters) -> None:
+def test_other_adapter_in_the_same_socket_holds_the_line(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1")
     socket = str(adapters.links / "by-path" / "pci-usb-1.1-port0")
     known(on(socket))
@@ -116,7 +116,7 @@ def test_another_adapter_in_the_same_socket_holds_the_line(adapters: Adapters) -
     assert known(on(port)).changed != ()
 
 
-def test_a_line_that_came_back_with_another_adapter_is_held(adapters: Adapters) -> None:
+def test_line_that_reconnects_with_another_adapter_is_held(adapters: Adapters) -> None:
     line = on(adapters.plug("ttyUSB0", "1.1", serial="A5"))
     found = known(line, PUMP)
     adapters.unplug("ttyUSB0")
@@ -129,7 +129,7 @@ def test_a_line_that_came_back_with_another_adapter_is_held(adapters: Adapters) 
     assert line.held == ""
 
 
-def test_another_drive_at_an_address_holds_the_line(adapters: Adapters) -> None:
+def test_other_drive_at_an_address_holds_the_line(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     line = on(port)
@@ -144,13 +144,13 @@ def test_another_drive_at_an_address_holds_the_line(adapters: Adapters) -> None:
     assert known(on(port), PUMP).changed != ()
 
 
-def test_another_version_is_another_drive(adapters: Adapters) -> None:
+def test_other_firmware_version_is_another_drive(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     assert known(on(port), replace(PUMP, version="0302")).changed != ()
 
 
-def test_a_drive_that_says_nothing_is_known_by_its_profile(adapters: Adapters) -> None:
+def test_drive_without_identification_is_known_by_its_profile(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), SILENT, profile="powerdrive")
     assert known(on(port), SILENT, profile="powerdrive").changed == ()
@@ -159,7 +159,7 @@ def test_a_drive_that_says_nothing_is_known_by_its_profile(adapters: Adapters) -
     assert reported == "Device 5 was powerdrive, and is varmeca now."
 
 
-def test_one_that_says_less_this_time_is_not_forgotten(adapters: Adapters) -> None:
+def test_incomplete_identity_does_not_replace_the_stored_one(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     less = DriveIdentity(2, "", "", "", "", None, ())
@@ -167,14 +167,14 @@ def test_one_that_says_less_this_time_is_not_forgotten(adapters: Adapters) -> No
     assert known(on(port), FAN).changed != ()
 
 
-def test_a_new_drive_and_one_that_is_away_hold_nothing(adapters: Adapters) -> None:
+def test_new_or_absent_drive_does_not_hold_the_line(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     assert known(on(port), replace(FAN, device=3)).changed == ()
     assert {*load_memory().lines[line_key(port)].drives} == {2, 3}
 
 
-def test_value_after_yes_is_correct_too(adapters: Adapters) -> None:
+def test_confirmed_drive_is_stored(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     line = on(port)
@@ -185,7 +185,7 @@ def test_value_after_yes_is_correct_too(adapters: Adapters) -> None:
     assert known(on(port), FAN).changed == ()
 
 
-def test_one_yes_is_no_yes_to_what_comes_later(adapters: Adapters) -> None:
+def test_confirmation_does_not_cover_later_changes(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP, replace(PUMP, device=3))
     line = on(port)
@@ -195,7 +195,7 @@ def test_one_yes_is_no_yes_to_what_comes_later(adapters: Adapters) -> None:
     assert "Device 3" in line.held
 
 
-async def test_a_held_line_takes_nothing_but_a_stop(adapters: Adapters) -> None:
+async def test_held_line_accepts_stops_only(adapters: Adapters) -> None:
     line = on(adapters.plug("ttyUSB0", "1.1", serial="A5"))
     line.held = "Not yet."
     with pytest.raises(RequestRefused, match="Not yet"):
@@ -205,7 +205,7 @@ async def test_a_held_line_takes_nothing_but_a_stop(adapters: Adapters) -> None:
     assert (await line.read(2, 7)).words == (5,)
 
 
-def test_a_held_line_arms_nothing() -> None:
+def test_held_line_arms_no_drive() -> None:
     line = FakeLine()
     line.held = "Not yet."
     with pytest.raises(OrderRefused, match="Not yet"):
@@ -222,7 +222,7 @@ def test_a_held_line_arms_nothing() -> None:
 
 
 @pytest.mark.parametrize(("priority", "reaches"), [(Priority.STOP, True), (Priority.POLL, False)])
-async def test_the_real_line_holds_too(priority: Priority, *, reaches: bool) -> None:
+async def test_real_line_is_held_too(priority: Priority, *, reaches: bool) -> None:
     line = Line(TcpLink("127.0.0.1", 1))
     line.describe(2, WRITES)
     line.held = "Not yet."
@@ -240,7 +240,7 @@ def test_gateways_are_known_by_their_drives() -> None:
     assert known(FakeLine(link=TcpLink("gateway.plant", 503)), FAN).changed == ()
 
 
-def test_a_number_of_a_pseudo_terminal_is_nobody_but_a_link_to_it_is(tmp_path: Path) -> None:
+def test_pseudo_terminal_number_is_not_stored_but_a_link_is(tmp_path: Path) -> None:
     master, slave = os.openpty()
     try:
         number, link = os.ttyname(slave), tmp_path / "line"
@@ -256,7 +256,7 @@ def test_a_number_of_a_pseudo_terminal_is_nobody_but_a_link_to_it_is(tmp_path: P
         os.close(slave)
 
 
-def test_a_start_is_found_where_its_adapter_is_plugged_in_now(adapters: Adapters) -> None:
+def test_recorded_start_is_found_at_the_new_port_of_its_adapter(adapters: Adapters) -> None:
     class Ended(Processes):
         """Every program has ended."""
 
@@ -280,7 +280,7 @@ def test_a_start_is_found_where_its_adapter_is_plugged_in_now(adapters: Adapters
     assert Starts(processes=Ended()).found(moved, 2) is None
 
 
-def test_a_line_is_remembered_by_its_adapter(adapters: Adapters) -> None:
+def test_line_is_stored_by_its_adapter(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     by_id = str(adapters.links / "by-id" / "usb-FTDI_6001_A5-if00-port0")
     assert remembered_text(f"{port},9600,8N1,timeout=2") == f"serial:{by_id},9600,8N1,timeout=2"
@@ -304,7 +304,7 @@ def test_a_line_is_remembered_by_its_adapter(adapters: Adapters) -> None:
     ],
     ids=range(8),
 )
-def test_a_damaged_memory_knows_nothing_and_hinders_nothing(stored: bytes) -> None:
+def test_damaged_line_store_is_empty_and_blocks_nothing(stored: bytes) -> None:
     memory_file().parent.mkdir(parents=True)
     memory_file().write_bytes(stored)
     assert all(not mark.drives for mark in load_memory().lines.values())
@@ -313,7 +313,7 @@ def test_a_damaged_memory_knows_nothing_and_hinders_nothing(stored: bytes) -> No
     assert known(line, FAN).changed != ()
 
 
-def test_a_memory_that_is_a_pipe_or_cannot_be_written_hinders_nothing() -> None:
+def test_unusable_line_store_blocks_nothing() -> None:
     memory_file().parent.mkdir(parents=True)
     os.mkfifo(memory_file())
     assert load_memory() == LinesMemory()
@@ -322,7 +322,7 @@ def test_a_memory_that_is_a_pipe_or_cannot_be_written_hinders_nothing() -> None:
     assert known(on("/dev/ttyS1"), PUMP).changed == ()
 
 
-def test_the_memory_does_not_grow_for_ever() -> None:
+def test_line_store_is_bounded() -> None:
     keep_memory(LinesMemory({f"tcp:{n}": LineMark() for n in range(LINES_KEPT + 5)}, {}))
     stored: Any = json.loads(memory_file().read_text("utf-8"))
     assert len(stored["lines"]) == LINES_KEPT

@@ -54,7 +54,7 @@ def armed(line: OneDrive, profile: Profile) -> DriveSession:
     return session
 
 
-async def test_fields_of_one_register_come_in_one_read() -> None:
+async def test_fields_of_one_register_need_one_read() -> None:
     line = OneDrive({10: 0x8015, 11: 7})
     session = armed(line, FIELDS)
     readings = await Reader(session).read(["LOW", "MID", "TOP", "WHOLE"])
@@ -67,7 +67,7 @@ async def test_fields_of_one_register_come_in_one_read() -> None:
     assert line.requested == [(10, 2)]
 
 
-async def test_a_field_is_written_without_the_others(journal: Journal) -> None:
+async def test_field_write_keeps_the_other_fields(journal: Journal) -> None:
     line = OneDrive({10: 0x8015})
     session = armed(line, FIELDS)
     writer = Writer(session, journal, session.work.permit())
@@ -84,7 +84,7 @@ async def test_a_field_is_written_without_the_others(journal: Journal) -> None:
     assert line.registers[10] == 0x9F00
 
 
-async def test_a_field_that_the_drive_does_not_take_is_reported(journal: Journal) -> None:
+async def test_field_not_kept_by_the_drive_is_reported(journal: Journal) -> None:
     line = OneDrive({10: 0x8015})
     session = armed(line, FIELDS)
     taking = line.devices[1].take
@@ -95,13 +95,13 @@ async def test_a_field_that_the_drive_does_not_take_is_reported(journal: Journal
         )
 
 
-def test_a_field_is_never_a_word_by_itself() -> None:
+def test_field_needs_its_whole_word() -> None:
     with pytest.raises(ValueRefused, match="some bits of a word"):
         to_words(FIELDS["MID"], 1)
     assert to_words(FIELDS["MID"], 1, 0xFFFF) == (0xFF9F,)
 
 
-def test_functions_3_and_4_are_never_read_in_one() -> None:
+def test_registers_of_functions_3_and_4_are_read_separately() -> None:
     plan = plan_reads(FIELDS, ["LOW", "WHOLE", "SPEED", "AMPS"])
     requested = sorted(
         (request.function, request.address, request.count) for request in plan.requests
@@ -118,7 +118,7 @@ async def test_an_input_register_is_read_by_function_4() -> None:
     assert ReadInput(1, 11, 2).pdu() == bytes([4, 0, 11, 0, 2])
 
 
-async def test_function_4_keeps_to_its_own_limit() -> None:
+async def test_function_4_has_its_own_limit() -> None:
     line = OneDrive(dict.fromkeys(range(20), 0))
     line.describe(1, limits_of(FIELDS))
     await line.read(1, 0, 4, function=4)
@@ -228,7 +228,7 @@ def shared(tmp_path: Path, more: str, head: str = 'rows_from = ["ramps.rows"]') 
     return path
 
 
-def test_rows_that_families_share_stand_once(tmp_path: Path) -> None:
+def test_shared_rows_are_merged_into_a_profile(tmp_path: Path) -> None:
     path = shared(tmp_path, '[[parameters]]\ncode = "ACC"\nmax = 500\n')
     assert library.faults_of(path) == []
     profile = library.load_file(path)
@@ -238,7 +238,7 @@ def test_rows_that_families_share_stand_once(tmp_path: Path) -> None:
     assert [source.id for source in profile.data.sources] == ["shared", "m"]
 
 
-def test_a_row_of_ones_own_stands_behind_the_one_above_it(tmp_path: Path) -> None:
+def test_own_row_follows_the_row_above_it(tmp_path: Path) -> None:
     between = '[[parameters]]\ncode = "ACC"\n\n' + ROW.replace("HOLD", "OWN")
     path = shared(tmp_path, between + ROW.replace("HOLD", "NEXT").replace("77", "78"))
     assert library.faults_of(path) == []
@@ -250,7 +250,7 @@ def test_a_row_of_ones_own_stands_behind_the_one_above_it(tmp_path: Path) -> Non
     assert reported.startswith(f"{path}:{line + 3}: "), "a place is known after rows were moved"
 
 
-def test_a_shared_row_can_be_left_out(tmp_path: Path) -> None:
+def test_shared_row_can_be_omitted(tmp_path: Path) -> None:
     head = 'rows_from = ["ramps.rows"]\nwithout = ["ACC"]'
     profile = library.load_file(shared(tmp_path, "", head))
     assert [p.code for p in profile.parameters] == ["DEC", "HOURS", "ENERGY"]
@@ -259,7 +259,7 @@ def test_a_shared_row_can_be_left_out(tmp_path: Path) -> None:
         library.load_file(path)
 
 
-def test_a_fault_of_a_shared_row_is_reported_where_it_stands(tmp_path: Path) -> None:
+def test_error_in_a_shared_row_is_reported_at_its_line(tmp_path: Path) -> None:
     path = shared(tmp_path, '[[parameters]]\ncode = "ACC"\nscale = "no"\n')
     (tmp_path / "ramps.rows").write_text(ROWS.replace("address = 10", "address = 9"), "utf-8")
     own, both = library.faults_of(path)
@@ -270,7 +270,7 @@ def test_a_fault_of_a_shared_row_is_reported_where_it_stands(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("name", ["none.rows", "../ramps.rows", "/etc/hosts"])
-def test_shared_rows_lie_beside_the_profile(tmp_path: Path, name: str) -> None:
+def test_shared_rows_are_beside_the_profile(tmp_path: Path, name: str) -> None:
     path = shared(tmp_path, "", f'rows_from = ["{name}"]')
     with pytest.raises(ProfileError, match=r"long\.toml:7: rows_from: "):
         library.load_file(path)
@@ -302,13 +302,13 @@ async def saved(
     return reported, [request for request in line.requests if isinstance(request, WriteOne)]
 
 
-async def test_a_save_word_may_keep_its_value(journal: Journal) -> None:
+async def test_save_word_may_keep_its_value(journal: Journal) -> None:
     reported, written = await saved(OneDrive({1: 0, 2: 0, 3: 0}), journal, SAVING)
     assert "saved" in reported
     assert written == [WriteOne(1, 2, 1)]
 
 
-async def test_another_word_may_tell_that_it_is_saved(journal: Journal) -> None:
+async def test_another_word_may_report_the_save(journal: Journal) -> None:
     line = OneDrive({1: 0, 2: 0, 3: 0})
     requested: list[int] = []
     held = line.devices[1].held

@@ -30,11 +30,11 @@ def on_a_line(*others: Program, requested: bool = True) -> DriveSession:
 
 
 @pytest.mark.parametrize("on_purpose", [False, True])
-def test_alone_on_the_line_nothing_is_added(on_purpose: bool) -> None:
+def test_text_is_empty_without_other_programs(on_purpose: bool) -> None:
     assert peer_effect_text(on_a_line(), on_purpose=on_purpose) == ""
 
 
-def test_a_motor_that_is_not_left_on_purpose_is_stopped_by_the_others() -> None:
+def test_other_programs_stop_a_motor_not_left_on_purpose() -> None:
     reported = peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=False)
     assert (
         reported == f"Watch (pid 78) is on the line, too: {STOPPED} the line is opened here again."
@@ -45,13 +45,13 @@ def test_a_motor_that_is_not_left_on_purpose_is_stopped_by_the_others() -> None:
     assert reported.startswith("Other programs are on the line, too: ")
 
 
-def test_a_motor_that_is_left_on_purpose_runs_on_while_it_is_requested() -> None:
+def test_motor_left_on_purpose_runs_while_it_is_polled() -> None:
     reported = peer_effect_text(on_a_line(WATCH), on_purpose=True)
     assert reported == f"Watch (pid 78) polls this drive. As long as it does, {RUNS_ON}"
     assert peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=True) == ""
 
 
-def test_a_panel_whose_motors_go_on_leaves_them_running_by_closing_a_line_too() -> None:
+def test_closing_a_line_leaves_motors_running_if_chosen() -> None:
     session = on_a_line(WATCH, PANEL)
     assert session.starts is not None
     session.starts.leave(session)
@@ -59,7 +59,7 @@ def test_a_panel_whose_motors_go_on_leaves_them_running_by_closing_a_line_too() 
     assert reported == f"Other programs on the line poll this drive. As long as they do, {RUNS_ON}"
 
 
-def test_a_motor_that_was_not_started_here_is_not_stopped_by_the_others() -> None:
+def test_motor_of_another_source_is_not_stopped_by_other_programs() -> None:
     session = on_a_line(WATCH)
     assert session.starts is not None
     session.starts.give_away(session)

@@ -39,11 +39,11 @@ def kinds_after(*minutes: LastMinute) -> list[Sequence[str]]:
         (LastMinute(good=60, lost=60, foreign=9, strays=9), ["poor", "foreign", "strays"]),
     ],
 )
-def test_a_line_is_in_trouble_by_its_last_minute(minute: LastMinute, kinds: list[str]) -> None:
+def test_line_health_depends_on_the_last_minute(minute: LastMinute, kinds: list[str]) -> None:
     assert kinds_after(minute) == [kinds]
 
 
-def test_a_trouble_ends_later_than_it_began() -> None:
+def test_trouble_has_hysteresis() -> None:
     poor, little, well = (LastMinute(good=g, lost=1000 - g) for g in (979, 985, 990))
     assert kinds_after(little, poor, little, well, little) == [[], ["poor"], ["poor"], [], []]
     few = LastMinute(good=10, lost=1)
@@ -54,7 +54,7 @@ def test_a_trouble_ends_later_than_it_began() -> None:
     assert kinds_after(minute, both, minute, none, minute) == [[], strange, strange, [], []]
 
 
-def test_a_new_trouble_is_reported_once_and_so_is_its_end() -> None:
+def test_begin_and_end_of_trouble_are_reported_once() -> None:
     health = LineHealth()
     drives = {2: LastMinute(good=81, lost=38, damaged=3), 5: LastMinute(good=408)}
     poor = LastMinute(good=489, lost=38, damaged=3)
@@ -77,7 +77,7 @@ def test_a_new_trouble_is_reported_once_and_so_is_its_end() -> None:
     assert health.look(counted(LastMinute(good=600))) == []
 
 
-def test_one_poor_drive_among_many_is_named() -> None:
+def test_single_poor_drive_is_named() -> None:
     health = LineHealth()
     drives = {device: LastMinute(good=300) for device in range(1, 11)}
     drives[4] = LastMinute(good=50, lost=20)
@@ -87,25 +87,25 @@ def test_one_poor_drive_among_many_is_named() -> None:
     assert health.troubles[0].signs[0] == "drive 4 71 % good"
 
 
-def test_a_dead_drive_raises_no_alert_of_the_line() -> None:
+def test_dead_drive_raises_no_line_alert() -> None:
     health = LineHealth()
     drives = {1: LastMinute(good=300), 2: LastMinute(good=100, silent=40), 9: LastMinute(silent=30)}
     assert health.look(counted(LastMinute(good=400), drives)) == []
 
 
-def test_a_drive_that_never_answered_is_not_the_worst() -> None:
+def test_drive_that_never_answered_is_not_the_worst() -> None:
     health = LineHealth()
     drives = {1: LastMinute(good=90, lost=10), 2: LastMinute(good=99, lost=1), 3: LastMinute()}
     ((_, text),) = health.look(counted(LastMinute(good=189, lost=11), drives))
     assert "Worst: drive 1, 90 %." in text
 
 
-def test_the_worst_drive_is_that_with_most_lost_replies() -> None:
+def test_drive_with_most_lost_replies_is_the_worst() -> None:
     drives = {1: LastMinute(good=21), 2: LastMinute(good=14, lost=4), 3: LastMinute(good=1, lost=1)}
     ((_, text),) = LineHealth().look(counted(LastMinute(good=36, lost=5), drives))
     assert "Worst: drive 2, 77 %." in text
 
 
-def test_a_share_is_never_rounded_up_to_a_better_one() -> None:
+def test_share_is_rounded_down() -> None:
     shares = (None, 0.0, 0.9799, 0.999, 1.0)
     assert [percent(share) for share in shares] == [" --", "  0", " 97", " 99", "100"]

@@ -9,14 +9,14 @@ import pytest
 from tui.session.connect.line_key import line_key
 
 
-def test_a_port_is_found_behind_its_links(tmp_path: Path) -> None:
+def test_port_links_are_resolved(tmp_path: Path) -> None:
     port, link = tmp_path / "ttyUSB0", tmp_path / "by-id-adapter"
     port.touch()
     link.symlink_to(port)
     assert line_key(f"serial:{link},9600,8N1") == line_key(str(port)) == f"serial:{port}"
 
 
-def test_a_link_that_leads_elsewhere_now_is_another_line(tmp_path: Path) -> None:
+def test_changed_link_is_another_line(tmp_path: Path) -> None:
     link = tmp_path / "by-id-adapter"
     link.symlink_to(tmp_path / "ttyUSB0")
     before = line_key(f"serial:{link}")
@@ -41,7 +41,7 @@ def test_a_link_that_leads_elsewhere_now_is_another_line(tmp_path: Path) -> None
         ("sim:atv71@2,atv21", "SIM: atv21@1, ATV71@2"),
     ],
 )
-def test_spellings_of_one_line(text: str, other: str) -> None:
+def test_spellings_of_one_line_have_one_key(text: str, other: str) -> None:
     assert line_key(text) == line_key(other)
 
 
@@ -58,11 +58,11 @@ def test_spellings_of_one_line(text: str, other: str) -> None:
         ("sim:atv71", "sim:atv21"),
     ],
 )
-def test_different_lines(text: str, other: str) -> None:
+def test_different_lines_have_different_keys(text: str, other: str) -> None:
     assert line_key(text) != line_key(other)
 
 
-def test_a_name_of_the_hosts_file_is_its_number(
+def test_hosts_file_name_equals_its_address(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hosts = tmp_path / "hosts"

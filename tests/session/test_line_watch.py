@@ -122,7 +122,7 @@ async def test_drive_is_kept_alive_by_its_own_timeout(keep: Callable[[int], Kept
 
 
 @pytest.mark.parametrize(("silent", "reported"), [(40.0, False), (60.0, True), (150.0, True)])
-async def test_a_drive_that_was_not_heard_for_half_its_time_is_reported(
+async def test_drive_silent_for_half_its_timeout_is_reported(
     keep: Callable[[int], Kept], silent: float, reported: bool
 ) -> None:
     kept = keep(1000)
@@ -136,7 +136,7 @@ async def test_a_drive_that_was_not_heard_for_half_its_time_is_reported(
         assert warning.left == pytest.approx(100.0 - silent, abs=10.0)
 
 
-async def test_a_drive_that_watches_nothing_is_neither_fed_nor_reported_of(
+async def test_drive_without_a_timeout_is_neither_kept_alive_nor_reported(
     keep: Callable[[int], Kept],
 ) -> None:
     kept = keep(0)

@@ -99,7 +99,7 @@ BOTH_REPLY = reply_words(2, 0x0637, 425, function=23)
          "  2 diagnostics"),
     ],
 )  # fmt: skip
-def test_an_exchange_in_words(readings: tuple[bytes, ...], text: str) -> None:
+def test_exchange_is_described_in_words(readings: tuple[bytes, ...], text: str) -> None:
     found = Heard(named("atv31", "atv71")).say(*readings).rest().texts
     assert any(item.startswith(text) for item in found), found
 
@@ -111,13 +111,13 @@ def test_identity_text_does_not_control_terminal() -> None:
     assert "␛[2JATV71H" in text
 
 
-def test_values_that_were_refused_or_not_confirmed_are_none() -> None:
+def test_refused_or_unconfirmed_values_are_null() -> None:
     heard = Heard(named("atv31", "atv71")).say(COMMAND, frame(2, b"\x86\x03"), COMMAND).rest()
     assert [exchange.values for exchange in heard.reported] == [(), ()]
     assert [requested_names(exchange) for exchange in heard.reported] == [["CMD"], ["CMD"]]
 
 
-def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() -> None:
+def test_family_comes_from_option_then_drive_then_memory() -> None:
     identity = frame(2, bytes.fromhex("2b0e01010000010105") + b"ATV71")
     requested = (IDENTIFY, identity, READ, WORDS)
     taken = {
@@ -163,7 +163,7 @@ def reads_of(profile_id: str, codes: Iterable[str]) -> list[bytes]:
         ("powerdrive", ("10.40", "1.21"), None),
     ],
 )
-def test_a_family_is_likely_by_what_the_drive_answers(
+def test_likely_family_follows_from_the_replies(
     profile_id: str, codes: tuple[str, ...], others: tuple[str, ...] | None
 ) -> None:
     family = Heard().say(*reads_of(profile_id, codes)).reported[-1].family
@@ -175,7 +175,7 @@ def test_a_family_is_likely_by_what_the_drive_answers(
         assert profile_id in (family.profile.id, *family.others)
 
 
-def test_families_that_fit_as_well_are_named() -> None:
+def test_equally_likely_families_are_named() -> None:
     heard = Heard().say(READ, WORDS)
     family = heard.reported[-1].family
     assert family is not None
@@ -183,14 +183,14 @@ def test_families_that_fit_as_well_are_named() -> None:
     assert f"(likely, or {', '.join(family.others)})" in heard.lines
 
 
-def test_a_read_longer_than_a_family_answers_is_of_another() -> None:
+def test_read_beyond_the_limits_excludes_a_family() -> None:
     words = [0] * 40
     heard = Heard().say(read_frame(2, 3201, 40), reply_words(2, *words))
     family = heard.reported[-1].family
     assert family is None or family.profile.id == "atv71"
 
 
-def test_nothing_is_likely_where_nothing_fits() -> None:
+def test_no_family_is_likely_if_none_matches() -> None:
     heard = Heard().say(read_frame(2, 60000, 1), reply_words(2, 7))
     assert heard.reported[-1].family is None
     assert "Device 2: family unknown; name it with -p" in heard.lines
@@ -202,7 +202,7 @@ def cycle(heard: Heard, times: int, *readings: bytes, every: float = 0.02) -> He
     return heard
 
 
-def test_commanding_and_reading_masters() -> None:
+def test_masters_are_commanding_or_reading() -> None:
     heard = Heard(named("atv71", "atv71"))
     run = [write_one(1, 8501, 0x000F)] * 2 + [write_one(1, 8502, 425)] * 2
     cycle(heard, 3, *run, READ, WORDS)
@@ -212,14 +212,14 @@ def test_commanding_and_reading_masters() -> None:
     assert "read only: the master on this line does not command it" in heard.lines
 
 
-def test_a_setting_is_written_and_commands_nothing() -> None:
+def test_written_setting_is_not_a_command() -> None:
     heard = Heard(named("atv71", "atv71")).say(*[write_one(2, 9001, 30)] * 2)
     (drive,) = heard.summary.drives
     assert not drive.tally.commanded
     assert "  written: ACC 30 raw once" in heard.lines
 
 
-def test_how_often_a_drive_is_requested() -> None:
+def test_polling_interval_of_a_drive_is_reported() -> None:
     heard = cycle(Heard(named("atv71", "atv71")), 11, READ, WORDS, every=0.05)
     (drive,) = heard.summary.drives
     assert drive.pace == pytest.approx(10.0)
@@ -234,7 +234,7 @@ def test_how_often_a_drive_is_requested() -> None:
         (4.0, "TTO 3 s (as read on the line): NOT POLLED"),
     ],
 )
-def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
+def test_polling_within_the_timeout_is_reported(pause: float, reported: str) -> None:
     heard = Heard(named("atv71", "atv71")).say(COMMAND, COMMAND)
     place = library.load("atv71")["TTO"].address
     heard.say(read_frame(2, place, 1), reply_words(2, 30), READ, WORDS)
@@ -245,18 +245,18 @@ def test_whether_the_time_out_is_fed(pause: float, reported: str) -> None:
     assert drive.feeding.fed is (pause < 3)
 
 
-def test_a_pause_that_goes_on_counts_too() -> None:
+def test_pause_in_progress_counts() -> None:
     heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
     assert "factory setting; no master has read it): polled in time" in heard.lines
     assert "NOT POLLED" in heard.rest(11.0).lines
 
 
-def test_a_time_out_that_begins_with_a_command_is_none_before() -> None:
+def test_timeout_that_starts_with_a_command_is_inactive_before() -> None:
     heard = Heard(named("atv71", "atv71")).say(READ, WORDS)
     assert "starts with the first command, and none was sent yet" in heard.lines
 
 
-def test_a_request_that_is_not_answered_feeds_nobody() -> None:
+def test_unanswered_request_does_not_restart_the_timeout() -> None:
     heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
     cycle(heard, 6, READ, every=2.0)
     assert "NOT POLLED" in heard.lines
@@ -281,14 +281,14 @@ def test_exceptions_and_silence_are_reported() -> None:
     assert "Device 9: family unknown; name it with -p\n  no answer to 1 request" in heard.lines
 
 
-def test_a_second_master_is_suspected_where_requests_cross() -> None:
+def test_overlapping_requests_indicate_a_second_master() -> None:
     heard = cycle(Heard(), 3, READ + read_frame(3, 3201, 1), reply_words(3, 7))
     assert "A SECOND MASTER? 3 requests began while another request still waited" in heard.lines
     patient = cycle(Heard(), 3, READ, read_frame(3, 3201, 1), reply_words(3, 7), every=0.1)
     assert "SECOND MASTER" not in patient.lines
 
 
-def test_broken_frames_and_silences_are_reported() -> None:
+def test_damaged_frames_and_gaps_are_reported() -> None:
     heard = Heard()
     heard.say(READ, WORDS[:4], WORDS[4:], every=0.02)
     assert "Broken frames: 1 frame with an internal pause of up to 17.1 ms" in heard.lines
@@ -300,7 +300,7 @@ def test_broken_frames_and_silences_are_reported() -> None:
     assert "The gaps between frames" not in Heard().say(b"\x33\x44").lines
 
 
-def test_silences_are_not_judged_where_readings_tell_none() -> None:
+def test_gaps_are_not_judged_if_not_measurable() -> None:
     heard = Heard(times=False).say(READ, WORDS[:4], WORDS[4:])
     assert "Gaps between frames are not checked" in heard.lines
     assert "The gaps between frames" not in heard.lines
@@ -309,7 +309,7 @@ def test_silences_are_not_judged_where_readings_tell_none() -> None:
     assert "several frames at once: the gaps between them are unknown" in together.lines
 
 
-def test_a_shorter_plan_for_the_master() -> None:
+def test_shorter_read_plan_is_suggested() -> None:
     heard = Heard(named("atv71", "atv71"))
     singles = [
         data
@@ -327,7 +327,7 @@ def test_a_shorter_plan_for_the_master() -> None:
     assert "the master reads ETA, RFR, LCR in 3 requests" in heard.lines
 
 
-def test_no_plan_is_reported_where_the_master_reads_well() -> None:
+def test_no_plan_is_suggested_if_the_master_reads_well() -> None:
     heard = cycle(
         Heard(named("atv71", "atv71")), 3, read_frame(2, 3201, 4), reply_words(2, *[1] * 4)
     )
@@ -335,7 +335,7 @@ def test_no_plan_is_reported_where_the_master_reads_well() -> None:
     assert drive.shorter is None
 
 
-def test_reads_that_are_seldom_are_no_part_of_the_cycle() -> None:
+def test_rare_reads_are_not_part_of_the_cycle() -> None:
     heard = Heard(named("atv71", "atv71"))
     heard.say(read_frame(2, 3204, 1), reply_words(2, 1))
     cycle(heard, 5, read_frame(2, 3201, 2), reply_words(2, 1, 1))
@@ -343,7 +343,7 @@ def test_reads_that_are_seldom_are_no_part_of_the_cycle() -> None:
     assert drive.shorter is None
 
 
-def test_nothing_and_noise_are_reported() -> None:
+def test_silence_and_noise_are_reported() -> None:
     assert "Nothing was received" in Heard().rest().lines
     noise = Heard().say(b"\xff\x00\xff").rest()
     assert (
@@ -353,7 +353,7 @@ def test_nothing_and_noise_are_reported() -> None:
     assert "Outside frames: 3 bytes in 1 place" in both.lines
 
 
-def test_a_scale_follows_what_was_heard_of_the_same_drive() -> None:
+def test_scale_follows_values_seen_from_the_same_drive() -> None:
     """A value whose scale follows another word is raw until that was heard."""
     profile = next(p for p in PROFILES if any(item.scale_by for item in p.parameters))
     entry = next(p for p in profile.parameters if p.scale_by and "r" in p.access)

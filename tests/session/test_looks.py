@@ -15,9 +15,7 @@ from ..line.test_on_a_line import until
 
 
 @pytest.mark.parametrize(("family", "limit"), [("atv71", "INV"), ("atv21", ""), ("powerdrive", "")])
-async def test_a_look_tells_how_much_of_its_rated_current_a_motor_draws(
-    family: str, limit: str
-) -> None:
+async def test_snapshot_has_the_share_of_the_rated_current(family: str, limit: str) -> None:
     opened = open_line(f"sim:{family}@1")
     drive = DriveSession(opened.line, 1, library.load(family))
     line_watch = LineWatch(opened.line)
@@ -34,7 +32,7 @@ async def test_a_look_tells_how_much_of_its_rated_current_a_motor_draws(
         opened.close()
 
 
-async def test_a_drive_that_falls_silent_keeps_its_fault_and_what_was_last_read() -> None:
+async def test_silent_drive_keeps_its_fault_and_last_values() -> None:
     opened = open_line("sim:atv71@1")
     drive = DriveSession(opened.line, 1, library.load("atv71"))
     line_watch = LineWatch(opened.line)

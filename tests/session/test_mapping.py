@@ -74,7 +74,7 @@ def stopped(here: Bench) -> None:
 # Looking
 
 
-async def test_the_scanner_as_it_leaves_the_factory() -> None:
+async def test_factory_scanner_is_compared() -> None:
     with bench("atv71") as here:
         view = await Mapper(here.session).look(block(here, "read"))
         assert view.plan == factory(here.profile, view.block)
@@ -87,7 +87,7 @@ async def test_the_scanner_as_it_leaves_the_factory() -> None:
         assert [s.parameter.code for s in outputs.slots if s.parameter] == ["CMD", "LFRD"]
 
 
-async def test_values_of_a_running_motor_are_the_same_or_moving() -> None:
+async def test_values_of_a_running_motor_are_equal_or_moving() -> None:
     with bench("atv71", run_hz=35.0) as here:
         for slot, raw in plan_of(here, "read", EXAMPLE_IN).slots.items():
             here.drive.set(slot, raw)
@@ -97,7 +97,7 @@ async def test_values_of_a_running_motor_are_the_same_or_moving() -> None:
         assert all(s.text != "-----" for s in view.slots)
 
 
-async def test_an_address_that_the_drive_does_not_know_has_no_value() -> None:
+async def test_unknown_address_has_no_value() -> None:
     with bench("atv71", sets={"NMA3": 3199}) as here:
         view = await Mapper(here.session).look(block(here, "read"))
         assert view.slots[2].verdict is SlotMatch.NONE
@@ -105,7 +105,7 @@ async def test_an_address_that_the_drive_does_not_know_has_no_value() -> None:
         assert view.slots[1].verdict is SlotMatch.SAME
 
 
-async def test_a_slot_that_brings_something_else_differs() -> None:
+async def test_slot_with_another_value_differs() -> None:
     with bench("atv71", sets={"NMA1": 9001, "NMA2": 9002, "ACC": 37, "DEC": 59}) as here:
         line = here.session.line
         honest = line.read
@@ -122,7 +122,7 @@ async def test_a_slot_that_brings_something_else_differs() -> None:
         assert [s.verdict for s in view.slots[:2]] == [SlotMatch.DIFFERS, SlotMatch.DIFFERS]
 
 
-async def test_a_scanner_changed_between_never_shows_one_value_as_another() -> None:
+async def test_scanner_changed_between_reads_never_mixes_values() -> None:
     words = {"ACC": 37, "DEC": 59, "HSP": 523, "LSP": 41}
     with bench("atv71", sets=words) as here:
         codes = list(words)
@@ -152,7 +152,7 @@ async def test_a_scanner_changed_between_never_shows_one_value_as_another() -> N
         assert SlotMatch.CHANGED in verdicts
 
 
-async def test_a_drive_without_blocks_has_nothing_to_look_at() -> None:
+async def test_drive_without_blocks_has_nothing_to_compare() -> None:
     with bench("atv312") as here:
         assert here.profile.data.blocks == []
 
@@ -160,7 +160,7 @@ async def test_a_drive_without_blocks_has_nothing_to_look_at() -> None:
 # The indirect block of the Altivar 21
 
 
-async def test_a_block_is_configured_then_pending_then_active() -> None:
+async def test_block_is_configured_then_pending_then_active() -> None:
     with bench("atv21", sets=READ_BLOCK, run_hz=35.0) as here:
         mapper, read = Mapper(here.session), block(here, "read")
         view = await mapper.verify(read)
@@ -183,7 +183,7 @@ async def test_a_block_is_configured_then_pending_then_active() -> None:
         assert [s.parameter.code for s in view.slots[2:4] if s.parameter] == ["FE05", "FE03"]
 
 
-async def test_one_comparison_proves_nothing_but_a_monitor_may_have_proved_it() -> None:
+async def test_one_comparison_does_not_confirm_but_a_monitor_may() -> None:
     with bench("atv21", sets=READ_BLOCK, run_hz=35.0) as here:
         read = block(here, "read")
         view = await Mapper(here.session).look(read)
@@ -192,7 +192,7 @@ async def test_one_comparison_proves_nothing_but_a_monitor_may_have_proved_it() 
         assert [s.force for s in view.slots[:2]] == [Force.ACTIVE, Force.UNPROVED]
 
 
-async def test_slots_changed_between_two_comparisons_prove_nothing() -> None:
+async def test_slots_changed_between_comparisons_are_not_confirmed() -> None:
     # at rest, where all values are zero and nothing can be told
     with bench("atv21", sets=READ_BLOCK) as here:
         line, honest, reads = here.session.line, here.session.line.read, itertools.count()
@@ -249,7 +249,7 @@ async def test_written_slots_wait_for_reset_with_zero_values() -> None:
         assert [s.force for s in view.slots[:2]] == [Force.UNPROVED] * 2
 
 
-async def test_the_write_block_cannot_be_read() -> None:
+async def test_write_block_cannot_be_read() -> None:
     with bench("atv21", sets={"F870": 1, "F871": 3}) as here:
         view = await Mapper(here.session).look(block(here, "write"))
         assert "can only be written" in view.trouble
@@ -259,7 +259,7 @@ async def test_the_write_block_cannot_be_read() -> None:
 
 
 @pytest.mark.parametrize("count", [2, 5])
-async def test_the_manuals_reads_of_the_block(count: int) -> None:
+async def test_manual_reads_of_the_block_succeed(count: int) -> None:
     with bench("atv21", sets=READ_BLOCK) as here:
         read = plan_of(here, "read", ["FD01", "FD00", "FE03", "FE05", "FC91"][:count])
         stretch = span(read)
@@ -272,7 +272,7 @@ async def test_the_manuals_reads_of_the_block(count: int) -> None:
 
 
 @pytest.mark.parametrize(("address", "count"), [(0x1876, 2), (0x1875, 6), (0x1874, 2), (0x1879, 5)])
-async def test_wrong_reads_of_the_block_never_leave_this_side(address: int, count: int) -> None:
+async def test_invalid_reads_of_the_block_are_not_sent(address: int, count: int) -> None:
     with bench("atv21", sets=READ_BLOCK) as here:
         with pytest.raises(RequestRefused):
             await here.session.line.read(1, address, count)
@@ -282,16 +282,14 @@ async def test_wrong_reads_of_the_block_never_leave_this_side(address: int, coun
 @pytest.mark.parametrize(
     ("address", "words"), [(0x1871, [0xC400, 0x1770]), (0x1870, [0xC400, 0x1770, 0])]
 )
-async def test_wrong_writes_of_the_block_never_leave_this_side(
-    address: int, words: list[int]
-) -> None:
+async def test_invalid_writes_of_the_block_are_not_sent(address: int, words: list[int]) -> None:
     with bench("atv21", sets={"F870": 1, "F871": 3}) as here:
         with pytest.raises(RequestRefused):
             await here.session.line.write(1, address, words)
         assert sent(here, 16) == []
 
 
-async def test_a_write_block_that_selects_nothing_is_refused_by_the_drive() -> None:
+async def test_drive_refuses_an_unassigned_write_block() -> None:
     with bench("atv21") as here:
         with pytest.raises(DeviceException) as refused:
             await here.session.line.write(1, 0x1870, [0xC400, 0x1770])
@@ -302,7 +300,7 @@ async def test_a_write_block_that_selects_nothing_is_refused_by_the_drive() -> N
 # Writing an assignment
 
 
-async def test_moved_slot_is_taken_out_first() -> None:
+async def test_moved_slot_is_freed_first() -> None:
     with bench("atv71") as here:
         plan = plan_of(here, "read", ["RFRD", "ETA", "LCR"])
         assert "NMA1, NMA2, NMA3" in await write(here, plan)
@@ -355,7 +353,7 @@ async def test_foreign_slot_change_is_not_overwritten() -> None:
         assert here.writes() == []
 
 
-async def test_somebody_else_between_two_slots() -> None:
+async def test_change_by_another_source_between_two_slots_ends_the_writing() -> None:
     with bench("atv71") as here:
         plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
         honest = here.session.line.write
@@ -376,7 +374,7 @@ LOST = {"line": LineLost("The program that owned it ended."), "answer": NoAnswer
 
 @pytest.mark.parametrize("error", LOST.values(), ids=LOST)
 @pytest.mark.parametrize("taken", [True, False])
-async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
+async def test_slot_without_a_reply_is_read_and_not_written_again(
     error: LineError, taken: bool
 ) -> None:
     with bench("atv71") as here:
@@ -412,7 +410,7 @@ async def test_writes_before_line_loss_are_reported() -> None:
             await write(here, plan)
 
 
-async def test_a_read_only_line_writes_nothing() -> None:
+async def test_read_only_line_writes_no_slot() -> None:
     with bench("atv71", read_only=True) as here, pytest.raises(RequestRefused):
         await write(here, plan_of(here, "read", ["LCR"]))
 
@@ -453,14 +451,14 @@ async def test_damaged_user_words_are_none(text: str, own_folders: Path) -> None
         assert load_words(here.session) == NO_WORDS
 
 
-async def test_a_drive_that_meets_the_unknown_with_silence_is_not_requested_again() -> None:
+async def test_drive_silent_at_unknown_words_is_not_read_again() -> None:
     with bench("powerdrive") as here:
         words = (UserWord(60000), *NO_WORDS[1:])
         assert await read_words(here.session, words) == [None] * 4
         assert list(here.session.line.trace) == []
 
 
-async def test_the_timing_is_that_of_the_line() -> None:
+async def test_timing_is_that_of_the_line() -> None:
     with bench("atv71") as here:
         await Reader(here.session).read(["ETA"])
         timing = wire_timing(here.session)
@@ -468,7 +466,7 @@ async def test_the_timing_is_that_of_the_line() -> None:
         assert 0 < timing.turnaround < 1
 
 
-async def test_trembling_values_of_a_real_line_are_no_difference() -> None:
+async def test_fluctuating_values_are_not_a_difference() -> None:
     sets = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 11}
     timing = LineTiming(19200, "8N1", True)
     simulation = Simulation([DriveSpec("atv21", 1, sets=sets, run_hz=35.0)], timing=timing)

@@ -129,7 +129,7 @@ def silence() -> NoAnswer:
     return NoAnswer(1, 3, STATE)
 
 
-async def test_after_one_failed_request_only_that_cycle_is_read_again(bench: Bench) -> None:
+async def test_one_failed_request_repeats_only_its_cycle(bench: Bench) -> None:
     await bench.run(12)
     failed, after = await bench.fail(silence(), cycles=2)
     assert failed[0].error
@@ -139,7 +139,7 @@ async def test_after_one_failed_request_only_that_cycle_is_read_again(bench: Ben
     assert REFUSED not in after[1]  # it is still known that the drive does not have it
 
 
-async def test_a_failed_cycle_shows_its_error_and_nothing_new(bench: Bench) -> None:
+async def test_failed_cycle_shows_its_error_and_no_new_values(bench: Bench) -> None:
     await bench.run(3)
     (before, _), *_ = await bench.run(1)
     bench.line.registers[SPEED] = 777
@@ -165,7 +165,7 @@ async def test_value_possibly_of_another_drive_is_read_again(
     assert {REFUSED, *(FIRST_SLOW + 100 * i for i in range(SLOW))} <= requested
 
 
-async def test_a_drive_in_fault_may_be_reset_by_the_failure(bench: Bench) -> None:
+async def test_drive_in_fault_stays_resettable_after_a_failed_read(bench: Bench) -> None:
     bench.line.registers[STATE] = FAULT
     await bench.run(12)
     cycles = await bench.fail(silence(), cycles=10)
@@ -173,7 +173,7 @@ async def test_a_drive_in_fault_may_be_reset_by_the_failure(bench: Bench) -> Non
     assert any(REFUSED in addresses for _, addresses in cycles)
 
 
-async def test_a_snapshot_is_stale_after_three_of_its_cycles(bench: Bench) -> None:
+async def test_snapshot_is_stale_after_three_cycles(bench: Bench) -> None:
     ((snapshot, _),) = await bench.run(1)
     slow = replace(snapshot, period=2.0)
     assert not slow.is_stale(slow.time + 5.9)
@@ -184,7 +184,7 @@ async def test_a_snapshot_is_stale_after_three_of_its_cycles(bench: Bench) -> No
     assert fast.is_stale(fast.time + 1.6)
 
 
-async def test_values_of_failed_cycles_are_stale_after_three(bench: Bench) -> None:
+async def test_values_are_stale_after_three_failed_cycles(bench: Bench) -> None:
     await bench.run(3)
     bench.line.silence(1)
     cycles = await bench.run(12)
@@ -197,7 +197,7 @@ async def test_values_of_failed_cycles_are_stale_after_three(bench: Bench) -> No
     assert snapshot.state.kind == "unknown"
 
 
-async def test_a_failed_cycle_leaves_a_gap_in_the_trend(bench: Bench) -> None:
+async def test_failed_cycle_leaves_a_gap_in_the_trend(bench: Bench) -> None:
     bench.monitor._trend._codes = ["SPEED"]
     await bench.run(2)
     await bench.fail(silence(), cycles=1)
@@ -223,7 +223,7 @@ def test_failed_range_is_halved_then_doubled() -> None:
     assert len(requested[5]) <= 1  # the usual turns again
 
 
-def test_all_have_their_turn_though_some_fail() -> None:
+def test_all_parameters_get_their_turn_although_some_fail() -> None:
     due, codes = Rotation(10), tuple("abcdefghijklmnopqrstuvwxyz")
     read: set[str] = set()
     for cycle in range(120):
@@ -236,7 +236,7 @@ def test_all_have_their_turn_though_some_fail() -> None:
     assert read == set(codes)
 
 
-def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
+def test_unreadable_values_are_not_retried_forever() -> None:
     due = Rotation(10)
     due.add("ab")
     due.turn("ab", one_each)
@@ -247,7 +247,7 @@ def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
     assert due.turn("ab", lambda codes: []) == ()
 
 
-async def test_a_drive_that_is_held_back_is_not_requested_and_says_why(bench: Bench) -> None:
+async def test_paused_drive_is_not_polled_and_has_a_reason(bench: Bench) -> None:
     await bench.run(2)
     bench.monitor.held_back = lambda: "Left alone."
     reported = await bench.run(FORGOTTEN_AFTER + 2)
@@ -265,7 +265,7 @@ async def test_a_drive_that_is_held_back_is_not_requested_and_says_why(bench: Be
         (LineLost("The line is lost."), "not_polled"),
     ],
 )
-async def test_failed_cycle_tells_silence_damage_and_no_poll_apart(
+async def test_failed_cycle_is_silent_damaged_or_not_polled(
     bench: Bench, fault: Exception, contact: str
 ) -> None:
     good, _ = (await bench.run(1))[0]
@@ -282,7 +282,7 @@ async def test_drive_that_refuses_every_read_is_neither_silent_nor_read(bench: B
     assert seen.contact == "refused"
 
 
-async def test_wish_that_others_tell_in_the_first_cycle_stretches_it(bench: Bench) -> None:
+async def test_claim_of_another_program_lengthens_the_first_cycle(bench: Bench) -> None:
     before_read = bench.line.before_read
 
     async def claimed(device: int, registers: range, priority: Priority) -> None:
@@ -295,7 +295,7 @@ async def test_wish_that_others_tell_in_the_first_cycle_stretches_it(bench: Benc
     assert seen.too_slow
 
 
-async def test_cycle_without_any_reading_is_no_refusal(bench: Bench) -> None:
+async def test_cycle_without_any_value_is_not_a_refusal(bench: Bench) -> None:
     bench.monitor.start([], period=0.01)
     for snapshot, _ in await bench.run(2):
         assert not snapshot.readings

@@ -47,7 +47,7 @@ def settings(text: str) -> Path:
     return path
 
 
-def test_a_name_stands_for_a_line_and_its_drive() -> None:
+def test_name_refers_to_a_line_and_its_drive() -> None:
     path = settings(GOOD)
     assert line_named("pump") == NamedLine("pump", BY_ID)
     assert line_named("fan") == NamedLine("Fan", "tcp:192.168.0.10", 5, "powerdrive")
@@ -68,14 +68,14 @@ def test_without_a_file_there_are_no_names() -> None:
     assert line_named("pump") is None
 
 
-def test_the_file_is_read_anew_once_it_has_changed() -> None:
+def test_changed_file_is_read_again() -> None:
     settings('lines.pump = "tcp:one"')
     assert named_lines()["pump"].line == "tcp:one"
     settings('lines.pump = "tcp:three"')
     assert named_lines()["pump"].line == "tcp:three"
 
 
-def test_the_file_lies_beside_the_profiles(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_file_is_beside_the_profiles(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("DRIVEPANEL_CONFIG")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     assert settings_file() == tmp_path / "drivepanel" / "settings.toml"
@@ -99,9 +99,7 @@ def test_the_file_lies_beside_the_profiles(monkeypatch: pytest.MonkeyPatch, tmp_
         ("[line]", "3: line: only a table [lines]"),
     ],
 )
-def test_a_fault_is_reported_with_file_line_and_key_and_hinders_no_other_name(
-    row: str, fault: str
-) -> None:
+def test_error_has_file_line_and_key_and_affects_no_other_name(row: str, fault: str) -> None:
     path = settings(f'[lines]\npump = "tcp:gateway"\n{row}\n')
     (reported,) = line_settings().faults
     assert reported.startswith(f"{path}:{fault}")
@@ -121,7 +119,7 @@ def test_a_fault_is_reported_with_file_line_and_key_and_hinders_no_other_name(
     ],
     ids=["table", "cut short", "deep", "zero", "long"],
 )
-def test_a_file_that_is_no_settings_says_so_and_ends_nothing(text: str) -> None:
+def test_invalid_settings_file_is_reported_and_ends_nothing(text: str) -> None:
     path = settings(text)
     (reported,) = line_settings().faults
     assert reported.startswith(str(path))
@@ -130,7 +128,7 @@ def test_a_file_that_is_no_settings_says_so_and_ends_nothing(text: str) -> None:
 
 
 @pytest.mark.parametrize("what", ["pipe", "zero", "folder", "bytes", "gone"])
-def test_a_path_that_is_no_file_says_so_and_waits_for_nobody(what: str) -> None:
+def test_path_that_is_not_a_file_is_reported_without_blocking(what: str) -> None:
     path = settings_file()
     path.parent.mkdir(parents=True)
     match what:
@@ -158,7 +156,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
-def test_a_stop_finds_its_line_in_a_broken_file(text: str) -> None:
+def test_stop_finds_its_line_in_a_broken_file(text: str) -> None:
     text = text.replace('["lines"]', "[lines]")
     settings(text)
     with pytest.raises(SettingsError):
@@ -177,19 +175,19 @@ def test_a_stop_finds_its_line_in_a_broken_file(text: str) -> None:
         "[lines.x]\ndevice = 3\n[",
     ],
 )
-def test_a_stop_finds_its_drive_in_a_broken_file(text: str) -> None:
+def test_stop_finds_its_drive_in_a_broken_file(text: str) -> None:
     settings(text)
     assert line_to_stop("pump") == NamedLine("pump", "tcp:x", 7, "powerdrive")
 
 
 @pytest.mark.parametrize("device", ['"x"', "five", "300", "", "-2"])
-def test_a_stop_of_a_drive_that_cannot_be_made_out_says_what_to_type(device: str) -> None:
+def test_stop_of_an_unreadable_drive_says_what_to_type(device: str) -> None:
     settings(f'[lines.pump]\nline = "tcp:x"\ndevice = {device}\n')
     with pytest.raises(SettingsError, match="stop tcp:x -d ADDRESS"):
         line_to_stop("pump")
 
 
-def test_a_stop_of_a_name_that_is_nowhere_is_refused() -> None:
+def test_stop_of_an_unknown_name_is_refused() -> None:
     settings("[lines")
     with pytest.raises(SettingsError):
         line_to_stop("pump")
@@ -197,7 +195,7 @@ def test_a_stop_of_a_name_that_is_nowhere_is_refused() -> None:
     assert line_to_stop("other") is None
 
 
-def test_the_profile_of_a_drive_is_that_of_its_line_and_address() -> None:
+def test_profile_of_a_drive_follows_line_and_address() -> None:
     settings(GOOD)
     assert profile_named("tcp:192.168.0.10:502", 5) == "powerdrive"
     assert profile_named("tcp:192.168.0.10:502", 6) is None
@@ -205,12 +203,12 @@ def test_the_profile_of_a_drive_is_that_of_its_line_and_address() -> None:
 
 
 @pytest.mark.parametrize("text", ["a", "pump-2", "Pump_2", "COM", "COM3x"])
-def test_names(text: str) -> None:
+def test_valid_names_are_accepted(text: str) -> None:
     assert is_name(text)
 
 
 @pytest.mark.parametrize("text", ["", "2pump", "pump.toml", "a b", "com12", "x" * 33, "tcp:x", "é"])
-def test_no_names(text: str) -> None:
+def test_invalid_names_are_refused(text: str) -> None:
     assert not is_name(text)
 
 
@@ -219,7 +217,7 @@ SIGNS = [*"[]{}=\".'\n,\\#5x\0é", "", "lines"]
 
 @how(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
 @given(st.lists(st.tuples(st.integers(0, len(GOOD)), st.sampled_from(SIGNS)), max_size=12))
-def test_a_file_of_any_content_ends_in_a_sentence(changes: list[tuple[int, str]]) -> None:
+def test_random_content_is_reported_in_a_sentence(changes: list[tuple[int, str]]) -> None:
     text = GOOD
     for at, sign in changes:
         text = text[:at] + sign + text[at + 1 :]

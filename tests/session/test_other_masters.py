@@ -41,7 +41,7 @@ def test_other_master_is_reported_with_its_requests() -> None:
     )
 
 
-def test_of_many_requests_to_one_address_some_are_reported() -> None:
+def test_many_requests_to_one_address_are_summarized() -> None:
     frames = [came(read_frame(4, register, 1), LATE) for register in range(5)]
     assert "read of register 2 and 2 more." in overheard(frames, 0.0).text
 
@@ -57,11 +57,11 @@ def test_of_many_requests_to_one_address_some_are_reported() -> None:
     ],
     ids=["before", "our own, late", "echo", "a reply to us", "a spark"],
 )
-def test_frames_of_no_master(frames: list[Frame]) -> None:
+def test_own_or_damaged_frames_show_no_master(frames: list[Frame]) -> None:
     assert overheard(frames, 0.0).text == ""
 
 
-def test_replies_to_somebody_and_talk_that_is_no_frame_show_a_master_too() -> None:
+def test_foreign_replies_and_unknown_bytes_show_a_master() -> None:
     reply = frame(4, bytes.fromhex("03 02 0006"))
     assert "4 answered it" in overheard([came(reply, LATE)], 0.0).text
     assert "another baud or format: 6 bytes" in Overheard(loose=6).text
@@ -86,7 +86,7 @@ def talking(peer: PtyPeer, *, gap: float) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("gap", [0.1, 0.004], ids=["now and then", "without a silence"])
-async def test_a_master_is_heard_on_a_line_on_which_nothing_is_sent(gap: float) -> None:
+async def test_master_is_detected_on_an_idle_line(gap: float) -> None:
     with PtyPeer(silent) as peer:
         line = Line(SerialLink(peer.path))
         line.open(wait=10.0)
@@ -99,7 +99,7 @@ async def test_a_master_is_heard_on_a_line_on_which_nothing_is_sent(gap: float) 
             line.close()
 
 
-async def test_damaged_replies_to_polls_are_no_talk_of_others() -> None:
+async def test_damaged_replies_to_polls_do_not_show_a_master() -> None:
     def damaged(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(request[0], bytes.fromhex("03 02 0001"))[:-1] + b"\0"]
 
@@ -117,7 +117,7 @@ async def test_damaged_replies_to_polls_are_no_talk_of_others() -> None:
             line.close()
 
 
-async def test_a_master_that_begins_during_a_search_ends_it() -> None:
+async def test_master_that_starts_during_a_scan_ends_it() -> None:
     with PtyPeer(silent) as peer:
         line = Line(SerialLink(peer.path))
         line.open(wait=10.0)

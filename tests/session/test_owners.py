@@ -87,7 +87,7 @@ async def bench(family: str, *, watch: bool = True, **spec: Any) -> AsyncIterato
 # What is known
 
 
-async def test_an_older_reply_never_takes_the_place_of_a_newer_one() -> None:
+async def test_older_reply_never_replaces_a_newer_one() -> None:
     async with bench("atv71", watch=False) as here:
         image = here.session.image
         now = time.monotonic()
@@ -96,7 +96,7 @@ async def test_an_older_reply_never_takes_the_place_of_a_newer_one() -> None:
         assert image.raws["ACC"] == 50
 
 
-async def test_possibly_changed_value_is_known_but_not_trusted() -> None:
+async def test_possibly_changed_value_is_kept_but_not_trusted() -> None:
     async with bench("atv71", watch=False) as here:
         image = here.session.image
         await Reader(here.session).read(["CHCF"])
@@ -111,7 +111,7 @@ async def test_possibly_changed_value_is_known_but_not_trusted() -> None:
 # Watching
 
 
-async def test_a_monitor_that_dies_by_an_error_of_its_own_says_so_and_begins_anew(
+async def test_monitor_with_an_internal_error_reports_it_and_restarts(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(monitor_module, "RESTART_AFTER", 0.2)
@@ -136,7 +136,7 @@ async def test_a_monitor_that_dies_by_an_error_of_its_own_says_so_and_begins_ane
         await until(lambda: monitor.latest is not None and not monitor.latest.error)
 
 
-async def test_a_listener_that_raises_hurts_nobody(caplog: pytest.LogCaptureFixture) -> None:
+async def test_listener_that_raises_affects_no_other(caplog: pytest.LogCaptureFixture) -> None:
     async with bench("atv71") as here:
         monitor = here.console.monitor
 
@@ -153,7 +153,7 @@ async def test_a_listener_that_raises_hurts_nobody(caplog: pytest.LogCaptureFixt
         assert "a listener's own mistake" in caplog.text
 
 
-async def test_a_snapshot_that_no_cycle_follows_is_stale() -> None:
+async def test_snapshot_without_a_following_cycle_becomes_stale() -> None:
     async with bench("atv71") as here:
         latest = here.console.latest
         assert latest is not None
@@ -161,7 +161,7 @@ async def test_a_snapshot_that_no_cycle_follows_is_stale() -> None:
         assert latest.is_stale(latest.time + 5.0)
 
 
-async def test_arming_asks_for_a_state_of_now() -> None:
+async def test_arming_requires_a_current_state() -> None:
     """With a monitor that stands still, an old state arms nothing; the drive is asked."""
     async with bench("atv71") as here:
         here.console.monitor.stop()
@@ -174,7 +174,7 @@ async def test_arming_asks_for_a_state_of_now() -> None:
         assert requested
 
 
-async def test_a_drive_that_does_not_tell_its_state_is_not_armed(
+async def test_drive_without_a_state_is_not_armed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async with bench("atv71", watch=False) as here:
@@ -196,7 +196,7 @@ async def test_a_drive_that_does_not_tell_its_state_is_not_armed(
 EIGHT = ("ACC", "DEC", "LSP", "AC2", "DE2", "TLS", "JPF", "ITH")
 
 
-async def test_a_stop_ends_parameter_writing_before_its_next_frame() -> None:
+async def test_stop_ends_parameter_writing_before_the_next_frame() -> None:
     """Eight staged edits: what was on the wire may go out, nothing behind the stop does."""
     async with bench("atv71", run_hz=20.0) as here:
         editor, profile = here.console.editor, here.session.profile
@@ -230,7 +230,7 @@ async def test_a_stop_ends_parameter_writing_before_its_next_frame() -> None:
         assert len(editor.staging.edits) < staged
 
 
-async def test_settings_and_blocks_are_refused_while_the_drive_is_not_armed() -> None:
+async def test_settings_and_blocks_are_refused_on_a_disarmed_drive() -> None:
     """Arming belongs to the drive, not to the screen that asks."""
     async with bench("atv71") as here:
         await Reader(here.session).read(["ACC", "INR"])
@@ -246,7 +246,7 @@ async def test_settings_and_blocks_are_refused_while_the_drive_is_not_armed() ->
         assert "ACC" in editor.staging.edits
 
 
-async def test_one_thing_at_a_time_is_done_to_a_drive() -> None:
+async def test_tasks_of_a_drive_run_one_at_a_time() -> None:
     async with bench("atv71") as here:
         await Reader(here.session).read(["ACC", "INR"])
         here.session.arming.arm()
@@ -263,7 +263,7 @@ async def test_one_thing_at_a_time_is_done_to_a_drive() -> None:
 # The fleet
 
 
-async def test_the_drives_are_walked_from_another_thread_while_they_come_and_go() -> None:
+async def test_drives_can_be_iterated_from_another_thread() -> None:
     async with bench("atv71", watch=False) as here:
         fleet, ended = here.fleet, threading.Event()
         errors: list[BaseException] = []
@@ -290,7 +290,7 @@ async def test_the_drives_are_walked_from_another_thread_while_they_come_and_go(
         assert list(fleet.found) == list(range(1, 32))
 
 
-async def test_drives_at_rest_that_will_trip_are_known() -> None:
+async def test_resting_drives_that_will_trip_are_known() -> None:
     """An Altivar 21 watches the line from the first request on, at rest too."""
     async with bench("atv21") as here:
         await until(lambda: here.fleet.line_watch.watch(1) is not None)
@@ -299,7 +299,7 @@ async def test_drives_at_rest_that_will_trip_are_known() -> None:
         assert here.fleet.line_watch.under_command() == []
 
 
-async def test_a_motor_that_runs_by_the_line_is_watched_whoever_started_it() -> None:
+async def test_motor_commanded_by_the_line_is_watched_whatever_started_it() -> None:
     """The timeout of an Altivar 71 runs once it was commanded, be it by another program."""
     async with bench("atv71", watch=False) as here:
         line_watch = here.fleet.line_watch
@@ -312,7 +312,7 @@ async def test_a_motor_that_runs_by_the_line_is_watched_whoever_started_it() -> 
         assert 1 in line_watch.left_alone()
 
 
-async def test_arming_that_a_command_requested_does_not_run_out() -> None:
+async def test_arming_by_a_command_does_not_expire() -> None:
     async with bench("atv71") as here:
         here.session.arming.arm(seconds=math.inf)
         assert here.session.arming.armed_for == math.inf
@@ -320,7 +320,7 @@ async def test_arming_that_a_command_requested_does_not_run_out() -> None:
         assert here.session.arming.armed_for == math.inf
 
 
-async def test_a_drive_that_is_found_again_keeps_what_is_known_of_it() -> None:
+async def test_drive_found_again_keeps_its_known_values() -> None:
     """A rescan while a motor runs by a command from here must not disown it."""
     async with bench("atv71", run_hz=20.0) as here:
         here.session.note_command()
@@ -333,7 +333,7 @@ async def test_a_drive_that_is_found_again_keeps_what_is_known_of_it() -> None:
         assert "It runs by a command of this panel" in here.fleet.events.events[-1].text
 
 
-async def test_a_drive_that_is_named_otherwise_is_another_one() -> None:
+async def test_drive_with_another_profile_is_a_new_one() -> None:
     async with bench("atv71") as here:
         await until(lambda: not here.fleet.line_watch.under_command())
         other = here.fleet.take(DriveSession(here.line, 1, library.load("atv312")))

@@ -40,7 +40,7 @@ def sleeper() -> Iterator[subprocess.Popen[bytes]]:
             program.kill()
 
 
-def test_this_program_lives() -> None:
+def test_this_program_is_alive() -> None:
     here = Processes()
     started = here.started(os.getpid())
     assert started
@@ -48,7 +48,7 @@ def test_this_program_lives() -> None:
 
 
 @pytest.mark.parametrize("proc", [Path("/proc"), Path("/nowhere")], ids=["proc", "ps"])
-def test_a_killed_program_ended_before_its_status_is_fetched(proc: Path) -> None:
+def test_killed_program_counts_as_ended_before_it_is_reaped(proc: Path) -> None:
     here = Processes(proc)
     with sleeper() as program:
         started = here.started(program.pid)
@@ -60,22 +60,22 @@ def test_a_killed_program_ended_before_its_status_is_fetched(proc: Path) -> None
         assert here.started(program.pid) is None
 
 
-def test_a_reused_number_is_another_program(tmp_path: Path) -> None:
+def test_reused_pid_is_another_program(tmp_path: Path) -> None:
     here = made_up(tmp_path, p7="S 200")
     assert here.lives("boot-1", 7, "200")
     assert not here.lives("boot-1", 7, "100")
 
 
-def test_a_program_of_the_machine_s_last_run_ended(tmp_path: Path) -> None:
+def test_program_of_an_earlier_boot_has_ended(tmp_path: Path) -> None:
     assert not made_up(tmp_path, boot="boot-2", p7="S 100").lives("boot-1", 7, "100")
 
 
 @pytest.mark.parametrize(("state", "lives"), [("S", True), ("T", True), ("Z", False), ("X", False)])
-def test_states(tmp_path: Path, state: str, lives: bool) -> None:
+def test_process_state_shows_if_it_is_alive(tmp_path: Path, state: str, lives: bool) -> None:
     assert made_up(tmp_path, p7=f"{state} 100").lives("boot-1", 7, "100") is lives
 
 
-def test_in_doubt_it_lives(tmp_path: Path) -> None:
+def test_process_with_unknown_state_counts_as_alive(tmp_path: Path) -> None:
     here = made_up(tmp_path, p7="S 100")
     assert here.lives("", 7, "")
     (tmp_path / "8").mkdir()

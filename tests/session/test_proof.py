@@ -100,7 +100,7 @@ def test_two_comparisons_are_not_enough() -> None:
     assert not any(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
 
 
-def test_replacement_for_a_choice_is_reported() -> None:
+def test_replacement_for_an_assignment_is_reported() -> None:
     behind = dict.fromkeys(BLOCK.slots, CODES[2])
     proof = compared(behind, APART, 2, random.Random(1), CHOSEN)
     assert {proof.brings(slot) for slot in BLOCK.slots} == {""}
@@ -132,7 +132,7 @@ def test_replacement_for_a_choice_is_reported() -> None:
         ("FD01", [(0b100, 0b011, 0b001)], SlotMatch.DIFFERS),
     ],
 )
-def test_how_words_compare(
+def test_words_are_compared_over_rounds(
     code: str, rounds: list[tuple[int, int, int]], verdict: SlotMatch
 ) -> None:
     proof = SlotEvidence(PROFILE, BLOCK)
@@ -142,20 +142,20 @@ def test_how_words_compare(
     assert proof.verdict("F876", code) is SlotMatch.UNREAD
 
 
-def test_an_even_ramp_does_not_hide_what_a_place_brings() -> None:
+def test_linear_ramp_does_not_hide_the_value_of_a_slot() -> None:
     signal = APART | {CODES[1]: Signal(2500, slope=300.0), CODES[3]: Signal(5200, slope=600.0)}
     proof = compared(CHOSEN, signal, 6, random.Random(1))
     assert all(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
 
 
-def test_values_that_are_alike_prove_nothing_but_hinder_no_other_place() -> None:
+def test_equal_values_confirm_nothing_and_block_no_other_slot() -> None:
     signal = APART | {CODES[1]: Signal(0), CODES[4]: Signal(0)}
     proof = compared(CHOSEN, signal, 6, random.Random(1))
     held = [slot for slot, code in CHOSEN.items() if proof.holds(slot, RAWS[code])]
     assert held == [slot for slot in BLOCK.slots if slot not in ("F876", "F879")]
 
 
-def test_a_parameter_that_was_not_compared_leaves_all_open() -> None:
+def test_uncompared_parameter_leaves_all_slots_unconfirmed() -> None:
     proof = SlotEvidence(PROFILE, BLOCK)
     for _ in range(5):
         for code in CODES[:-1]:
@@ -166,7 +166,7 @@ def test_a_parameter_that_was_not_compared_leaves_all_open() -> None:
     assert CODES[-1] in proof.open_codes({"F875": RAWS["FD01"]})
 
 
-def test_a_place_that_was_unlucky_may_begin_again() -> None:
+def test_excluded_slot_may_start_again() -> None:
     chosen = {"F875": CODES[0]}
     raws = {"F875": RAWS[CODES[0]]}
     wrong = compared(dict.fromkeys(BLOCK.slots, CODES[2]), APART, 3, random.Random(1), chosen)
@@ -188,7 +188,7 @@ def test_a_place_that_was_unlucky_may_begin_again() -> None:
     rounds=st.integers(3, 8),
     seed=st.integers(0, 2**16),
 )
-def test_nothing_is_proved_that_is_not_so(
+def test_only_true_assignments_are_confirmed(
     signal: list[Signal], behind: list[str], chosen: list[str], rounds: int, seed: int
 ) -> None:
     """Whatever the values do, a place is never taken for another parameter's."""
@@ -210,6 +210,6 @@ def test_nothing_is_proved_that_is_not_so(
                 assert not proof.holds(slot, RAWS[other]), (slot, code, other)
 
 
-def test_nothing_is_sure_before_anything_was_compared() -> None:
+def test_nothing_is_confirmed_before_a_comparison() -> None:
     reported: Callable[[str, int], bool] = SlotEvidence(PROFILE, BLOCK).holds
     assert not any(reported(slot, raw) for slot in BLOCK.slots for raw in (0, *RAWS.values(), 99))

@@ -55,7 +55,7 @@ NEVER = replace(AS_SET, bracket=Bracket(6.0), seen="", fault="")
         ),
     ],
 )
-def test_result_in_words(result: ProofResult, short: str, parts: list[str]) -> None:
+def test_result_is_described_in_words(result: ProofResult, short: str, parts: list[str]) -> None:
     assert result.short == short
     assert [part for part in parts if part not in result.text] == []
     assert ("NOT AS SET" in result.text) is ("NOT AS SET" in short)
@@ -75,7 +75,7 @@ def test_short_timeout_may_differ_by_50_ms() -> None:
 
 
 @pytest.mark.parametrize(("result", "verdict"), [(AS_SET, "as set"), (LATE, "NOT AS SET")])
-def test_entry_of_the_journal(result: ProofResult, verdict: str) -> None:
+def test_result_has_a_journal_entry(result: ProofResult, verdict: str) -> None:
     session = DriveSession(FakeLine(), 7, PROFILE)
     entry = proof_entry(session, result)
     assert (entry.device, entry.profile, entry.code) == (7, "atv312", "ttO")

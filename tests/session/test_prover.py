@@ -92,7 +92,7 @@ def bench(clock: OwnTime, drive: WatchingDrive, *, turning: bool = False) -> Pro
     return Prover(session, Journal(), session.work.permit(), turning)
 
 
-def test_silences_around_the_time_out_are_at_most_300_ms_apart_at_2_s() -> None:
+def test_silences_near_a_2_s_timeout_are_at_most_300_ms_apart() -> None:
     around = [silence for silence in silences(2.0) if 1.5 <= silence <= 2.7]
     steps = [b - a for a, b in pairwise(around)]
     assert max(steps) < 0.3
@@ -101,7 +101,7 @@ def test_silences_around_the_time_out_are_at_most_300_ms_apart_at_2_s() -> None:
 
 
 @pytest.mark.parametrize("timeout", [0.5, 2.0, 10.0])
-async def test_a_drive_that_reacts_as_set_is_bracketed(timeout: float) -> None:
+async def test_timeout_of_a_drive_that_reacts_as_set_is_bracketed(timeout: float) -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, timeout)
     result = await bench(clock, drive).prove()
@@ -114,7 +114,9 @@ async def test_a_drive_that_reacts_as_set_is_bracketed(timeout: float) -> None:
 
 
 @pytest.mark.parametrize(("timeout", "held"), [(0.4, 2.0), (1.0, 2.0), (4.0, 2.0)])
-async def test_a_time_out_that_is_not_the_one_set_is_reported(timeout: float, held: float) -> None:
+async def test_timeout_that_differs_from_its_setting_is_reported(
+    timeout: float, held: float
+) -> None:
     clock = OwnTime()
     result = await bench(clock, WatchingDrive(clock, timeout, held=held)).prove()
     assert not result.as_set
@@ -124,7 +126,7 @@ async def test_a_time_out_that_is_not_the_one_set_is_reported(timeout: float, he
 
 
 @pytest.mark.parametrize("timeout", [2.0, math.inf])
-async def test_connection_closed_in_a_silence_is_read_once_it_is_back(timeout: float) -> None:
+async def test_connection_closed_in_a_silence_is_read_after_it_returns(timeout: float) -> None:
     clock, texts, lost = OwnTime(), list[str](), dict[float, float]()
 
     class BehindAGateway(WatchingDrive):
@@ -148,7 +150,7 @@ async def test_connection_closed_in_a_silence_is_read_once_it_is_back(timeout: f
     assert result.bracket.not_before <= timeout <= (result.bracket.not_after or math.inf)
 
 
-async def test_line_that_stays_lost_ends_the_proof() -> None:
+async def test_line_that_stays_lost_ends_the_test() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 2.0)
     lost_at: list[float] = []
@@ -165,7 +167,7 @@ async def test_line_that_stays_lost_ends_the_proof() -> None:
     assert not drive.facts.paused
 
 
-async def test_a_drive_that_never_reacts_is_reported_in_capitals() -> None:
+async def test_drive_that_never_reacts_is_reported_in_capitals() -> None:
     clock = OwnTime()
     result = await bench(clock, WatchingDrive(clock, math.inf, held=1.0)).prove()
     assert not result.as_set
@@ -174,7 +176,7 @@ async def test_a_drive_that_never_reacts_is_reported_in_capitals() -> None:
     assert result.text.startswith("DID NOT REACT to 3.0 s")
 
 
-async def test_another_fault_than_that_of_the_line_is_not_as_set() -> None:
+async def test_fault_other_than_communication_loss_is_not_as_set() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     drive.fault = 9
@@ -183,7 +185,7 @@ async def test_another_fault_than_that_of_the_line_is_not_as_set() -> None:
     assert "the fault should be SLF" in result.text
 
 
-async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards() -> None:
+async def test_polling_is_paused_during_the_test_and_resumes() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     prover = bench(clock, drive)
@@ -202,7 +204,7 @@ async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards
     await drive.read(1, STATUS)
 
 
-async def test_a_stop_ends_the_proof_and_lets_the_drive_be_requested() -> None:
+async def test_stop_ends_the_test_and_resumes_polling() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 5.0)
     prover = bench(clock, drive)
@@ -213,7 +215,7 @@ async def test_a_stop_ends_the_proof_and_lets_the_drive_be_requested() -> None:
     assert not drive.facts.paused
 
 
-async def test_a_motor_that_turns_is_proved_only_where_that_was_reported() -> None:
+async def test_turning_motor_is_tested_only_if_confirmed() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     drive.registers[STATUS] = RUNNING
@@ -226,7 +228,7 @@ async def test_a_motor_that_turns_is_proved_only_where_that_was_reported() -> No
         await bench(clock, drive, turning=True).prove()
 
 
-async def test_a_motor_that_begins_to_turn_meanwhile_is_still_polled() -> None:
+async def test_motor_that_starts_during_the_test_is_polled_again() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 5.0)
 
@@ -240,7 +242,7 @@ async def test_a_motor_that_begins_to_turn_meanwhile_is_still_polled() -> None:
     assert not drive.facts.paused
 
 
-async def test_foreign_change_during_test_proves_nothing() -> None:
+async def test_foreign_change_during_the_test_invalidates_it() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
 
@@ -252,7 +254,7 @@ async def test_foreign_change_during_test_proves_nothing() -> None:
         await bench(clock, drive).prove()
 
 
-async def test_a_long_time_out_gets_silences_that_are_longer() -> None:
+async def test_long_timeout_gets_longer_silences() -> None:
     clock = OwnTime()
     result = await bench(clock, WatchingDrive(clock, 100.0)).prove()
     assert result.as_set
@@ -272,7 +274,7 @@ async def test_without_visible_reaction_or_with_fault_is_refused() -> None:
         await bench(clock, drive).prove()
 
 
-async def test_a_watch_that_is_off_is_nothing_to_prove() -> None:
+async def test_disabled_timeout_is_not_tested() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     drive.registers[TIMEOUT] = 0
@@ -281,7 +283,7 @@ async def test_a_watch_that_is_off_is_nothing_to_prove() -> None:
     assert not drive.facts.paused
 
 
-async def test_a_reaction_that_was_changed_behind_the_panels_back_is_reported() -> None:
+async def test_reaction_changed_by_another_source_is_reported() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 1.0)
     prover = bench(clock, drive)
@@ -290,7 +292,7 @@ async def test_a_reaction_that_was_changed_behind_the_panels_back_is_reported() 
     assert result.changed.startswith("ttO is 1.0 s; it was 10.0 s when")
 
 
-def test_the_bracket_never_closes_on_the_wrong_side() -> None:
+def test_bracket_never_contradicts_itself() -> None:
     bracket = Bracket().alive(1.9).reacted(1.8)
     assert bracket.not_after == 1.9
     assert not Bracket().alive(3.0).holds(1.0)
@@ -318,9 +320,7 @@ class WithoutModule(OneDrive):
         (("15.07", "11.63"), "Not tested: 15.07 and 11.63 cannot be read; .* is unknown"),
     ],
 )
-async def test_ports_that_the_drive_does_not_have_are_named(
-    codes: tuple[str, ...], reported: str
-) -> None:
+async def test_missing_ports_of_the_drive_are_named(codes: tuple[str, ...], reported: str) -> None:
     clock = OwnTime()
     drive = WithoutModule(clock, *codes)
     session = DriveSession(drive, 1, drive.profile, clock=clock)
@@ -330,7 +330,7 @@ async def test_ports_that_the_drive_does_not_have_are_named(
     assert not drive.facts.paused
 
 
-async def test_a_drive_that_answers_nothing_is_reported_as_such() -> None:
+async def test_silent_drive_is_reported_as_such() -> None:
     clock = OwnTime()
     drive = WithoutModule(clock, "15.07", "6.42", "6.43")
     session = DriveSession(drive, 1, drive.profile, clock=clock)
@@ -340,7 +340,7 @@ async def test_a_drive_that_answers_nothing_is_reported_as_such() -> None:
 
 
 @pytest.mark.parametrize("timeout", [2.0, 10.0])
-def test_silences_are_close_around_the_timeout(timeout: float) -> None:
+def test_silences_are_dense_around_the_timeout(timeout: float) -> None:
     expected = [0.25, 0.5, 0.7, 0.82, 0.94, 1.06, 1.18, 1.6, 2.2, 3.0]
     assert list(silences(timeout)) == pytest.approx([share * timeout for share in expected])
     assert list(silences(40.0))[-3:] == [64.0, 88.0, 90.0]
@@ -393,7 +393,7 @@ async def test_motor_that_slows_down_has_reacted(status: int, hertz: float, seen
     assert result.fault == ""
 
 
-async def test_stop_at_the_end_of_a_silence_keeps_the_read_from_the_drive() -> None:
+async def test_stop_at_the_end_of_a_silence_prevents_the_read() -> None:
     begun: list[float] = []
 
     class StoppedThen(OwnTime):
@@ -451,7 +451,7 @@ def bench_71(clock: OwnTime, drive: OneDrive) -> Prover:
     return Prover(session, Journal(), session.work.permit())
 
 
-async def test_watch_begins_with_one_command_that_moves_nothing() -> None:
+async def test_timeout_is_started_with_a_command_that_moves_nothing() -> None:
     clock = OwnTime()
     drive = WatchedFromItsFirstCommand(clock, profile_in_force=1)
     prover = bench_71(clock, drive)
@@ -464,7 +464,7 @@ async def test_watch_begins_with_one_command_that_moves_nothing() -> None:
     assert (entry.code, entry.why) == ("CMD", "starts communication monitoring, moves nothing")
 
 
-async def test_proof_in_a_profile_without_commands_is_refused() -> None:
+async def test_timeout_test_in_a_profile_without_commands_is_refused() -> None:
     clock = OwnTime()
     drive = WatchedFromItsFirstCommand(clock, profile_in_force=0)
     with pytest.raises(OrderRefused, match="state of the drive is unknown"):
@@ -472,7 +472,7 @@ async def test_proof_in_a_profile_without_commands_is_refused() -> None:
     assert drive.commands == []
 
 
-async def test_stop_before_the_watch_begins_keeps_its_command_from_the_drive() -> None:
+async def test_stop_before_the_timeout_starts_prevents_its_command() -> None:
     clock = OwnTime()
     drive = WatchedFromItsFirstCommand(clock, profile_in_force=1)
     prover = bench_71(clock, drive)

@@ -18,7 +18,7 @@ from .fakes import BlockDrive, OneDrive, parameter, profile_of
 INR = {"parameter": "INR", "scales": {"0": "0.01", "1": "0.1", "2": "1"}}
 
 
-async def test_neighbors_come_in_one_request_with_their_units() -> None:
+async def test_neighbors_are_read_in_one_request_with_their_units() -> None:
     profile = profile_of(
         parameter("LCR", 3204, unit="A", scale="0.1"),
         parameter("OTR", 3205, unit="%", scale="0.1", type="int16"),
@@ -31,7 +31,7 @@ async def test_neighbors_come_in_one_request_with_their_units() -> None:
     assert all(r.quality is Quality.GOOD for r in readings.values())
 
 
-async def test_one_refused_word_does_not_hurt_its_neighbors() -> None:
+async def test_refused_word_does_not_affect_its_neighbors() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
     line = OneDrive({10: 1, 12: 3})
     reader = Reader(DriveSession(line, 1, profile))
@@ -42,7 +42,7 @@ async def test_one_refused_word_does_not_hurt_its_neighbors() -> None:
     assert "refused" in readings["P11"].error
 
 
-async def test_a_poll_does_not_ask_again_for_what_was_refused() -> None:
+async def test_refused_word_is_not_polled_again() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
     line = OneDrive({10: 1, 12: 3})
     reader = Reader(DriveSession(line, 1, profile))
@@ -56,7 +56,7 @@ async def test_a_poll_does_not_ask_again_for_what_was_refused() -> None:
     assert line.requested == [(11, 1)]
 
 
-async def test_the_word_for_no_value_is_requested_alone() -> None:
+async def test_word_that_may_mean_no_value_is_read_alone() -> None:
     """16#8000 in a block may be a value or may mean none: only a single read tells."""
     profile = profile_of(
         *(parameter(f"P{a}", a) for a in (8400, 8401, 8402)),
@@ -93,7 +93,7 @@ async def test_a_ramp_without_its_increment_is_shown_raw() -> None:
     assert (reading.text, reading.unit) == ("30", "raw")
 
 
-async def test_a_drive_without_the_increment_has_the_older_scale() -> None:
+async def test_drive_without_the_increment_has_the_older_scale() -> None:
     older = {**INR, "absent": "0.1"}
     profile = profile_of(
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=older), parameter("INR", 9020)
@@ -103,7 +103,7 @@ async def test_a_drive_without_the_increment_has_the_older_scale() -> None:
     assert (reading.text, reading.unit) == ("3.0", "s")
 
 
-async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
+async def test_percentage_is_in_amperes_once_the_rating_is_known() -> None:
     profile = profile_of(
         parameter("FE03", 65027, unit="%", scale="0.01"),
         parameter("OWN", 10, unit="%", scale="1", rating="NCR"),
@@ -120,7 +120,7 @@ async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
     assert (again.text, again.physical.display) == ("50.00", "4.6 A")
 
 
-async def test_only_a_percentage_with_a_number_is_converted_to_the_unit_of_its_rating() -> None:
+async def test_only_numeric_percentages_are_converted_to_their_rating() -> None:
     profile = profile_of(
         parameter("HZ", 10, unit="Hz", scale="0.1", rating="NCR"),
         parameter("PCT", 11, unit="%", scale="1", values={"0": "off"}, rating="NCR"),
@@ -138,7 +138,7 @@ async def test_only_a_percentage_with_a_number_is_converted_to_the_unit_of_its_r
 
 
 @pytest.mark.parametrize("priority", [Priority.POLL, Priority.OPERATOR_READ])
-async def test_whatever_was_read_is_known_of_the_drive(priority: Priority) -> None:
+async def test_every_value_read_is_stored_for_the_drive(priority: Priority) -> None:
     """What Monitor polls is what parameters, commands and stops go by."""
     line = OneDrive({10: 7, 11: 8})
     session = DriveSession(line, 1, profile_of(parameter("A", 10), parameter("B", 11)))
@@ -149,14 +149,14 @@ async def test_whatever_was_read_is_known_of_the_drive(priority: Priority) -> No
     assert session.image.trusted == {"A": 9, "B": 8}
 
 
-async def test_silence_is_an_error_not_a_value() -> None:
+async def test_unanswered_read_is_an_error_not_a_value() -> None:
     line = OneDrive({1: 1})
     line.silence(1)
     with pytest.raises(NoAnswer):
         await Reader(DriveSession(line, 1, profile_of(parameter("P1", 1)))).read(["P1"])
 
 
-def test_the_line_learns_the_limits_of_the_profile() -> None:
+def test_line_gets_the_limits_of_the_profile() -> None:
     line = OneDrive({})
     profile = profile_of(
         parameter("P1", 1),
@@ -175,7 +175,7 @@ def test_the_line_learns_the_limits_of_the_profile() -> None:
     assert limits.broadcast_functions == {6}
 
 
-async def test_plans_do_not_pile_up_without_end() -> None:
+async def test_stored_plans_are_bounded() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in range(10, 120)))
     line = OneDrive({a: a for a in range(10, 120)})
     reader = Reader(DriveSession(line, 1, profile))

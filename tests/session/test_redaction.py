@@ -48,7 +48,7 @@ CLEAN = {
 
 
 @pytest.mark.parametrize("case", CLEAN.values(), ids=CLEAN.keys())
-def test_text_is_cleaned(case: tuple[str, str]) -> None:
+def test_private_words_are_removed_from_a_text(case: tuple[str, str]) -> None:
     assert cleaned(case[0]) == [case[1]]
 
 
@@ -75,19 +75,19 @@ def test_plain_word_after_password_is_not_taken_for_a_secret() -> None:
     assert cleaned("password=None", "none of them; None")[1] == "none of them; None"
 
 
-def test_document_is_cleaned_but_for_its_keys_and_numbers() -> None:
+def test_document_is_redacted_except_keys_and_numbers() -> None:
     redaction = Redaction(NAMES)
     found = redaction.clean({"jdoe": ["by jdoe", 1, None], "b": {"c": "Press7-PC"}})
     assert found == {"jdoe": [f"by {USER}", 1, None], "b": {"c": HOST}}
     assert redaction.counts == {USER: 1, HOST: 1}
 
 
-def test_text_cleaned_twice_is_the_same_as_once() -> None:
+def test_redacting_twice_changes_nothing_more() -> None:
     for text, once in CLEAN.values():
         assert cleaned(once) == [once], text
 
 
-def test_names_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_of_this_computer_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("USER", "erna")
     monkeypatch.setenv("HOME", "/srv/erna")
     monkeypatch.setenv("DRIVEPANEL_MQTT_PASSWORD", "Tr0ub4dor")

@@ -26,7 +26,7 @@ from .test_command import bench
 
 
 @pytest.mark.parametrize(("mode", "raw"), [(0, 2000), (1, 200), (2, 20)])
-async def test_run_with_scale_by_turns_at_the_hertz_that_were_typed(mode: int, raw: int) -> None:
+async def test_run_with_a_scale_factor_turns_at_the_typed_frequency(mode: int, raw: int) -> None:
     installed_mixer(SCALE_BY)
     async with bench(MIXER, sets={"MODE": mode}) as made:
         made.commander.run("forward", "20Hz")
@@ -60,7 +60,7 @@ async def test_start_after_the_scale_changed_is_refused() -> None:
         assert made.drive.motor.frequency == 0
 
 
-async def test_start_is_refused_if_the_scale_changes_behind_the_write() -> None:
+async def test_start_is_refused_if_the_scale_changes_after_the_write() -> None:
     """Another master sets it between the write and the start."""
     installed_mixer(SCALE_BY)
     async with bench(MIXER, sets={"MODE": 1}) as made:
@@ -108,7 +108,7 @@ async def test_start_and_reference_are_refused_while_another_master_has_changed_
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv71"])
-async def test_stop_is_sent_in_any_scale_of_the_references(family: str) -> None:
+async def test_stop_is_sent_with_any_reference_scale(family: str) -> None:
     async with bench(family) as made:
         made.commander.run("forward", "20Hz")
         await made.done()
@@ -117,7 +117,7 @@ async def test_stop_is_sent_in_any_scale_of_the_references(family: str) -> None:
         await made.let_go_until(lambda: made.stopped)
 
 
-async def test_start_of_a_drive_without_the_word_of_the_scale_is_not_refused() -> None:
+async def test_drive_without_the_scale_word_can_start() -> None:
     async with bench("atv71", protects=frozenset({"CMI"})) as made:
         made.commander.run("forward", "20Hz")
         await made.done()
@@ -157,7 +157,7 @@ async def test_reference_in_any_unit_is_converted(
     ("reference", "typed", "hertz"),
     [(PERCENT_OF_FULL, "20Hz", 20), (SPEED, "30Hz", 30), (PERCENT, "40%", 24), (VOLTS, "5V", 30)],
 )
-async def test_run_in_any_unit_turns_the_motor_as_typed(
+async def test_run_in_any_unit_turns_the_motor_at_the_typed_value(
     reference: str, typed: str, hertz: float
 ) -> None:
     installed_mixer(reference)
@@ -178,7 +178,7 @@ async def test_run_in_any_unit_turns_the_motor_as_typed(
         (PERCENT_OF_FULL, "5V", "in % or Hz or rpm."),
     ],
 )
-async def test_reference_in_a_unit_that_leads_nowhere_is_refused(
+async def test_reference_in_an_unknown_unit_is_refused(
     reference: str, typed: str, units: str
 ) -> None:
     installed_mixer(reference)
@@ -198,7 +198,7 @@ async def test_reference_in_a_unit_that_leads_nowhere_is_refused(
         (FINE, "40.01", "40.01 Hz is above HIGH = 40.0 Hz"),
     ],
 )
-async def test_limits_hold_in_their_own_unit(reference: str, typed: str, text: str) -> None:
+async def test_limits_apply_in_their_own_unit(reference: str, typed: str, text: str) -> None:
     installed_mixer(reference)
     async with bench(MIXER, sets={"LOW": 50, "HIGH": 400}) as made:
         made.commander.refer(typed)
@@ -207,7 +207,7 @@ async def test_limits_hold_in_their_own_unit(reference: str, typed: str, text: s
 
 
 @pytest.mark.parametrize(("reference", "raw"), [(PERCENT_OF_FULL, 800), (SPEED, 1200)])
-async def test_a_step_goes_to_the_limit_in_the_unit_of_the_reference(
+async def test_step_reaches_the_limit_in_the_unit_of_the_reference(
     reference: str, raw: int
 ) -> None:
     installed_mixer(reference)

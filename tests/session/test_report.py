@@ -75,7 +75,7 @@ async def test_changed_settings_are_listed_with_old_values() -> None:
         ("powerdrive", "15.07", 30, "3.0 s"),
     ],
 )
-async def test_a_watch_that_is_off_is_reported(
+async def test_disabled_timeout_is_reported(
     family: str, code: str, raw: int, reported: str
 ) -> None:
     with bench(family, sets={code: raw}) as made:
@@ -85,7 +85,7 @@ async def test_a_watch_that_is_off_is_reported(
     assert f"- Timeout ({code}): {reported}" in text.splitlines()
 
 
-async def test_values_stored_with_a_fault() -> None:
+async def test_values_stored_with_a_fault_are_listed() -> None:
     with bench("atv71", run_hz=35.0) as made:
         await asyncio.to_thread(wait_until, lambda: made.drive.motor.frequency > 20, "it turns")
         made.drive.provoke("OCF")
@@ -105,7 +105,7 @@ async def test_values_stored_with_a_fault() -> None:
     assert f"| {held.raws[stored[0]] / 10:.1f} Hz |" in found
 
 
-async def test_the_scanner_tells_what_it_brings() -> None:
+async def test_scanner_slots_are_listed_with_their_parameters() -> None:
     with bench("atv71", sets={"NMA1": 3201, "NMA2": 0}) as made:
         upload = Upload(made.session)
         await upload.run()
@@ -115,7 +115,7 @@ async def test_the_scanner_tells_what_it_brings() -> None:
     assert "None." in text.partition("## Writes by Drive Panel")[2]
 
 
-async def test_damaged_lines_of_the_journal_are_left_out() -> None:
+async def test_damaged_lines_of_the_journal_are_omitted() -> None:
     with bench("atv71") as made:
         await made.apply(ACC="5")
         made.journal.flush()
@@ -127,7 +127,7 @@ async def test_damaged_lines_of_the_journal_are_left_out() -> None:
         assert [entry.code for entry in entries] == ["ACC"]
 
 
-async def test_all_times_are_in_the_zone_in_which_the_drive_was_read() -> None:
+async def test_times_are_in_the_zone_of_the_reading() -> None:
     with bench("atv312") as made:
         await made.apply(SP2="7", ttO="5")
         upload = Upload(made.session, ["SP2"])
@@ -143,7 +143,7 @@ async def test_all_times_are_in_the_zone_in_which_the_drive_was_read() -> None:
     assert written.index("2026-10-25 01:30:00") < written.index("2026-10-25 02:30:00")
 
 
-async def test_report_lists_a_trip_once_however_often_it_was_seen() -> None:
+async def test_report_lists_each_trip_once() -> None:
     with bench("atv71") as made:
         made.drive.provoke("OCF")
         upload = Upload(made.session)

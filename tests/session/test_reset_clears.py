@@ -47,14 +47,14 @@ def access(line: TrippedDrive) -> CommandAccess:
     return CommandAccess(session, Journal(), session.work.permit(), CommandHistory(session))
 
 
-def test_reset_follows_with_cmod_terminals_names_the_gap() -> None:
+def test_reset_text_warns_of_a_closed_input_until_control_returns() -> None:
     reported = reset_follows(ATV21, {"FD01": 0, "CMOD": 0}, {"FD06": 1})
     assert "Until Drive Panel sends 16#C000, a closed run input" in reported
     assert "clears FA00 and the reference" in reported
     assert reported.endswith("Closed at the terminals now: F.")
 
 
-async def test_the_reference_is_reported_and_not_brought_back() -> None:
+async def test_cleared_reference_is_reported_and_not_restored() -> None:
     line = TrippedDrive()
     made = access(line)
     line.registers.update({STATUS: STANDBY, FAULT: 0})

@@ -80,7 +80,7 @@ async def restored(made: Bench, values: ParameterSet, options: Options) -> Resto
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "powerdrive"))
-async def test_back_up_factory_settings_restore_and_equal(family: str) -> None:
+async def test_restore_after_a_factory_reset_equals_the_backup(family: str) -> None:
     with bench(family, sets=known(family)) as made:
         values = await backed_up(made)
         await to_factory(made)
@@ -104,7 +104,7 @@ async def test_back_up_factory_settings_restore_and_equal(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", kept(["atv21", "atv312", "atv71"], "atv312"))
-async def test_killed_half_way_and_resumed(family: str) -> None:
+async def test_killed_restore_is_resumed(family: str) -> None:
     with bench(family, sets=known(family)) as made:
         values = await backed_up(made)
         await to_factory(made)
@@ -141,7 +141,7 @@ async def test_killed_half_way_and_resumed(family: str) -> None:
         assert len(made.writes()) - before <= len(left.edits) + len(done.results)
 
 
-async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
+async def test_lost_line_keeps_the_rest_and_the_resume_mark() -> None:
     with bench("atv71", sets=known("atv71")) as made:
         values = await backed_up(made)
         await to_factory(made)
@@ -167,7 +167,7 @@ async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
         assert again.complete, again
 
 
-async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
+async def test_line_lost_between_passes_keeps_the_results() -> None:
     with bench("atv312", sets=known("atv312")) as made:
         values = await backed_up(made)
         await to_factory(made)
@@ -194,14 +194,14 @@ async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
         assert (await restored(made, values, NO_OPTIONS)).complete
 
 
-async def test_a_read_only_line_is_not_restored_to() -> None:
+async def test_read_only_line_is_not_restored() -> None:
     with bench("atv71", read_only=True) as made:
         with pytest.raises(RequestRefused, match="read-only"):
             await restored(made, values_of("atv71", {"ACC": 50}), NO_OPTIONS)
         assert not Mark.of(made.session).path.exists()
 
 
-async def test_an_equal_drive_is_written_nothing() -> None:
+async def test_equal_drive_is_not_written() -> None:
     with bench("atv312", sets=known("atv312")) as made:
         values = await backed_up(made)
         done = await restored(made, values, Options())
@@ -209,7 +209,7 @@ async def test_an_equal_drive_is_written_nothing() -> None:
         assert made.writes() == []
 
 
-async def test_a_running_motor_takes_what_can_be_written_and_tells_the_rest() -> None:
+async def test_running_motor_gets_writable_settings_and_reports_the_rest() -> None:
     with bench("atv312", sets=known("atv312")) as made:
         values = await backed_up(made)
         for code, raw in (("ACC", 5), ("FrS", 600), ("UnS", 230)):
@@ -246,7 +246,7 @@ NOW = {"INR": 1, "ACC": 30, "HSP": 500, "LSP": 0, "TFR": 600, "NCR": 40, "UNS": 
        "TBR": 32, "FRY": 0, "PAN0": 1, "CMD": 0, "RFR": 0}  # fmt: skip
 
 
-def test_omitted_settings_and_reasons() -> None:
+def test_omitted_settings_have_reasons() -> None:
     values = ParameterSet(
         SetHead("atv71"),
         {**NOW, "ACC": 50, "ADD": 9, "TBR": 28, "FRY": 3, "CMD": 15, "RFR": 99, "DEC": 4},
@@ -265,7 +265,7 @@ def test_omitted_settings_and_reasons() -> None:
     assert found.count("skip") == 6
 
 
-def test_values_out_of_range_and_past_each_other() -> None:
+def test_values_beyond_ranges_and_limits_are_not_written() -> None:
     found = plan("atv71", NOW, values_of("atv71", {"TTO": 9999, "CHCF": 99}))
     assert skipped(found) == {"TTO": "absent", "CHCF": "absent"}
     now = {**NOW, "TTO": 100, "CHCF": 1}
@@ -274,7 +274,7 @@ def test_values_out_of_range_and_past_each_other() -> None:
     assert len(found.edits) == 0
 
 
-def test_another_rating_keeps_its_motor_data() -> None:
+def test_drive_with_another_rating_keeps_its_motor_data() -> None:
     values = values_of("atv71", {**NOW, "NCR": 99, "UNS": 230, "ACC": 60}, reference="ATV71HU15N4")
     same = plan("atv71", NOW, values, reference="ATV71HU15N4")
     assert same.same_rating is True
@@ -288,20 +288,20 @@ def test_another_rating_keeps_its_motor_data() -> None:
     assert plan("atv71", NOW, values).same_rating is None
 
 
-def test_models_are_reported_by_their_own_word_too() -> None:
+def test_models_are_compared_by_their_model_word_too() -> None:
     values = values_of("atv21", {"FB05": 20, "F803": 5})
     assert plan("atv21", {"FB05": 20, "F803": 3}, values).same_rating is True
     assert plan("atv21", {"FB05": 24, "F803": 3}, values).same_rating is False
 
 
-def test_unverified_ones_wait_for_a_confirmation() -> None:
+def test_unverified_parameters_wait_for_confirmation() -> None:
     values = values_of("atv21", {"F111": 48})
     assert skipped(plan("atv21", {"F111": 38}, values)) == {"F111": "unverified"}
     confirmed = plan("atv21", {"F111": 38}, values, Options(confirmed=frozenset({"F111"})))
     assert [edit.code for edit in confirmed.edits] == ["F111"]
 
 
-def test_a_ramp_comes_over_as_seconds_whatever_the_scales_are() -> None:
+def test_ramp_is_restored_in_seconds_whatever_the_scale() -> None:
     values = values_of("atv312", {"Inr": 0, "ACC": 300})
     both = plan("atv312", {"Inr": 1, "ACC": 10}, values)
     assert [(e.code, e.new, e.text) for e in both.edits] == [
@@ -315,7 +315,7 @@ def test_a_ramp_comes_over_as_seconds_whatever_the_scales_are() -> None:
     assert [(e.code, e.new, e.text) for e in old.edits] == [("ACC", 30, "3.0 s")]
 
 
-def test_between_families_common_quantities_come_over_in_their_units() -> None:
+def test_common_quantities_are_converted_between_families() -> None:
     values = values_of(
         "atv71",
         {"INR": 0, "ACC": 314, "DEC": 300, "HSP": 450, "LSP": 0, "TFR": 600, "ADD": 9, "TTO": 50,
@@ -336,7 +336,7 @@ def test_between_families_common_quantities_come_over_in_their_units() -> None:
     assert "UnS" in taken.edits
 
 
-async def test_a_set_of_another_family_on_a_drive() -> None:
+async def test_set_of_another_family_is_restored_by_quantity() -> None:
     with bench("atv71", sets={"ACC": 77, "HSP": 420, "SP3": 222}) as made:
         values = await backed_up(made)
     with bench("atv312") as made:
@@ -351,7 +351,7 @@ async def test_a_set_of_another_family_on_a_drive() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_plan_never_writes_an_order_nor_what_is_forbidden(family: str) -> None:
+def test_plan_never_writes_commands_or_forbidden_parameters(family: str) -> None:
     """Even if a file holds another value for every single parameter."""
     profile = library.load(family)
     now = {p.code: 0 for p in profile.parameters}

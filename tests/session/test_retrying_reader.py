@@ -59,7 +59,7 @@ def bench(drive: LosesReplies, priority: Priority) -> tuple[RetryingReader, Coun
         (ChecksumFault(1, 3, 10), Priority.POLL, []),
     ],
 )
-async def test_lost_reply_is_requested_again_after_a_rest(
+async def test_lost_reply_is_requested_again_after_a_pause(
     error: Exception, priority: Priority, slept: list[float]
 ) -> None:
     reader, clock = bench(LosesReplies(error), priority)
@@ -83,7 +83,7 @@ async def test_refused_parameter_has_its_reason() -> None:
     assert reader.why_absent("P10") == ""
 
 
-def test_neighbors_are_parted_where_no_read_spans_the_gap() -> None:
+def test_neighbors_are_split_if_no_read_spans_the_gap() -> None:
     assert neighbors(PROFILE, ["P90", "P11", "P10"]) == [["P10", "P11"], ["P90"]]
     wide = profile_of(*(parameter(f"P{address}", address) for address in range(100, 221)))
     parts = neighbors(wide, [parameter.code for parameter in wide.parameters])

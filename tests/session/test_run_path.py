@@ -35,7 +35,7 @@ def documented_hops() -> list[str]:
     return re.findall(r"^\| \d+ \|.*$", section, re.MULTILINE)
 
 
-async def test_run_word_is_handed_on_by_documented_objects_only(tmp_path: Path) -> None:
+async def test_run_word_passes_documented_objects_only(tmp_path: Path) -> None:
     bench = SlowBench(tmp_path)
     paths: list[list[str]] = []
 

@@ -96,7 +96,7 @@ def stop_elsewhere(bench: MotorBench) -> None:
 # The start
 
 
-def test_the_motor_runs_inside_the_block_alone(bench: MotorBench) -> None:
+def test_motor_runs_only_inside_the_block(bench: MotorBench) -> None:
     with bench.drive.armed():
         with bench.drive.running("20Hz") as motor:
             bench.wait_turning()
@@ -108,7 +108,7 @@ def test_the_motor_runs_inside_the_block_alone(bench: MotorBench) -> None:
     assert motor.ended == ""
 
 
-def test_it_runs_in_reverse_and_at_the_present_reference(bench: MotorBench) -> None:
+def test_motor_runs_in_reverse_and_at_the_current_reference(bench: MotorBench) -> None:
     with bench.drive.armed(), bench.drive.running("20Hz", reverse=True):
         wait_until(lambda: bench.simulation.drive(1).motor.frequency < -15, "it turns in reverse")
     with bench.drive.armed(), bench.drive.running():
@@ -128,7 +128,7 @@ def test_nothing_is_started_without_arming(bench: MotorBench) -> None:
     assert bench.command_word == 0
 
 
-def test_making_the_block_starts_nothing(bench: MotorBench) -> None:
+def test_creating_the_block_starts_nothing(bench: MotorBench) -> None:
     with bench.drive.armed():
         bench.drive.running("20Hz")
         time.sleep(0.5)
@@ -143,7 +143,7 @@ def test_making_the_block_starts_nothing(bench: MotorBench) -> None:
         ({"CD1": 0, "CHCF": 2}, "20Hz", "not commanded by Modbus"),
     ],
 )
-def test_an_interlock_starts_nothing(sets: dict[str, int], reference: str, text: str) -> None:
+def test_interlock_prevents_a_start(sets: dict[str, int], reference: str, text: str) -> None:
     with Simulation([spec(**sets)]) as simulation, DriveLine(opened(simulation)) as line:
         drive = line.drive(profile="atv71")
         with drive.armed(), pytest.raises(DriveError, match=text), drive.running(reference):
@@ -151,7 +151,7 @@ def test_an_interlock_starts_nothing(sets: dict[str, int], reference: str, text:
         assert simulation.drive(1).raw("CMD") == 0
 
 
-def test_a_start_that_cannot_be_recorded_starts_nothing(
+def test_unrecordable_start_starts_nothing(
     bench: MotorBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
@@ -167,7 +167,7 @@ def test_a_start_that_cannot_be_recorded_starts_nothing(
     assert bench.command_word == 0
 
 
-def test_the_start_is_on_record_while_it_runs(bench: MotorBench) -> None:
+def test_start_is_recorded_while_the_motor_runs(bench: MotorBench) -> None:
     starts = Path(os.environ["DRIVEPANEL_STATE"])
 
     def records() -> list[Path]:
@@ -179,7 +179,7 @@ def test_the_start_is_on_record_while_it_runs(bench: MotorBench) -> None:
     wait_until(lambda: not records(), "the record is removed")
 
 
-def test_one_block_runs_a_motor_at_a_time(bench: MotorBench) -> None:
+def test_motor_is_run_by_one_block_at_a_time(bench: MotorBench) -> None:
     again = bench.line.drive(profile="atv71")
     with bench.drive.armed(), bench.drive.running("20Hz"):
         with pytest.raises(DriveError, match="another block"), again.running("30Hz"):
@@ -199,7 +199,7 @@ def test_one_block_runs_a_motor_at_a_time(bench: MotorBench) -> None:
     assert bench.stands
 
 
-def test_the_end_of_the_block_disarms(bench: MotorBench) -> None:
+def test_end_of_the_block_disarms(bench: MotorBench) -> None:
     with bench.drive.armed():
         with bench.drive.running("20Hz"):
             pass
@@ -218,7 +218,7 @@ class OwnError(Exception):
 
 
 @pytest.mark.parametrize("error", [OwnError, KeyboardInterrupt, SystemExit, GeneratorExit])
-def test_an_exception_stops_the_motor_and_goes_on(
+def test_exception_stops_the_motor_and_propagates(
     bench: MotorBench, error: type[BaseException]
 ) -> None:
     with leaving_raises(error), bench.drive.armed(), bench.drive.running("20Hz"):
@@ -227,7 +227,7 @@ def test_an_exception_stops_the_motor_and_goes_on(
     assert bench.stands
 
 
-def test_a_ctrl_c_while_it_starts_leaves_none_running(bench: MotorBench) -> None:
+def test_ctrl_c_during_the_start_leaves_no_motor_running(bench: MotorBench) -> None:
     """At each moment of the start, by the signal itself."""
     entered = 0
     for step in range(12):
@@ -253,7 +253,7 @@ def test_a_ctrl_c_while_it_starts_leaves_none_running(bench: MotorBench) -> None
         (signal.SIGUSR1, SystemExit),
     ],
 )
-def test_a_signal_ends_the_script_after_standstill(
+def test_signal_ends_the_script_after_standstill(
     bench: MotorBench, number: signal.Signals, error: type[BaseException]
 ) -> None:
     before = signal.getsignal(number)
@@ -268,7 +268,7 @@ def test_a_signal_ends_the_script_after_standstill(
     assert signal.getsignal(number) is before
 
 
-def test_a_signal_during_the_stop_ends_no_wait(bench: MotorBench) -> None:
+def test_signal_during_the_stop_does_not_end_the_wait(bench: MotorBench) -> None:
     with leaving_raises(KeyboardInterrupt), bench.drive.armed(), bench.drive.running("40Hz"):
         wait_until(lambda: bench.simulation.drive(1).motor.frequency > 35, "it turns")
         for step in range(1, 4):
@@ -276,7 +276,7 @@ def test_a_signal_during_the_stop_ends_no_wait(bench: MotorBench) -> None:
     assert bench.stands
 
 
-def test_an_own_handler_that_raises_during_the_stop_ends_no_wait(bench: MotorBench) -> None:
+def test_own_handler_that_raises_during_the_stop_does_not_end_the_wait(bench: MotorBench) -> None:
     is_raising = threading.Event()
 
     def handle(_number: int, _frame: object) -> None:
@@ -301,7 +301,7 @@ def test_an_own_handler_that_raises_during_the_stop_ends_no_wait(bench: MotorBen
         signal.signal(signal.SIGTERM, before)
 
 
-def test_a_script_that_swallows_ctrl_c_has_its_motor_stopped(bench: MotorBench) -> None:
+def test_motor_of_a_script_that_ignores_ctrl_c_is_stopped(bench: MotorBench) -> None:
     with bench.drive.armed(), bench.drive.running("20Hz"):
         bench.wait_turning()
         try:
@@ -310,7 +310,7 @@ def test_a_script_that_swallows_ctrl_c_has_its_motor_stopped(bench: MotorBench) 
             wait_until(lambda: bench.stands, "the motor stops before the block ends", 20.0)
 
 
-def test_a_signal_that_the_script_handles_is_left_to_it(
+def test_signal_handled_by_the_script_is_left_to_it(
     bench: MotorBench,
 ) -> None:
     taken: list[int] = []
@@ -325,7 +325,7 @@ def test_a_signal_that_the_script_handles_is_left_to_it(
     assert bench.stands
 
 
-def test_a_signal_stops_the_motors_of_nested_blocks_together() -> None:
+def test_signal_stops_motors_of_nested_blocks_together() -> None:
     """The outer one does not turn on until the inner one has come to rest."""
     specs = [
         DriveSpec("atv71", 1, sets={"ACC": RAMP, "DEC": RAMP}),
@@ -356,7 +356,7 @@ def test_closing_the_line_in_the_block_stops_the_motor_first(bench: MotorBench) 
     assert bench.stands
 
 
-def test_a_block_of_another_thread_ends_with_the_line(bench: MotorBench) -> None:
+def test_block_in_another_thread_ends_with_the_line(bench: MotorBench) -> None:
     errors: list[BaseException] = []
 
     def work() -> None:
@@ -379,7 +379,7 @@ def test_a_block_of_another_thread_ends_with_the_line(bench: MotorBench) -> None
 # Stopped early
 
 
-def test_a_trip_is_reported_at_the_end_and_at_once_by_wait(bench: MotorBench) -> None:
+def test_trip_is_reported_at_the_end_and_immediately_by_wait(bench: MotorBench) -> None:
     with (
         leaving_raises(MotorTripped, match="Device 1 tripped: OCF"),
         bench.drive.armed(),
@@ -401,7 +401,7 @@ def test_a_trip_is_reported_at_the_end_and_at_once_by_wait(bench: MotorBench) ->
     assert time.monotonic() - begun < 50
 
 
-def test_a_stop_of_another_program_is_reported_and_nothing_is_restarted(
+def test_stop_by_another_program_is_reported_without_a_restart(
     bench: MotorBench,
 ) -> None:
     with (
@@ -419,7 +419,7 @@ def test_a_stop_of_another_program_is_reported_and_nothing_is_restarted(
     assert bench.command_word & 0xF != 0xF
 
 
-def test_a_stop_of_another_program_just_before_the_end_is_reported(bench: MotorBench) -> None:
+def test_stop_by_another_program_just_before_the_end_is_reported(bench: MotorBench) -> None:
     with (
         leaving_raises(MotorStopped, match="stopped by drivepanel stop"),
         bench.drive.armed(),
@@ -430,7 +430,7 @@ def test_a_stop_of_another_program_just_before_the_end_is_reported(bench: MotorB
     assert bench.stands
 
 
-def test_an_early_stop_is_a_note_to_an_error_of_the_script(bench: MotorBench) -> None:
+def test_early_stop_is_a_note_on_the_error_of_the_script(bench: MotorBench) -> None:
     with (
         leaving_raises(OwnError) as ended,
         bench.drive.armed(),
@@ -443,7 +443,7 @@ def test_an_early_stop_is_a_note_to_an_error_of_the_script(bench: MotorBench) ->
     assert "Device 1 tripped: OCF" in "".join(ended.value.__notes__)
 
 
-def test_a_motor_that_another_starts_after_an_early_stop_is_not_stopped(
+def test_motor_started_by_another_program_after_an_early_stop_is_not_stopped(
     bench: MotorBench,
 ) -> None:
     """The run ended with the early stop: the end of the block has nothing to stop."""
@@ -456,7 +456,7 @@ def test_a_motor_that_another_starts_after_an_early_stop_is_not_stopped(
     assert bench.turns
 
 
-def test_a_stop_of_the_script_itself_is_no_early_stop(bench: MotorBench) -> None:
+def test_stop_by_the_script_is_not_an_early_stop(bench: MotorBench) -> None:
     with bench.drive.armed(), bench.drive.running("20Hz") as motor:
         bench.wait_turning()
         assert "stopped" in bench.drive.stop()
@@ -482,7 +482,7 @@ def refuse_writes(bench: MotorBench) -> None:
 
 
 @pytest.mark.parametrize("expected", [nullcontext(), pytest.raises(OwnError)], ids=["end", "error"])
-def test_a_motor_that_is_not_stopped_replaces_every_error(
+def test_not_stopped_replaces_every_other_error(
     bench: MotorBench, expected: AbstractContextManager[object]
 ) -> None:
     with (
@@ -499,7 +499,7 @@ def test_a_motor_that_is_not_stopped_replaces_every_error(
         assert isinstance(ended.value.__context__, OwnError)
 
 
-def test_a_lost_line_is_reported_and_the_motor_is_stopped_when_it_is_back(
+def test_motor_is_stopped_when_a_lost_line_returns(
     bench: MotorBench, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.ERROR)
@@ -522,7 +522,7 @@ def test_a_lost_line_is_reported_and_the_motor_is_stopped_when_it_is_back(
     assert bench.stands
 
 
-def test_a_line_that_its_own_thread_closes_is_not_stopped(bench: MotorBench) -> None:
+def test_line_closed_by_its_own_thread_raises_not_stopped(bench: MotorBench) -> None:
     with (
         leaving_raises(NotStopped, match="the line was closed"),
         bench.drive.armed(),
@@ -557,7 +557,7 @@ def test_async_blocks_run_and_stop_the_motor(bench: MotorBench) -> None:
     asyncio.run(script())
 
 
-def test_a_cancelled_task_has_its_motor_stopped_at_each_moment(bench: MotorBench) -> None:
+def test_motor_of_a_cancelled_task_is_stopped_at_any_moment(bench: MotorBench) -> None:
     line = AsyncDriveLine(bench.line._calls._opened)
 
     async def script() -> None:
@@ -588,7 +588,7 @@ def test_a_cancelled_task_has_its_motor_stopped_at_each_moment(bench: MotorBench
     ("number", "error", "delays"),
     [(signal.SIGINT, KeyboardInterrupt, (0, 0.1)), (signal.SIGTERM, SystemExit, (0, 0.1, 0.2))],
 )
-def test_a_signal_ends_an_async_script_after_standstill(
+def test_signal_ends_an_async_script_after_standstill(
     bench: MotorBench,
     number: signal.Signals,
     error: type[BaseException],
@@ -612,7 +612,7 @@ def test_a_signal_ends_an_async_script_after_standstill(
     assert bench.stands
 
 
-def test_a_signal_ends_the_blocks_of_several_tasks() -> None:
+def test_signal_ends_the_blocks_of_several_tasks() -> None:
     specs = [DriveSpec("atv71", n, sets={"ACC": RAMP, "DEC": RAMP * n}) for n in (1, 2, 3)]
     with Simulation(specs) as simulation:
         line = AsyncDriveLine(opened(simulation))
@@ -643,7 +643,7 @@ def test_a_signal_ends_the_blocks_of_several_tasks() -> None:
         asyncio.run(line.close())
 
 
-def test_the_journal_names_the_script_that_stopped(bench: MotorBench) -> None:
+def test_journal_names_the_script_that_stopped(bench: MotorBench) -> None:
     with bench.drive.armed(), bench.drive.running("20Hz"):
         pass
     bench.line.close()
@@ -651,7 +651,7 @@ def test_the_journal_names_the_script_that_stopped(bench: MotorBench) -> None:
     assert '"CMD"' in written
 
 
-def test_lines_without_a_drive_run_nothing() -> None:
+def test_line_without_a_drive_runs_nothing() -> None:
     with Simulation([spec()]) as simulation, DriveLine(opened(simulation)) as line:
         drive = line.drive(profile="atv71")
         simulation.unplug()

@@ -107,7 +107,7 @@ async def searched(
     return results
 
 
-async def test_a_single_drive_says_who_it_is_before_any_profile_is_read(
+async def test_single_drive_is_identified_before_profiles_are_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def read_them(*_: object, **__: object) -> AddressProber:
@@ -125,7 +125,7 @@ async def test_a_single_drive_says_who_it_is_before_any_profile_is_read(
     assert line.requested == []
 
 
-async def test_a_single_drive_that_does_not_say_it_is_requested_as_any_other() -> None:
+async def test_single_drive_without_identification_is_probed_like_others() -> None:
     line = Replies(present={7}, errors={7: DeviceException(7, 43, 0, 1)})
     search = Search([7], line.no_time)
     (result,) = await searched(search, line)
@@ -138,7 +138,7 @@ def devices(results: Iterable[ScanResult]) -> list[int]:
     return [result.device for result in results]
 
 
-async def test_a_drive_missed_once_is_requested_again_with_more_patience() -> None:
+async def test_drive_missed_once_is_probed_again_with_a_longer_wait() -> None:
     line, texts = Replies({1, 4}, late={3}), list[str]()
     search = Search(range(1, 6), line.no_time)
     assert devices(await searched(search, line, texts)) == [1, 4, 3]
@@ -147,7 +147,7 @@ async def test_a_drive_missed_once_is_requested_again_with_more_patience() -> No
     assert (search.text, set(search.answered)) == ("done, 3 found", {1, 3, 4})
 
 
-async def test_an_empty_address_costs_one_request_and_the_longest_turnaround() -> None:
+async def test_empty_address_costs_one_request_and_the_longest_turnaround() -> None:
     line = Replies({1})
     await searched(Search(range(1, 4), line.no_time, once=True), line)
     assert line.requested == [
@@ -159,14 +159,14 @@ async def test_an_empty_address_costs_one_request_and_the_longest_turnaround() -
     assert line.waits == [pytest.approx(0.010 + 11 / 19200 + JITTER)] * 2
 
 
-async def test_slow_characters_are_waited_for() -> None:
+async def test_slow_characters_extend_the_wait() -> None:
     line = Replies(set(), link=SerialLink("/dev/null", 1200, "8N1"))
     await searched(Search([1, 2], line.no_time, once=True), line)
     # the silence that ends the request, and the first character
     assert line.waits == [pytest.approx(4.5 * 10 / 1200 + JITTER)] * 2
 
 
-async def test_a_network_is_waited_for_as_ever() -> None:
+async def test_network_line_has_the_default_wait() -> None:
     line = Replies(set(), link=TcpLink("127.0.0.1"))
     await searched(Search([1, 2], line.no_time, once=True), line)
     assert line.waits == [None, None]
@@ -190,7 +190,7 @@ async def test_remaining_estimate_counts_silent_addresses_again() -> None:
     assert search.left == 0
 
 
-async def test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one() -> None:
+async def test_paused_drive_is_not_reported_as_silent() -> None:
     line = Replies({1})
     line.facts.pause_polling(2, "It is being proved.")
     search = Search(range(1, 4), line.no_time, once=True)
@@ -200,7 +200,7 @@ async def test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one() -> None:
     assert 2 in search.answered
 
 
-async def test_silent_addresses_that_take_longer_tell_more_time() -> None:
+async def test_slow_silent_addresses_increase_the_estimate() -> None:
     line, clock, left = Replies(set()), [0.0], list[float]()
 
     async def rest(_seconds: float) -> None:
@@ -215,13 +215,13 @@ async def test_silent_addresses_that_take_longer_tell_more_time() -> None:
     assert left == [pytest.approx(3 * search.cost), 4.0, 2.0]
 
 
-async def test_late_answer_is_heard_and_requested_again() -> None:
+async def test_late_reply_is_accepted_and_requested_again() -> None:
     line = Replies({1}, late={3}, heard_late={3})
     assert devices(await searched(Search(range(1, 5), line.no_time, once=True), line)) == [1, 3]
     assert (line.background(), line.patiently()) == ([1, 2, 3, 4], [3])
 
 
-async def test_a_drive_with_a_long_response_delay_is_found() -> None:
+async def test_drive_with_a_long_response_delay_is_found() -> None:
     simulation = Simulation([DriveSpec("powerdrive", 3), DriveSpec("atv71", 5)], any_settings=True)
 
     def script(request: bytes, _count: int) -> Sequence[Step]:
@@ -239,7 +239,7 @@ async def test_a_drive_with_a_long_response_delay_is_found() -> None:
     assert [result.by for result in results] == ["read of register 1039", "function 43"]
 
 
-async def test_address_text_between_two_addresses_can_end_search() -> None:
+async def test_callback_between_two_addresses_can_end_the_scan() -> None:
     line, requested = Replies({1, 2}), list[int]()
 
     def look() -> None:
@@ -267,7 +267,7 @@ async def test_polls_run_between_two_probes() -> None:
     assert rests == [REST * line.timing.scan_timeout, REST * line.timing.patient_timeout]
 
 
-async def test_a_search_that_is_ended_says_so() -> None:
+async def test_cancelled_scan_reports_it() -> None:
     line, search = Replies({1}), Search([1, 2, 3])
     at_the_first = asyncio.Event()
 
@@ -284,7 +284,7 @@ async def test_a_search_that_is_ended_says_so() -> None:
     assert (search.goes_on, search.text, search.at) == (False, "stopped, 1 found", None)
 
 
-async def test_a_search_finds_every_drive_and_no_other() -> None:
+async def test_scan_finds_every_drive_and_no_other() -> None:
     opened = demo_line({"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0})
     try:
         assert devices(await searched(Search(range(1, 6), patient=True), opened.line)) == [1, 2, 3]
@@ -296,7 +296,7 @@ async def test_a_search_finds_every_drive_and_no_other() -> None:
 
 
 @pytest.mark.sweep
-async def test_a_second_search_finds_drives_without_function_43_and_those_behind_them() -> None:
+async def test_second_scan_finds_drives_without_function_43_and_later_ones() -> None:
     opened = open_line("sim:powerdrive@1,varmeca@2,atv71@3")
     try:
         first = await searched(Search(range(1, 5), patient=True), opened.line)
@@ -324,21 +324,21 @@ async def test_a_second_search_finds_drives_without_function_43_and_those_behind
     ],
     ids=lambda error: type(error).__name__,
 )
-async def test_error_at_one_address_does_not_end_search(error: LineError) -> None:
+async def test_error_at_one_address_does_not_end_the_scan(error: LineError) -> None:
     results = await searched(Search(range(1, 4), patient=True), Replies({1, 3}, errors={2: error}))
     assert devices(results) == [1, 2, 3]
     assert [result.error for result in results] == ["", str(error), ""]
 
 
 @pytest.mark.parametrize("error", [LineLost("gone"), LineClosed()])
-async def test_a_search_ends_with_its_line(error: LineError) -> None:
+async def test_scan_ends_with_its_line(error: LineError) -> None:
     search = Search(range(1, 4), patient=True)
     with pytest.raises(type(error)):
         await searched(search, Replies({1, 3}, errors={2: error}))
     assert search.text == "stopped, 1 found"
 
 
-async def test_a_broken_profile_of_the_user_ends_no_search() -> None:
+async def test_broken_own_profile_does_not_end_a_scan() -> None:
     folder = library.user_folder()
     folder.mkdir(parents=True)
     (folder / "mine.toml").write_text('[profile]\nid = "mine"\n', encoding="utf-8")

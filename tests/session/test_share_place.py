@@ -25,7 +25,7 @@ def others(opened: OpenLine) -> list[str]:
     return [other.name for other in opened.line.facts.others]
 
 
-def test_a_line_is_one_by_its_device_however_it_is_spelt(tmp_path: Path) -> None:
+def test_line_is_identified_by_its_device_in_any_spelling(tmp_path: Path) -> None:
     with PtyPeer(honest) as peer:
         by_id = tmp_path / "usb-adapter"
         by_id.symlink_to(peer.path)
@@ -45,7 +45,7 @@ def test_a_line_is_one_by_its_device_however_it_is_spelt(tmp_path: Path) -> None
                 line.close()
 
 
-def test_a_program_without_a_name_shares_nothing(tmp_path: Path) -> None:
+def test_program_without_a_name_shares_nothing(tmp_path: Path) -> None:
     with PtyPeer(honest) as peer:
         opened = open_line(f"serial:{peer.path}", wait=5)
         try:
@@ -55,7 +55,7 @@ def test_a_program_without_a_name_shares_nothing(tmp_path: Path) -> None:
             opened.close()
 
 
-def test_the_socket_lies_in_the_runtime_folder_else_in_the_state_folder(
+def test_socket_is_in_the_runtime_folder_or_the_state_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state = Path(os.environ["DRIVEPANEL_STATE"])
@@ -70,7 +70,7 @@ def test_the_socket_lies_in_the_runtime_folder_else_in_the_state_folder(
 
 
 @pytest.mark.parametrize("runtime", ["gone/for/good", "a file", "long" * 40])
-def test_whatever_the_runtime_folder_is_two_programs_meet(
+def test_two_programs_meet_with_any_runtime_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, runtime: str
 ) -> None:
     (tmp_path / "a file").write_text("")
@@ -101,12 +101,12 @@ def test_line_works_unshared_if_folder_cannot_be_made(
             first.close()
 
 
-def test_a_system_without_local_sockets_shares_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_system_without_local_sockets_shares_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.share_place.os.name", "nt")
     assert share_place("tcp:gateway") is None
 
 
-def test_a_program_is_named_by_what_it_is_and_its_number() -> None:
+def test_program_has_its_kind_and_pid_as_name() -> None:
     me, other = this_program("panel"), this_program("panel")
     assert me.id != other.id
     assert me.text.startswith("panel")

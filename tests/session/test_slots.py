@@ -108,7 +108,7 @@ def wrong(snapshots: list[Snapshot], expected: Mapping[str, int]) -> list[tuple[
     ]
 
 
-async def test_the_scanner_is_used_as_soon_as_it_saves_time(start: Start) -> None:
+async def test_scanner_is_used_once_it_saves_time(start: Start) -> None:
     words = scattered(6)
     simulation, opened = start(DriveSpec("atv71", 1, sets=words))
     monitor = Monitor(DriveSession(opened.line, 1, library.load("atv71")))
@@ -169,13 +169,13 @@ async def shared(start: Start) -> Shared:
     return made
 
 
-async def test_slots_that_were_read_before_the_block_are_read_again(shared: Shared) -> None:
+async def test_slots_read_before_the_block_are_read_again(shared: Shared) -> None:
     shared.change_slots()
     await shared.another_reads(INPUTS)
     assert await shared.read() == {}
 
 
-async def test_a_block_that_was_read_before_its_slots_is_read_again(shared: Shared) -> None:
+async def test_block_read_before_its_slots_is_read_again(shared: Shared) -> None:
     await shared.another_reads(INPUTS)
     shared.change_slots()
     await shared.another_reads(library.load("atv71")["NMA1"].address)
@@ -183,7 +183,7 @@ async def test_a_block_that_was_read_before_its_slots_is_read_again(shared: Shar
     assert await shared.read() == {}
 
 
-async def test_own_value_is_read_again_and_foreign_is_not(
+async def test_own_values_are_read_again_but_shared_ones_are_not(
     shared: Shared,
 ) -> None:
     reads = len(shared.line.trace)
@@ -199,7 +199,7 @@ async def test_own_value_is_read_again_and_foreign_is_not(
     raise AssertionError("what another program has just read was read again")
 
 
-async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(start: Start) -> None:
+async def test_scanner_changed_while_monitoring_never_mixes_values(start: Start) -> None:
     words = scattered(6)
     codes = list(words)
     simulation, opened = start(DriveSpec("atv71", 1, sets=words | assignment(codes)))
@@ -226,7 +226,7 @@ BLOCK_CODES = ["FD01", "FD00", "FE03", "FE05", "FE90"]
 BLOCK = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 11}
 
 
-async def test_a_fault_ends_the_trust_in_what_counts_until_a_reset(start: Start) -> None:
+async def test_fault_discards_the_confirmed_slots(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
     monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
     monitor.start(period=0.1)
@@ -238,7 +238,7 @@ async def test_a_fault_ends_the_trust_in_what_counts_until_a_reset(start: Start)
     monitor.stop()
 
 
-async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None:
+async def test_indirect_block_is_used_once_confirmed(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
     monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
     snapshots: list[Snapshot] = []
@@ -264,7 +264,7 @@ async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None
 
 
 @pytest.mark.sweep
-async def test_on_a_slow_line_every_place_is_proved_while_values_move(start: Start) -> None:
+async def test_every_slot_is_confirmed_on_a_slow_line_with_moving_values(start: Start) -> None:
     _, opened = start(
         DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0), LineTiming(19200, "8N1", True)
     )
@@ -276,7 +276,7 @@ async def test_on_a_slow_line_every_place_is_proved_while_values_move(start: Sta
     monitor.stop()
 
 
-async def test_a_pending_choice_is_never_proved(start: Start) -> None:
+async def test_pending_assignment_is_never_confirmed(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
     monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
     # chosen since the last reset: the block brings what it brought before

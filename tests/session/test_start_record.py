@@ -36,33 +36,33 @@ EXITED = "process 7, which has exited; no program commands it"
 TODAY = f"runs since 17:34, started by panel, {EXITED}"
 
 
-def test_a_motor_that_runs_is_reported() -> None:
+def test_running_motor_is_reported() -> None:
     assert offer(RECORD, IDENTITY, True, NOW) == TODAY
 
 
-def test_one_that_does_not_run_is_not() -> None:
+def test_motor_at_standstill_is_not_reported() -> None:
     assert offer(RECORD, IDENTITY, False, NOW) == ""
 
 
-def test_a_motor_that_is_not_seen_may_run() -> None:
+def test_unseen_motor_may_run() -> None:
     assert offer(RECORD, IDENTITY, None, NOW) == f"may {TODAY.replace('runs', 'run')}"
 
 
-def test_the_date_is_reported_where_it_is_not_today() -> None:
+def test_date_is_shown_unless_it_is_today() -> None:
     tomorrow = NOW + timedelta(days=1)
     assert "since 2026-03-05 17:34, started by" in offer(RECORD, IDENTITY, True, tomorrow)
 
 
-def test_the_time_is_reported_in_the_zone_of_now() -> None:
+def test_time_is_shown_in_the_current_zone() -> None:
     assert "since 15:34, started by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
 
 
-def test_a_motor_that_was_left_running_is_reported() -> None:
+def test_motor_left_running_is_reported() -> None:
     text = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW)
     assert text == f"runs since 17:34, left running on purpose by panel, {EXITED}"
 
 
-def test_a_program_that_lives_has_not_ended() -> None:
+def test_running_program_is_not_reported_as_ended() -> None:
     frozen = EXITED.replace("has exited", "does not answer on this line")
     text = offer(RECORD, IDENTITY, True, NOW, lives=True)
     assert text == f"runs since 17:34, started by panel, {frozen}"
@@ -70,7 +70,7 @@ def test_a_program_that_lives_has_not_ended() -> None:
     assert left == f"runs since 17:34, left running on purpose by panel, {frozen}"
 
 
-def test_a_time_that_is_none_is_left_out() -> None:
+def test_invalid_time_is_omitted() -> None:
     text = offer(replace(RECORD, wall="soon"), IDENTITY, True, NOW)
     assert text == f"runs, started by panel, {EXITED}"
 
@@ -87,11 +87,11 @@ def test_a_time_that_is_none_is_left_out() -> None:
     ],
     ids=lambda other: next(iter(other)),
 )
-def test_another_drive_withdraws_the_offer(other: dict[str, Any]) -> None:
+def test_other_drive_at_the_address_withdraws_the_offer(other: dict[str, Any]) -> None:
     assert offer(RECORD, replace(IDENTITY, **other), True, NOW) == ""
 
 
-def test_missing_identity_field_is_no_difference() -> None:
+def test_missing_identity_field_is_not_a_difference() -> None:
     nameless = DriveIdentity(2, "", "", "", "", None, ())
     assert offer(RECORD, nameless, True, NOW) == TODAY
     assert offer(RECORD, None, True, NOW) == TODAY
@@ -99,5 +99,5 @@ def test_missing_identity_field_is_no_difference() -> None:
     assert offer(silent, IDENTITY, True, NOW) == TODAY
 
 
-def test_a_profile_that_may_fit_is_no_other() -> None:
+def test_candidate_profile_is_not_another_drive() -> None:
     assert offer(replace(RECORD, profile="atv61"), IDENTITY, True, NOW) == TODAY

@@ -31,13 +31,13 @@ async def here(tmp_path: Path) -> AsyncIterator[SlowBench]:
     made.end()
 
 
-async def test_no_word_goes_out_before_the_state_that_it_needs_was_seen(here: SlowBench) -> None:
+async def test_no_word_is_sent_before_its_required_state(here: SlowBench) -> None:
     kind, text = await here.start()
     assert kind is OutcomeKind.DONE, text
     assert here.line.words == [(0x06, 0x0240), (0x07, READY), (0x0F, SWITCHED_ON)]
 
 
-async def test_a_drive_that_stays_where_it_is_gets_no_further_word(
+async def test_drive_that_stays_in_its_state_gets_no_more_words(
     here: SlowBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(access, "STEP_TIME", 0.05)
@@ -51,14 +51,14 @@ async def test_a_drive_that_stays_where_it_is_gets_no_further_word(
     assert here.records == []
 
 
-async def test_a_start_is_on_the_disk_before_the_first_frame(here: SlowBench) -> None:
+async def test_start_is_on_the_disk_before_the_first_frame(here: SlowBench) -> None:
     seen: list[int] = []
     here.line.before_write = lambda _address: seen.append(len(here.records))
     assert (await here.start())[0] is OutcomeKind.DONE
     assert set(seen) == {1}
 
 
-async def test_a_rest_shown_behind_the_run_word_ends_no_record(here: SlowBench) -> None:
+async def test_standstill_read_just_after_the_run_word_keeps_the_record(here: SlowBench) -> None:
     """The state of a slow drive is still the one before its start: the motor runs all the same."""
     assert (await here.start())[0] is OutcomeKind.DONE
     assert here.line.registers[STATUS] == ENABLED
@@ -75,7 +75,7 @@ async def test_unrecordable_start_is_refused(here: SlowBench) -> None:
     assert here.line.words == []
 
 
-async def test_a_refused_start_keeps_the_record_of_the_motor_that_runs(here: SlowBench) -> None:
+async def test_refused_start_keeps_the_record_of_the_running_motor(here: SlowBench) -> None:
     await here.start()
     here.line.dead_to_writes = True
     kind, _ = await here.start()
@@ -88,7 +88,7 @@ async def test_a_refused_start_keeps_the_record_of_the_motor_that_runs(here: Slo
     assert here.records == [], "its standstill counts as before"
 
 
-async def test_a_record_ends_with_the_standstill_and_not_with_the_stop(here: SlowBench) -> None:
+async def test_record_ends_at_standstill_not_at_the_stop(here: SlowBench) -> None:
     """A stop that the drive never heard leaves the start to be found by the next program."""
     await here.start()
     here.line.dead_to_writes = True

@@ -135,7 +135,7 @@ def files(starts: Starts) -> list[Path]:
     return sorted(starts.folder.glob("*.json"))
 
 
-def test_a_start_of_a_killed_program_is_found(tmp_path: Path) -> None:
+def test_start_of_a_killed_program_is_found(tmp_path: Path) -> None:
     starts = Starts(tmp_path)
     with other_program(tmp_path) as program:
         program.does("begin")
@@ -150,7 +150,7 @@ def test_a_start_of_a_killed_program_is_found(tmp_path: Path) -> None:
     assert files(starts) == []
 
 
-def test_two_programs_keep_each_other_s_records(tmp_path: Path) -> None:
+def test_two_programs_keep_the_records_of_each_other(tmp_path: Path) -> None:
     starts = Starts(tmp_path)
     with other_program(tmp_path) as item, other_program(tmp_path) as other:
         devices = range(1, 9)
@@ -177,7 +177,7 @@ def test_two_programs_keep_each_other_s_records(tmp_path: Path) -> None:
         assert [record.device for record in starts.all_found(LINE)] == [*devices]
 
 
-def test_a_rest_seen_by_another_program_keeps_a_living_one_s_start(starts: Starts) -> None:
+def test_standstill_seen_by_another_program_keeps_a_running_programs_start(starts: Starts) -> None:
     starts.begin(start(LIVING))
     starts.sent(LINE, 2)
     starts.end(LINE, 2)
@@ -185,17 +185,17 @@ def test_a_rest_seen_by_another_program_keeps_a_living_one_s_start(starts: Start
     assert len(files(starts)) == 1
 
 
-def test_a_reused_number_is_not_the_program_that_started(starts: Starts) -> None:
+def test_reused_pid_is_not_the_program_that_started(starts: Starts) -> None:
     starts.begin(start(LIVING, started="99"))
     assert starts.found(LINE, 2) is not None
 
 
-def test_a_restart_of_the_machine_ends_all_programs(starts: Starts) -> None:
+def test_reboot_ends_all_programs(starts: Starts) -> None:
     starts.begin(start(LIVING, boot_id="another"))
     assert starts.found(LINE, 2) is not None
 
 
-def test_it_is_found_whatever_way_the_line_was_typed(starts: Starts, tmp_path: Path) -> None:
+def test_start_is_found_for_any_spelling_of_the_line(starts: Starts, tmp_path: Path) -> None:
     port, link = tmp_path / "ttyUSB0", tmp_path / "adapter"
     port.touch()
     link.symlink_to(port)
@@ -206,9 +206,7 @@ def test_it_is_found_whatever_way_the_line_was_typed(starts: Starts, tmp_path: P
     assert files(starts) == []
 
 
-def test_a_port_that_has_another_number_now_is_found_by_its_link(
-    starts: Starts, tmp_path: Path
-) -> None:
+def test_renumbered_port_is_found_by_its_link(starts: Starts, tmp_path: Path) -> None:
     link = tmp_path / "adapter"
     link.symlink_to(tmp_path / "ttyUSB0")
     starts.begin(start(line=f"serial:{link}"))
@@ -218,7 +216,7 @@ def test_a_port_that_has_another_number_now_is_found_by_its_link(
     assert starts.found(f"serial:{tmp_path / 'ttyUSB0'}", 2) is None
 
 
-def test_two_lines_with_the_same_device(starts: Starts) -> None:
+def test_two_lines_with_the_same_device_address_are_distinct(starts: Starts) -> None:
     starts.begin(start(line="tcp:one", name="A"))
     starts.begin(start(line="tcp:two", name="B"))
     starts.note_stop("tcp:one", 2)
@@ -228,7 +226,7 @@ def test_two_lines_with_the_same_device(starts: Starts) -> None:
     assert len(files(starts)) == 1
 
 
-def test_the_newest_start_counts_in_any_zone(starts: Starts) -> None:
+def test_newest_start_counts_in_any_time_zone(starts: Starts) -> None:
     starts.begin(start(name="new", pid=ENDED, wall="2026-03-05T16:00:00+00:00"))
     starts.begin(start(name="old", pid=ENDED + 1, wall="2026-03-05T17:30:00+02:00"))
     found = starts.found(LINE, 2)
@@ -236,7 +234,7 @@ def test_the_newest_start_counts_in_any_zone(starts: Starts) -> None:
     assert found.name == "new"
 
 
-def test_a_motor_that_was_taken_over_is_no_longer_offered(starts: Starts) -> None:
+def test_motor_taken_over_is_no_longer_offered(starts: Starts) -> None:
     starts.begin(start())
     found = starts.found(LINE, 2)
     assert found is not None
@@ -251,7 +249,7 @@ def test_a_motor_that_was_taken_over_is_no_longer_offered(starts: Starts) -> Non
 
 @pytest.mark.parametrize("before", [True, False])
 @pytest.mark.parametrize("intended", [True, False])
-def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
+def test_new_commander_sets_the_effect_of_its_own_loss(
     starts: Starts, before: bool, intended: bool
 ) -> None:
     starts.begin(replace(start(), left_running=before))
@@ -264,7 +262,7 @@ def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
     assert mine.left_running is intended
 
 
-def test_of_two_motors_that_were_left_one_is_taken_over_and_the_other_still_offered(
+def test_taking_over_one_of_two_motors_keeps_the_other_offered(
     starts: Starts,
 ) -> None:
     keeper = StartKeeper("panel", starts)
@@ -285,7 +283,7 @@ def test_of_two_motors_that_were_left_one_is_taken_over_and_the_other_still_offe
     assert starts.found(LINE, 2) is starts.found(LINE, 3) is None
 
 
-def test_a_line_that_was_closed_and_opened_again_has_the_motor_that_was_started_here(
+def test_reopened_line_keeps_the_motor_started_by_this_program(
     starts: Starts, tmp_path: Path
 ) -> None:
     profile = library.load("atv71")
@@ -307,7 +305,7 @@ def test_a_line_that_was_closed_and_opened_again_has_the_motor_that_was_started_
     assert not other.commanded
 
 
-def test_the_motor_of_a_program_that_lives_is_offered_until_it_is_back(starts: Starts) -> None:
+def test_motor_of_a_running_program_is_offered_until_it_returns(starts: Starts) -> None:
     frozen, line = Program("frozen", "run", LIVING), FakeLine({})
     line.facts.set_programs((line.facts.me, frozen))
     line.facts.set_programs((line.facts.me,))
@@ -326,7 +324,7 @@ def test_the_motor_of_a_program_that_lives_is_offered_until_it_is_back(starts: S
         keeper.take_over(session)
 
 
-def test_a_rest_read_before_the_run_frame_does_not_take_the_record(starts: Starts) -> None:
+def test_standstill_read_before_the_run_frame_keeps_the_record(starts: Starts) -> None:
     starts.begin(start(os.getpid()))
     starts.end(LINE, 2)
     read = time.monotonic()
@@ -339,7 +337,7 @@ def test_a_rest_read_before_the_run_frame_does_not_take_the_record(starts: Start
     assert files(starts) == []
 
 
-def test_a_start_after_an_end_stays(starts: Starts, hung: threading.Event) -> None:
+def test_start_recorded_after_an_end_stays(starts: Starts, hung: threading.Event) -> None:
     starts.begin(start())
     starts.sent(LINE, 2)
     hung.clear()
@@ -355,7 +353,9 @@ def test_a_start_after_an_end_stays(starts: Starts, hung: threading.Event) -> No
 
 
 @pytest.mark.parametrize("nothing", ["end", "note_stop"])
-def test_a_hung_disk_holds_up_no_stop(starts: Starts, hung: threading.Event, nothing: str) -> None:
+def test_hung_disk_does_not_delay_a_stop(
+    starts: Starts, hung: threading.Event, nothing: str
+) -> None:
     starts.begin(start())
     starts.sent(LINE, 2)
     hung.clear()
@@ -369,7 +369,9 @@ def test_a_hung_disk_holds_up_no_stop(starts: Starts, hung: threading.Event, not
     assert files(starts) == []
 
 
-def test_a_hung_disk_refuses_a_start_and_leaves_none(starts: Starts, hung: threading.Event) -> None:
+def test_hung_disk_refuses_a_start_and_leaves_no_record(
+    starts: Starts, hung: threading.Event
+) -> None:
     starts.folder.mkdir(parents=True)
     hung.clear()
     for _ in range(3):
@@ -381,7 +383,7 @@ def test_a_hung_disk_refuses_a_start_and_leaves_none(starts: Starts, hung: threa
     assert [*starts.folder.iterdir()] == []
 
 
-def test_a_refused_start_keeps_the_one_of_the_motor_that_runs(
+def test_refused_start_keeps_the_start_of_the_running_motor(
     starts: Starts, hung: threading.Event
 ) -> None:
     starts.begin(start(name="first"))
@@ -400,7 +402,7 @@ def test_a_refused_start_keeps_the_one_of_the_motor_that_runs(
 
 
 @pytest.mark.parametrize("ahead", [None, "tcp:elsewhere"], ids=["written", "waiting"])
-def test_a_stop_overtakes_a_start_that_is_being_recorded(
+def test_stop_overtakes_a_start_being_recorded(
     starts: Starts, hung: threading.Event, ahead: str | None
 ) -> None:
     starts.folder.mkdir(parents=True)
@@ -425,7 +427,7 @@ def test_a_stop_overtakes_a_start_that_is_being_recorded(
     assert starts.found(LINE, 2) is not None
 
 
-def test_a_rest_seen_while_a_start_is_recorded_does_not_refuse_it(
+def test_standstill_seen_during_recording_does_not_refuse_the_start(
     starts: Starts, hung: threading.Event
 ) -> None:
     hung.clear()
@@ -446,9 +448,7 @@ def a_file(folder: Path) -> Path:
 @pytest.mark.parametrize(
     "place", [a_file, lambda _: Path("/proc/self"), lambda _: Path("/dev/full")]
 )
-def test_a_folder_that_cannot_be_written_refuses_the_start(
-    tmp_path: Path, place: Callable[[Path], Path]
-) -> None:
+def test_unwritable_folder_refuses_the_start(tmp_path: Path, place: Callable[[Path], Path]) -> None:
     starts = Starts(place(tmp_path / "place"), MadeUp())
     with pytest.raises(StartNotRecorded) as caught:
         starts.begin(start(), PATIENCE)
@@ -460,7 +460,7 @@ def test_a_folder_that_cannot_be_written_refuses_the_start(
     assert starts.close(PATIENCE)
 
 
-def test_a_full_disk_refuses_the_start_and_leaves_nothing(
+def test_full_disk_refuses_the_start_and_leaves_nothing(
     starts: Starts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(_: int) -> None:
@@ -477,7 +477,7 @@ def test_a_full_disk_refuses_the_start_and_leaves_nothing(
     assert [file.suffix for file in starts.folder.iterdir()] == [".json"]
 
 
-def test_it_is_flushed_before_it_has_its_name(
+def test_record_is_flushed_before_it_is_renamed(
     starts: Starts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[list[str]] = []
@@ -489,7 +489,7 @@ def test_it_is_flushed_before_it_has_its_name(
     assert seen == [[".part"], [".json"]], "the file, then the folder"
 
 
-def test_no_thread_refuses_a_start_and_a_stop_goes_on(
+def test_missing_thread_refuses_a_start_but_not_a_stop(
     starts: Starts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     starts.begin(start())
@@ -512,7 +512,7 @@ def test_no_thread_refuses_a_start_and_a_stop_goes_on(
 @pytest.mark.parametrize(
     "text", [b"", b"{", b"[]", b'{"line": "tcp:gateway"}', b"\xff\xfe", b'{"line": 3}']
 )
-def test_a_damaged_file_is_set_aside(
+def test_damaged_file_is_set_aside(
     starts: Starts, text: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     starts.begin(start())
@@ -535,11 +535,11 @@ def test_foreign_file_is_ignored(starts: Starts) -> None:
     assert sorted(file.name for file in starts.folder.iterdir()) == ["folder.json", "notes.txt"]
 
 
-def test_it_lies_in_the_state_folder(tmp_path: Path) -> None:
+def test_records_are_in_the_state_folder(tmp_path: Path) -> None:
     assert Starts().folder == tmp_path / "state" / "starts"
 
 
-def test_a_record_names_this_program() -> None:
+def test_record_names_this_program() -> None:
     record = Starts().record(LINE, IDENTITY, "atv71", "reverse", program="run", left_running=True)
     here = Processes()
     assert (record.pid, record.boot_id) == (os.getpid(), here.boot_id())
@@ -585,7 +585,7 @@ class Model:
 
 @settings(max_examples=60)
 @given(st.lists(STEPS, max_size=14))
-def test_any_order_of_calls(steps: list[tuple[str, Drive, int]]) -> None:
+def test_any_order_of_calls_matches_the_model(steps: list[tuple[str, Drive, int]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         starts, model = Starts(Path(folder), MadeUp()), Model()
         for number, (word, drive, pid) in enumerate(steps):
@@ -609,7 +609,7 @@ def test_any_order_of_calls(steps: list[tuple[str, Drive, int]]) -> None:
         assert len(files(starts)) == len(model.begun)
 
 
-def test_a_start_is_on_record_for_the_other_users_of_the_group(
+def test_start_is_recorded_for_other_users_of_the_group(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A program of another user may own the line, and has to stop a motor that was left."""
@@ -640,7 +640,7 @@ def test_a_start_is_on_record_for_the_other_users_of_the_group(
     assert starts.found(LINE, 2) is None
 
 
-def test_a_group_that_cannot_be_reported_keeps_no_motor_from_its_start(
+def test_unknown_group_does_not_block_a_start(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "own"))
@@ -652,7 +652,7 @@ def test_a_group_that_cannot_be_reported_keeps_no_motor_from_its_start(
     assert starts.close(PATIENCE)
 
 
-def test_a_program_of_another_user_that_proc_does_not_show_lives(
+def test_program_of_another_user_hidden_by_proc_counts_as_alive(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As where /proc is mounted with hidepid, and in a service with ProtectProc."""
@@ -685,7 +685,7 @@ def test_record_of_another_pid_namespace_is_kept_until_its_program_ends(tmp_path
     assert starts.found(LINE, there.device, {("pid:[2]", ENDED)}) is None
 
 
-def test_a_record_of_an_earlier_container_hides_no_later_start(tmp_path: Path) -> None:
+def test_record_of_an_earlier_container_does_not_hide_a_later_start(tmp_path: Path) -> None:
     """Whether a program of another PID namespace lives is not known: the last start counts."""
     starts = Starts(tmp_path, processes=MadeUp())
     there = replace(start(pid=ENDED), space="pid:[1]", wall="2026-11-01T10:00:00.000+00:00")

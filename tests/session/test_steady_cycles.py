@@ -138,7 +138,7 @@ async def steady() -> AsyncIterator[Steady]:
             await task
 
 
-async def test_a_steady_cycle_asks_nothing_and_brings_the_values_in_turn(steady: Steady) -> None:
+async def test_steady_cycle_sends_no_request_and_returns_values_in_turn(steady: Steady) -> None:
     await steady.start()
     first = steady.snapshots[-1]
     assert first.readings["SLOW3"].raw == 3  # all is read from here first
@@ -157,7 +157,7 @@ async def test_a_steady_cycle_asks_nothing_and_brings_the_values_in_turn(steady:
     assert len(steady.holder.plans) == 1
 
 
-async def test_values_have_the_time_at_which_they_were_on_the_wire(steady: Steady) -> None:
+async def test_values_have_their_time_on_the_wire(steady: Steady) -> None:
     await steady.start()
     for _ in range(3):
         await steady.cycle()
@@ -183,7 +183,7 @@ async def test_value_written_in_the_meantime_is_read_again(steady: Steady) -> No
     assert snapshot.readings["SPEED"].time > snapshot.readings["OTHER"].time
 
 
-async def test_values_missing_from_cycle_are_read_here(steady: Steady) -> None:
+async def test_missing_values_of_a_cycle_are_read_directly(steady: Steady) -> None:
     await steady.start()
     steady.holder.without = {OTHER}
     snapshot = await steady.cycle()
@@ -193,7 +193,7 @@ async def test_values_missing_from_cycle_are_read_here(steady: Steady) -> None:
     assert len(steady.holder.plans) == 1
 
 
-async def test_after_an_error_the_drive_is_read_from_here_until_nothing_is_owed(
+async def test_drive_is_read_directly_after_an_error_until_complete(
     steady: Steady,
 ) -> None:
     await steady.start()
@@ -213,7 +213,7 @@ async def test_after_an_error_the_drive_is_read_from_here_until_nothing_is_owed(
     assert after.turns == (*before.turns[2:], *before.turns[:2])
 
 
-async def test_a_look_at_everything_is_read_from_here_at_once(steady: Steady) -> None:
+async def test_full_read_is_sent_directly(steady: Steady) -> None:
     await steady.start()
     await steady.cycle()
     steady.session.request_full_read()
@@ -226,7 +226,7 @@ async def test_a_look_at_everything_is_read_from_here_at_once(steady: Steady) ->
     assert len(steady.holder.plans) == 1
 
 
-async def test_another_period_or_another_value_is_another_plan(steady: Steady) -> None:
+async def test_changed_period_or_values_make_a_new_plan(steady: Steady) -> None:
     await steady.start()
     await steady.cycle()
     steady.monitor.period = 0.25
@@ -246,7 +246,7 @@ async def test_another_period_or_another_value_is_another_plan(steady: Steady) -
     assert steady.holder.ended == 2
 
 
-async def test_a_holder_that_is_gone_is_replaced_by_reading_from_here(steady: Steady) -> None:
+async def test_drive_is_read_directly_if_the_holder_is_gone(steady: Steady) -> None:
     await steady.start()
     await steady.cycle()
     steady.holder.answers = False
@@ -261,7 +261,7 @@ async def test_a_holder_that_is_gone_is_replaced_by_reading_from_here(steady: St
     await steady.cycle()
 
 
-async def test_a_plan_that_is_refused_is_not_submitted_again(steady: Steady) -> None:
+async def test_refused_plan_is_not_submitted_again(steady: Steady) -> None:
     steady.holder.refuses = True
     steady.monitor.start(period=0.01)
     await steady.until(lambda: len(steady.snapshots) > 3)
@@ -271,7 +271,7 @@ async def test_a_plan_that_is_refused_is_not_submitted_again(steady: Steady) -> 
     assert not steady.snapshots[-1].error
 
 
-async def test_a_drive_that_is_held_back_at_times_is_read_from_here(steady: Steady) -> None:
+async def test_drive_paused_at_times_is_read_directly(steady: Steady) -> None:
     steady.monitor.freely = lambda: False
     steady.monitor.start(period=0.01)
     await steady.until(lambda: len(steady.snapshots) > 3)
@@ -284,20 +284,20 @@ async def test_a_drive_that_is_held_back_at_times_is_read_from_here(steady: Stea
     assert not steady.holder.polls
 
 
-async def test_the_end_of_watching_ends_the_plan(steady: Steady) -> None:
+async def test_end_of_watching_ends_the_plan(steady: Steady) -> None:
     await steady.start()
     steady.monitor.stop()
     await steady.until(lambda: not steady.holder.polls)
 
 
-async def test_a_drive_that_is_read_seldom_is_read_from_here(steady: Steady) -> None:
+async def test_rarely_read_drive_is_read_directly(steady: Steady) -> None:
     steady.monitor.start(period=LONGEST_STEADY + 1.0)
     await steady.until(lambda: len(steady.snapshots) == 1)
     await asyncio.sleep(0)
     assert steady.holder.plans == []
 
 
-async def test_alone_on_the_line_nothing_is_planned(steady: Steady) -> None:
+async def test_single_program_submits_no_plan(steady: Steady) -> None:
     steady.line.pace.carrier = None
     steady.monitor.start(period=0.01)
     await steady.until(lambda: len(steady.snapshots) > 3)

@@ -116,7 +116,7 @@ async def wait_for(holds: Callable[[], bool], seconds: float = 60.0) -> None:
         await asyncio.sleep(0.01)
 
 
-async def test_an_altivar_71_in_the_i_o_profile_never_gets_a_word_of_drivecom(
+async def test_altivar_71_in_the_io_profile_gets_no_drivecom_word(
     start: Start, journal: Journal
 ) -> None:
     """16#0007 has bit 0 set, which runs the motor in this profile."""
@@ -129,7 +129,7 @@ async def test_an_altivar_71_in_the_i_o_profile_never_gets_a_word_of_drivecom(
     assert drive.motor.frequency == 0
 
 
-async def test_a_profile_without_a_known_stop_says_so(start: Start, journal: Journal) -> None:
+async def test_profile_without_a_known_stop_is_reported(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv71", 1, sets={"CHCF": 0}))
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("atv71"))])
@@ -139,7 +139,7 @@ async def test_a_profile_without_a_known_stop_says_so(start: Start, journal: Jou
     assert writes(line) == []
 
 
-async def test_with_dotd_at_freewheel_the_drive_is_halted_instead(
+async def test_drive_with_dotd_at_freewheel_is_halted_instead(
     start: Start, journal: Journal
 ) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0, sets={"DOTD": 0}))
@@ -152,9 +152,7 @@ async def test_with_dotd_at_freewheel_the_drive_is_halted_instead(
     assert writes(line)[0] == (8501, 0x010F)
 
 
-async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(
-    start: Start, journal: Journal
-) -> None:
+async def test_stop_does_not_unlock_a_leroy_somer(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("powerdrive", 1, sets={"6.43": 1}))
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
@@ -162,7 +160,9 @@ async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(
     assert writes(line) == [(641, 0x0000)]
 
 
-async def test_a_drive_commanded_from_elsewhere_is_reported(start: Start, journal: Journal) -> None:
+async def test_stop_reports_a_drive_commanded_by_another_source(
+    start: Start, journal: Journal
+) -> None:
     simulation, line = start(DriveSpec("powerdrive", 1, run_hz=20.0))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
     stopper, clock = Stopper(line, journal), FakeClock()
@@ -172,7 +172,7 @@ async def test_a_drive_commanded_from_elsewhere_is_reported(start: Start, journa
     assert "commanded by another source" in report.text
 
 
-async def test_a_dead_drive_is_tried_again_and_reported_of(start: Start, journal: Journal) -> None:
+async def test_stop_of_a_dead_drive_is_retried_and_reported(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv21", 1))
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 9, library.load("atv21"))])
@@ -181,7 +181,7 @@ async def test_a_dead_drive_is_tried_again_and_reported_of(start: Start, journal
     assert len(writes(line)) == 5
 
 
-async def test_a_read_only_line_stops_nothing_and_says_so(start: Start, journal: Journal) -> None:
+async def test_read_only_line_refuses_a_stop_with_a_reason(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv21", 1), read_only=True)
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("atv21"))])
@@ -190,7 +190,7 @@ async def test_a_read_only_line_stops_nothing_and_says_so(start: Start, journal:
     assert "read-only" in report.text
 
 
-async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start, journal: Journal) -> None:
+async def test_stop_all_stops_every_drive_and_starts_none(start: Start, journal: Journal) -> None:
     specs = [DriveSpec(family, at, run_hz=20.0) for at, family in enumerate(FAMILIES[:4], start=1)]
     simulation, line = start(*specs)
     await wait_for(lambda: all(simulation.drive(at).motor.frequency > 5 for at in range(1, 5)))
@@ -206,7 +206,7 @@ async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start, journal
     assert [(data[1], data[2:6].hex()) for data in broadcasts] == [(6, "fa00c000")]
 
 
-async def test_a_stop_goes_before_all_that_waits(start: Start, journal: Journal) -> None:
+async def test_stop_precedes_all_waiting_requests(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
     session = DriveSession(line, 1, library.load("atv71"))
     await Reader(session).read(["CHCF", "DOTD", "ETA"])
@@ -252,7 +252,7 @@ def test_report_from_another_thread_is_kept(journal: Journal) -> None:
     assert kept == texts[:-1]
 
 
-def test_orders_that_no_state_allows_are_refused_in_words() -> None:
+def test_command_allowed_in_no_state_is_refused_with_a_reason() -> None:
     profile = library.load("atv21")
     chart = profile.data.charts[0]
     with pytest.raises(OrderRefused, match=r"possible in the states: .*Fault.* It is now: Standby"):
@@ -264,7 +264,7 @@ def test_orders_that_no_state_allows_are_refused_in_words() -> None:
         choose(leroy, "forward", {"10.40": 1, "6.43": 0})
 
 
-def test_the_way_through_the_chart() -> None:
+def test_path_through_the_chart_is_found() -> None:
     chart = library.load("atv31").data.charts[0]
     assert walk(chart, "disabled", "enabled") == [
         ("ready", 0x0006), ("switched-on", 0x0007), ("enabled", 0x000F),
@@ -295,7 +295,7 @@ PRESSES = 400
 """More stops than a drive could be asked between: a key that is held down."""
 
 
-async def test_a_stop_key_that_is_held_down_stops(start: Start, journal: Journal) -> None:
+async def test_held_stop_key_stops(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
     drive = simulation.drive(1)
     await wait_for(lambda: drive.motor.frequency > 5)
@@ -311,7 +311,7 @@ async def test_a_stop_key_that_is_held_down_stops(start: Start, journal: Journal
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
 
 
-async def test_a_stop_behind_a_command_is_one_of_its_own(start: Start, journal: Journal) -> None:
+async def test_stop_after_a_command_is_a_separate_stop(start: Start, journal: Journal) -> None:
     """One that was begun before the drive was armed again does not count for it."""
     _, line = start(DriveSpec("atv71", 1))
     stopper, session = Stopper(line, journal), DriveSession(line, 1, library.load("atv71"))

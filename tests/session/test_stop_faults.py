@@ -192,7 +192,7 @@ def room_of(place: Place) -> str:
 )
 @pytest.mark.parametrize("attached", [False, True], ids=["direct", "attached"])
 @pytest.mark.parametrize("room", ROOMS)
-def test_an_error_anywhere_on_the_way_of_a_stop_keeps_no_frame_from_the_drive(
+def test_error_anywhere_in_a_stop_does_not_prevent_its_frame(
     wire: Wire,
     room: str,
     attached: bool,

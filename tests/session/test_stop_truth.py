@@ -32,7 +32,7 @@ def test_coasting_word_never_replaces_another() -> None:
     assert nearest_stop(chart, "dc-braking") == "dc-braking"
 
 
-async def test_an_emergency_stop_that_a_drive_lacks_becomes_its_quick_stop_and_says_so() -> None:
+async def test_missing_emergency_stop_becomes_a_reported_quick_stop() -> None:
     async with bench("atv71", run_hz=20.0) as here:
         await until(lambda: here.drive.motor.frequency > 10)
         here.fleet.stop([here.session], "emergency-stop")
@@ -43,7 +43,7 @@ async def test_an_emergency_stop_that_a_drive_lacks_becomes_its_quick_stop_and_s
         assert (8501, 0x0002) in here.writes()
 
 
-async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
+async def test_own_stop_is_not_attributed_to_another_program() -> None:
     async with bench("atv71") as here:
         commander = here.console.commander
         await here.arm()
@@ -57,7 +57,7 @@ async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
         assert commander.given.lost_orders() == ""
 
 
-async def test_another_programs_stop_is_reported_with_the_word() -> None:
+async def test_stop_by_another_program_is_reported_with_its_word() -> None:
     async with bench("atv71") as here:
         commander = here.console.commander
         await here.arm()
@@ -71,7 +71,7 @@ async def test_another_programs_stop_is_reported_with_the_word() -> None:
 
 
 @pytest.mark.parametrize(("steps", "ends"), [(40, 500), (-90, 0)])
-async def test_a_step_past_a_limit_goes_to_the_limit(steps: int, ends: int) -> None:
+async def test_step_beyond_a_limit_reaches_the_limit(steps: int, ends: int) -> None:
     """40 held Up wrote nothing once the sum lay above HSP."""
     async with bench("atv71", sets={"HSP": 500, "LSP": 0}) as here:
         commander = here.console.commander
@@ -82,7 +82,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit(steps: int, ends: int) -> N
         await until(lambda: here.drive.raw("LFR") == ends)
 
 
-async def test_a_run_that_the_interlock_refuses_writes_no_reference() -> None:
+async def test_run_refused_by_an_interlock_writes_no_reference() -> None:
     async with bench("atv71", sets={"FR1": 1, "LFR": 0}) as here:
         commander = here.console.commander
         await here.arm()
@@ -93,7 +93,7 @@ async def test_a_run_that_the_interlock_refuses_writes_no_reference() -> None:
         assert here.writes() == []
 
 
-def test_the_log_of_events_keeps_each_once_and_the_last_ones() -> None:
+def test_event_log_keeps_the_latest_events_once() -> None:
     log = EventLog(lambda: 5.0)
     for _ in range(3):
         log.add("done", "written", 2)

@@ -58,7 +58,7 @@ def seen(family: str, raws: Mapping[str, int], ago: float = 0.0) -> DriveSession
         ("powerdrive", {}, 0.0, "stop", 0x0000),
     ],
 )
-def test_the_first_word_starts_no_motor_whatever_chart_is_in_force(
+def test_first_stop_word_starts_no_motor_in_any_chart(
     family: str, raws: Mapping[str, int], ago: float, order: OrderId, word: int
 ) -> None:
     session = seen(family, raws, ago)
@@ -67,7 +67,7 @@ def test_the_first_word_starts_no_motor_whatever_chart_is_in_force(
     assert order_target(session.profile, chart, chosen).code == chart.command
 
 
-async def test_every_drive_is_sent_its_word_before_anything_is_read(
+async def test_every_drive_gets_its_stop_word_before_any_read(
     start: Start, journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     families = ["atv71", "atv31", "powerdrive", "atv71", "atv21"]
@@ -123,7 +123,7 @@ async def ending(stopper: Stopper, device: int, phase: Phase) -> StopReport:
     return stopper.reports[device]
 
 
-async def test_a_stop_of_a_motor_that_its_terminals_run_is_not_stopped_at_once(
+async def test_motor_run_by_terminals_is_not_reported_as_stopped(
     start: Start, journal: Journal
 ) -> None:
     simulation, line = start(DriveSpec("atv31", 1, sets={"CHCF": 1, "Fr1": 1}))
@@ -146,7 +146,7 @@ async def test_a_stop_of_a_motor_that_its_terminals_run_is_not_stopped_at_once(
     assert (await ended(stopper, 1)).phase is Phase.STOPPED, "seen to stop after all"
 
 
-async def test_a_stop_is_sent_although_another_source_runs_the_motor(
+async def test_stop_is_sent_although_another_source_runs_the_motor(
     start: Start, journal: Journal
 ) -> None:
     simulation, line = start(DriveSpec("atv31", 1, sets={"CHCF": 1, "Fr1": 1}))

@@ -32,7 +32,7 @@ __all__ = ["journal", "start"]
 ATV71 = library.load("atv71")
 
 
-async def test_a_refused_write_of_the_profile_does_not_choose_the_next_stop_word(
+async def test_refused_profile_write_does_not_change_the_stop_word(
     start: Start, journal: Journal
 ) -> None:
     """CHCF = 1 was refused: 16#0007 would run the motor forward in the I/O profile."""
@@ -73,7 +73,7 @@ async def test_value_changed_at_rest_is_read_again(start: Start, journal: Journa
     assert session.reported_by_line, "a drive that watches from its first write on watches now"
 
 
-async def test_while_the_motor_runs_what_needs_it_at_rest_is_not_read_again(
+async def test_values_fixed_while_running_are_not_read_again(
     start: Start, journal: Journal
 ) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
@@ -94,7 +94,7 @@ async def test_while_the_motor_runs_what_needs_it_at_rest_is_not_read_again(
     assert not any(data[2:4] == (8401).to_bytes(2, "big") for data in requested[:at])
 
 
-async def test_a_profile_that_cannot_be_read_is_stopped_by_the_word_of_all(
+async def test_unreadable_control_profile_gets_the_common_stop_word(
     start: Start, journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
@@ -115,7 +115,7 @@ async def test_a_profile_that_cannot_be_read_is_stopped_by_the_word_of_all(
     assert drive.motor.frequency == 0
 
 
-def test_the_word_of_all_charts() -> None:
+def test_common_stop_word_is_safe_in_all_charts() -> None:
     assert stop_in_any(ATV71, {})[1].words == [0x0000]
     assert stop_in_any(ATV71, {"CHCF": 1})[1].words == [0x0007]
     assert stop_in_any(ATV71, {"CHCF": 3})[1].words == [0x0000]
@@ -123,7 +123,7 @@ def test_the_word_of_all_charts() -> None:
         stop_in_any(ATV71, {"CHCF": 0})
 
 
-async def test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped(
+async def test_enabled_motor_at_0_hz_is_not_reported_as_stopped(
     start: Start, journal: Journal
 ) -> None:
     """Run at the terminals with reference 0: the next touch of the potentiometer turns it."""
@@ -142,9 +142,7 @@ async def test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped(
     assert "still enabled from its terminals or keypad" in report.text
 
 
-async def test_halt_is_followed_by_the_word_that_ends_operation(
-    start: Start, journal: Journal
-) -> None:
+async def test_halt_is_followed_by_disable_operation(start: Start, journal: Journal) -> None:
     """With DOTD = 0 the motor is halted; at 0 Hz the drive would still be enabled."""
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0, sets={"DOTD": 0}))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
@@ -157,9 +155,7 @@ async def test_halt_is_followed_by_the_word_that_ends_operation(
     assert session.state(5.0).kind != "running"
 
 
-async def test_a_stop_disarms_and_voids_what_was_typed_before_it(
-    start: Start, journal: Journal
-) -> None:
+async def test_stop_disarms_and_cancels_earlier_input(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv71", 1))
     session = DriveSession(line, 1, ATV71)
     session.arming.arm()
@@ -173,7 +169,7 @@ async def test_a_stop_disarms_and_voids_what_was_typed_before_it(
     assert "F9" in permit.refusal()
 
 
-async def test_a_motor_that_coasts_is_not_stopped_before_it_stands(
+async def test_coasting_motor_is_not_stopped_before_standstill(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its state says so at once: nothing drives it any more, and it turns for a while."""

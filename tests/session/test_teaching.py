@@ -70,7 +70,7 @@ async def two_looks(line: OneDrive, teacher: Teacher) -> None:
     assert (await teacher.look("HZ", "50.3")).kind is LessonKind.TAUGHT
 
 
-async def test_from_the_second_look_on_the_value_is_reported_in_its_unit() -> None:
+async def test_value_has_its_unit_from_the_second_reading_on() -> None:
     line, teacher = drive()
     assert await shown(teacher) == "0"
     await two_looks(line, teacher)
@@ -80,7 +80,7 @@ async def test_from_the_second_look_on_the_value_is_reported_in_its_unit() -> No
     assert await shown(teacher, "AMPS") == "0"
 
 
-async def test_it_is_known_to_the_next_program_on_this_line_and_device() -> None:
+async def test_learned_scale_is_stored_for_line_and_device() -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     _, later = drive(HZ=250)
@@ -90,7 +90,7 @@ async def test_it_is_known_to_the_next_program_on_this_line_and_device() -> None
     assert await shown(elsewhere) == "250"
 
 
-async def test_another_drive_at_the_same_place_is_not_taken_for_it() -> None:
+async def test_other_drive_at_the_address_does_not_get_the_scale() -> None:
     line, teacher = drive(NAMED)
     await two_looks(line, teacher)
     _, other = drive(OTHER, HZ=250)
@@ -101,7 +101,7 @@ async def test_another_drive_at_the_same_place_is_not_taken_for_it() -> None:
     assert await shown(unsaid) == "25.0 Hz taught", "its profile was named, it was not asked"
 
 
-async def test_of_two_drives_taught_at_one_place_an_unnamed_one_is_neither() -> None:
+async def test_unidentified_drive_gets_no_scale_if_two_were_learned() -> None:
     for who in (NAMED, OTHER):
         line, teacher = drive(who)
         await two_looks(line, teacher)
@@ -109,7 +109,7 @@ async def test_of_two_drives_taught_at_one_place_an_unnamed_one_is_neither() -> 
     assert await shown(unsaid) == "250"
 
 
-async def test_a_third_look_that_disagrees_ends_it_for_good() -> None:
+async def test_disagreeing_third_reading_discards_the_stored_scale() -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     line.registers[500] = 400
@@ -120,7 +120,7 @@ async def test_a_third_look_that_disagrees_ends_it_for_good() -> None:
     assert await shown(later) == "250"
 
 
-async def test_a_sign_that_no_look_has_reported_leaves_the_word_raw() -> None:
+async def test_unknown_sign_leaves_the_word_raw() -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     line.registers[500] = 65036
@@ -129,21 +129,21 @@ async def test_a_sign_that_no_look_has_reported_leaves_the_word_raw() -> None:
     assert await shown(teacher) == "-50.0 Hz taught"
 
 
-async def test_scaled_value_is_not_taught() -> None:
+async def test_scaled_value_cannot_be_learned() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="nothing is to be taught"):
         await teacher.look("KNOWN", "12")
     assert line.requested == []
 
 
-async def test_a_text_that_is_no_number_is_refused_before_the_drive_is_requested() -> None:
+async def test_invalid_number_is_refused_before_any_request() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="not a number of a display"):
         await teacher.look("HZ", "fast")
     assert line.requested == []
 
 
-async def test_forgetting() -> None:
+async def test_forgetting_removes_the_learned_scale() -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     assert teacher.forget("HZ")
@@ -153,7 +153,7 @@ async def test_forgetting() -> None:
     assert await shown(later) == "250"
 
 
-async def test_lessons_of_two_programs_are_kept() -> None:
+async def test_scales_learned_by_two_programs_are_kept() -> None:
     line, teacher = drive()
     other_line, other = drive()
     await two_looks(line, teacher)
@@ -178,7 +178,7 @@ async def preset(unit: str = "Hz") -> Teacher:
     return teacher
 
 
-async def test_a_taught_preset_is_proposed_and_takes_the_reference_once_confirmed() -> None:
+async def test_confirmed_preset_accepts_the_reference() -> None:
     teacher = await preset()
     session = teacher.session
     assert teacher.proposal() == "PRESET"
@@ -194,7 +194,7 @@ async def test_a_taught_preset_is_proposed_and_takes_the_reference_once_confirme
     assert last.reference == ""
 
 
-async def test_a_preset_in_rpm_takes_a_speed() -> None:
+async def test_preset_in_rpm_accepts_a_speed() -> None:
     teacher = await preset("rpm")
     teacher.confirm_reference("PRESET")
     assert teacher.session.profile.quantity("command_speed") is not None
@@ -202,14 +202,14 @@ async def test_a_preset_in_rpm_takes_a_speed() -> None:
 
 
 @pytest.mark.parametrize(("unit", "why"), [("%", "given in Hz or rpm"), ("", "no unit")])
-async def test_a_preset_in_another_unit_takes_none(unit: str, why: str) -> None:
+async def test_preset_in_another_unit_accepts_no_reference(unit: str, why: str) -> None:
     teacher = await preset(unit)
     assert teacher.proposal() == ""
     with pytest.raises(ValueRefused, match=why):
         teacher.confirm_reference("PRESET")
 
 
-async def test_untaught_or_non_preset_value_is_refused() -> None:
+async def test_value_without_a_scale_or_preset_is_refused() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="not taught yet"):
         teacher.confirm_reference("PRESET")
@@ -218,7 +218,7 @@ async def test_untaught_or_non_preset_value_is_refused() -> None:
         teacher.confirm_reference("HZ")
 
 
-async def test_a_look_that_ends_the_scale_ends_the_reference_and_its_confirmation() -> None:
+async def test_discarded_scale_ends_the_reference_and_its_confirmation() -> None:
     teacher = await preset()
     teacher.confirm_reference("PRESET")
     assert (await teacher.look("PRESET", "20.0")).kind is LessonKind.ENDED
@@ -247,7 +247,7 @@ async def parsed(teacher: Teacher, text: str) -> Reference:
     return parse_reference(profile, text, readings)
 
 
-async def test_a_reference_in_the_taught_unit() -> None:
+async def test_reference_is_given_in_the_learned_unit() -> None:
     teacher = await preset("Hz")
     teacher.confirm_reference("PRESET")
     found = await parsed(teacher, "25.5")
@@ -256,7 +256,7 @@ async def test_a_reference_in_the_taught_unit() -> None:
         await parsed(teacher, "700rpm")
 
 
-async def test_the_highest_reference_holds_once_it_was_taught_in_the_same_unit() -> None:
+async def test_maximum_reference_applies_if_learned_in_the_same_unit() -> None:
     _, teacher = await presets("rpm")
     assert (await parsed(teacher, "900rpm")).raw == 900
     with pytest.raises(ValueRefused, match="above MOST = 900 rpm"):
@@ -267,7 +267,7 @@ async def test_the_highest_reference_holds_once_it_was_taught_in_the_same_unit()
     assert (await parsed(other, "901rpm")).raw == 901, "another unit says nothing"
 
 
-async def test_a_reference_whose_word_could_mean_a_negative_one_is_refused() -> None:
+async def test_reference_that_could_be_negative_is_refused() -> None:
     teacher = await preset("Hz")
     teacher.confirm_reference("PRESET")
     assert (await parsed(teacher, "3276.7")).raw == 0x7FFF
@@ -309,7 +309,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
-async def test_a_damaged_file_is_reported_and_nothing_is_lost(folder: Path, text: str) -> None:
+async def test_damaged_file_is_reported_and_kept(folder: Path, text: str) -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     path = kept(folder)
@@ -325,7 +325,7 @@ async def test_a_damaged_file_is_reported_and_nothing_is_lost(folder: Path, text
     assert await shown(drive(HZ=250)[1]) == "25.0 Hz taught"
 
 
-async def test_looks_that_contradict_each_other_teach_nothing(folder: Path) -> None:
+async def test_contradicting_readings_give_no_scale(folder: Path) -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     path = kept(folder)
@@ -335,7 +335,7 @@ async def test_looks_that_contradict_each_other_teach_nothing(folder: Path) -> N
     assert await shown(drive(HZ=250)[1]) == "250"
 
 
-async def test_a_code_that_the_profile_does_not_have_is_kept_and_not_used(folder: Path) -> None:
+async def test_unknown_code_is_kept_but_not_used(folder: Path) -> None:
     line, teacher = drive()
     await two_looks(line, teacher)
     path = kept(folder)
@@ -350,7 +350,7 @@ async def test_a_code_that_the_profile_does_not_have_is_kept_and_not_used(folder
     assert set(json.loads(path.read_text("utf-8"))["looks"]) == {"GONE", "KNOWN"}
 
 
-async def test_a_folder_that_cannot_be_written_is_reported_and_the_scale_is_used(
+async def test_unwritable_folder_is_reported_and_the_scale_is_used(
     folder: Path,
 ) -> None:
     (folder / "taught").write_text("in the way")
@@ -360,7 +360,7 @@ async def test_a_folder_that_cannot_be_written_is_reported_and_the_scale_is_used
     assert await shown(teacher) == "50.3 Hz taught"
 
 
-def test_the_file_is_found_however_the_line_is_typed() -> None:
+def test_file_is_found_for_any_spelling_of_the_line() -> None:
     drive = TaughtDrive.of("serial:/dev/ttyS9,19200,8E1", 4, "powerdrive", None)
     assert drive.file == TaughtDrive.of("/dev/ttyS9", 4, "powerdrive", None).file
     assert drive.file != TaughtDrive.of("/dev/ttyS9", 5, "powerdrive", None).file

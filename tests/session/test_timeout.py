@@ -78,7 +78,7 @@ async def reported(session: DriveSession) -> Timeout:
     return await read_timeout(Reader(session), Priority.OPERATOR_READ)
 
 
-async def test_seconds_reaction_and_fault() -> None:
+async def test_timeout_has_seconds_reaction_and_fault() -> None:
     watch = (await reported(session_of(Ports({TTO: 30})))).watch
     assert watch is not None
     assert (watch.timeout, watch.code, watch.fault, watch.active) == (3.0, "TTO", "SLF", True)
@@ -86,13 +86,13 @@ async def test_seconds_reaction_and_fault() -> None:
     assert watch.reaction.name == "Freewheel"
 
 
-async def test_a_reaction_without_a_trip_names_no_fault() -> None:
+async def test_reaction_without_a_trip_names_no_fault() -> None:
     watch = (await reported(session_of(Ports({TTO: 30, SLL: 2})))).watch
     assert watch is not None
     assert watch.fault == ""
 
 
-async def test_a_watch_whose_reaction_is_off_has_not_begun() -> None:
+async def test_timeout_without_a_reaction_has_not_begun() -> None:
     session = session_of(Ports({TTO: 30, SLL: 0}))
     session.timeout = await reported(session)
     for found in (session.timeout, timeout_now(session)):
@@ -103,12 +103,12 @@ async def test_a_watch_whose_reaction_is_off_has_not_begun() -> None:
     assert "acts" not in text
 
 
-async def test_off_and_refused_are_two_things() -> None:
+async def test_off_is_distinguished_from_refused() -> None:
     assert await reported(session_of(Ports({TTO: 0}))) == Timeout(known=True)
     assert await reported(session_of(Ports({TTO: 30}, refused=TTO))) == Timeout(known=False)
 
 
-async def test_the_shortest_of_several_ports_counts() -> None:
+async def test_shortest_timeout_of_several_ports_applies() -> None:
     for mine, other, shortest in ((0, 20, 2.0), (30, 0, 3.0), (30, 20, 2.0), (10, 20, 1.0)):
         line = Ports({TTO: mine, PORT: other})
         watch = (await reported(session_of(line, other_timeouts=["PORT"]))).watch
@@ -116,7 +116,7 @@ async def test_the_shortest_of_several_ports_counts() -> None:
         assert watch.timeout == shortest
 
 
-async def test_a_port_that_is_not_there_is_requested_once() -> None:
+async def test_timeout_of_a_missing_port_is_read_once() -> None:
     line = Ports({PORT: 20}, silent=TTO)
     session = session_of(line, other_timeouts=["PORT"])
     for _ in range(2):
@@ -126,7 +126,7 @@ async def test_a_port_that_is_not_there_is_requested_once() -> None:
     assert line.read_so_far.count(TTO) == 1
 
 
-async def test_a_word_that_met_silence_twice_is_no_longer_requested() -> None:
+async def test_word_unanswered_twice_is_not_read_again() -> None:
     """One lost reply is no missing word; and each silence keeps a drive from being asked."""
     clock = FakeClock()
     line = Ports({PORT: 20}, silent=TTO)
@@ -143,7 +143,7 @@ async def test_a_word_that_met_silence_twice_is_no_longer_requested() -> None:
     assert watch.code == "TTO"
 
 
-async def test_a_drive_is_requested_what_it_has_after_a_silence() -> None:
+async def test_timeout_is_read_again_after_a_silence() -> None:
     """Else it counts as silent, and polls and its feeding wait."""
     line = Ports({PORT: 20}, silent=TTO)
     await read_timeout(Reader(session_of(line, other_timeouts=["PORT"])), Priority.POLL)
@@ -151,7 +151,7 @@ async def test_a_drive_is_requested_what_it_has_after_a_silence() -> None:
     assert line.read_so_far[at : at + 3] == [TTO, STATE, PORT]
 
 
-async def test_a_family_that_refuses_by_silence_may_tell_nothing() -> None:
+async def test_family_that_refuses_by_silence_may_have_an_unknown_timeout() -> None:
     profile = library.load("powerdrive")
     line = Ports(
         {parameter.address: 0 for parameter in profile.parameters}, silent=profile["15.07"].address
@@ -163,13 +163,13 @@ async def test_a_family_that_refuses_by_silence_may_tell_nothing() -> None:
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
-def test_proof_of_presence_is_not_a_late_reply(family: str) -> None:
+def test_late_reply_does_not_prove_presence(family: str) -> None:
     ask = presence_read(library.load(family))
     assert ask is not None
     assert ask.count == 2
 
 
-async def test_a_drive_that_answers_nothing_is_reported() -> None:
+async def test_silent_drive_is_reported() -> None:
     with pytest.raises(NoAnswer):
         await reported(session_of(Ports({TTO: 30}, silent=TTO)))
 
@@ -183,7 +183,7 @@ async def test_a_drive_that_answers_nothing_is_reported() -> None:
         (True, 0, True, True),
     ],
 )
-async def test_a_watch_that_begins_with_a_command(
+async def test_timeout_that_begins_with_a_command_is_known(
     needs_write: bool, held: int, reported_by_line: bool, begun: bool
 ) -> None:
     session = session_of(Ports({TTO: 30, CMD: held}), needs_write=needs_write)

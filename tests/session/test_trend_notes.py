@@ -62,7 +62,7 @@ class TrendOf:
         return [point.time for point in self.trend.points]
 
 
-def test_the_next_program_has_the_points_at_their_times() -> None:
+def test_next_program_gets_trend_points_with_their_times() -> None:
     holder = LineHolder()
     TrendOf(holder, "panel").add(100.0, 100.5, 101.0, 101.5, 102.0)
     following = TrendOf(holder, "next")
@@ -72,7 +72,7 @@ def test_the_next_program_has_the_points_at_their_times() -> None:
     assert following.trend.points[0].values == (100.0, None, 1.0)
 
 
-def test_a_killed_program_has_left_all_but_the_last_two_seconds() -> None:
+def test_killed_program_leaves_all_but_the_last_two_seconds() -> None:
     holder = LineHolder()
     TrendOf(holder, "panel").add(*(100.0 + 0.5 * number for number in range(9)))
     following = TrendOf(holder, "next")
@@ -82,7 +82,7 @@ def test_a_killed_program_has_left_all_but_the_last_two_seconds() -> None:
     assert NOTED_EVERY <= 2.0
 
 
-def test_points_older_than_the_trend_are_left_out() -> None:
+def test_points_older_than_the_trend_are_omitted() -> None:
     holder = LineHolder()
     TrendOf(holder, "panel").add(100.0, 200.0, 300.0, 310.0)
     following = TrendOf(holder, "next")
@@ -91,7 +91,7 @@ def test_points_older_than_the_trend_are_left_out() -> None:
     assert following.times == [200.0, 300.0, 310.0, 150.0 + TREND_SECONDS]
 
 
-def test_a_trend_of_another_family_at_the_same_address_is_not_taken() -> None:
+def test_trend_of_another_family_at_the_address_is_ignored() -> None:
     holder = LineHolder()
     TrendOf(holder, "panel").add(100.0, 103.0)
     following = TrendOf(holder, "next", "atv31")
@@ -104,7 +104,7 @@ def test_a_trend_of_another_family_at_the_same_address_is_not_taken() -> None:
     assert following.times == [110.0]
 
 
-def test_notes_of_a_profile_with_long_names_are_messages_too() -> None:
+def test_notes_with_long_names_can_be_sent() -> None:
     holder = LineHolder()
     panel = TrendOf(holder, "panel")
     panel.trend = Trend(library.load("atv71"))
@@ -124,7 +124,7 @@ def test_notes_of_a_profile_with_long_names_are_messages_too() -> None:
         [TrendPoint(100.0, (1.0,))],
     ],
 )
-def test_points_that_cannot_be_drawn_are_left_out(points: list[TrendPoint]) -> None:
+def test_points_that_cannot_be_drawn_are_omitted(points: list[TrendPoint]) -> None:
     holder = LineHolder()
     kind = Trend(ATV71).kind
     holder.facts.notes.keep(LineNote(2, kind, b"no points"))
@@ -149,7 +149,7 @@ def found(holder: LineHolder, log: EventLog, name: str = "next") -> list[Event]:
     return list(log.events)
 
 
-def test_the_next_program_has_the_messages_with_their_time_drive_and_program() -> None:
+def test_next_program_gets_messages_with_time_drive_and_program() -> None:
     holder, log = LineHolder(), EventLog(lambda: 50.0)
     left(holder, "run", Event(40.0, 2, "stop", "Stopped."), Event(60.0, 3, "fault", "OCF."))
     log.add("told", "Own.")
@@ -161,7 +161,7 @@ def test_the_next_program_has_the_messages_with_their_time_drive_and_program() -
     ]
 
 
-def test_a_message_of_another_program_is_not_the_newest() -> None:
+def test_message_of_another_program_is_not_the_newest() -> None:
     holder, log = LineHolder(), EventLog(lambda: 50.0)
     left(holder, "run", Event(60.0, 3, "fault", "OCF."))
     assert found(holder, log)
@@ -171,20 +171,20 @@ def test_a_message_of_another_program_is_not_the_newest() -> None:
     assert log.newest == Event(50.0, None, "told", "Own.")
 
 
-def test_a_message_of_several_programs_at_once_is_kept_once() -> None:
+def test_same_message_of_several_programs_is_kept_once() -> None:
     holder, log = LineHolder(), EventLog()
     for name in ("panel", "watch"):
         left(holder, name, Event(60.0, 3, "told", "Stopped."), Event(90.0, 3, "told", "Again."))
     assert len(found(holder, log)) == 2
 
 
-def test_own_messages_do_not_come_back() -> None:
+def test_own_messages_are_not_repeated() -> None:
     holder, log = LineHolder(), EventLog()
     left(holder, "panel", Event(60.0, 3, "told", "Stopped."))
     assert found(holder, log, "panel") == []
 
 
-def test_a_message_cannot_reach_the_terminal_with_control_characters() -> None:
+def test_message_does_not_control_terminal() -> None:
     holder, log = LineHolder(), EventLog()
     data = msgspec.msgpack.encode(LeftEvent("run", Event(1.0, 2, "told", "\x1b[2J")))
     holder.facts.notes.keep(LineNote(0, EVENTS_OF_LINE, data))

@@ -14,7 +14,7 @@ from tui.simulator import FaultRates
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_every_readable_parameter_is_read_and_right(family: str) -> None:
+async def test_every_readable_parameter_is_read_correctly(family: str) -> None:
     with bench(family) as made:
         reported: list[tuple[int, int]] = []
         upload = Upload(made.session, progress=lambda done, of: reported.append((done, of)))
@@ -45,7 +45,7 @@ async def test_refused_parameter_is_absent_with_reason() -> None:
         assert upload.retrying.lacking == {"ACC", "NMA1"}
 
 
-async def test_a_lost_line_and_on_where_it_was() -> None:
+async def test_upload_continues_after_a_lost_line() -> None:
     with bench("atv31") as made:
         cut = [False]
 

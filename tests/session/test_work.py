@@ -116,7 +116,7 @@ async def reported() -> AsyncIterator[Notified]:
     await asyncio.sleep(0)
 
 
-async def test_one_after_another(reported: Notified) -> None:
+async def test_tasks_run_one_after_another(reported: Notified) -> None:
     reported.put("a", 0.02)
     reported.put("b")
     assert reported.queue.busy
@@ -124,7 +124,7 @@ async def test_one_after_another(reported: Notified) -> None:
     assert reported.outcome() == (OutcomeKind.DONE, "b is done")
 
 
-async def test_whose_work_it_is(reported: Notified) -> None:
+async def test_work_is_known_by_its_owner(reported: Notified) -> None:
     item, other = object(), object()
     reported.put("a", owner=item)
     reported.put("b", owner=other)
@@ -152,7 +152,7 @@ async def test_too_many_are_refused(reported: Notified) -> None:
         reported.put("one more")
 
 
-async def test_nothing_is_taken_for_a_lost_line(reported: Notified) -> None:
+async def test_tasks_on_a_lost_line_are_refused(reported: Notified) -> None:
     reported.line.become(LineStatus.LOST)
     with pytest.raises(OrderRefused, match="line was lost"):
         reported.put("a")
@@ -164,7 +164,7 @@ async def test_nothing_is_taken_for_a_lost_line(reported: Notified) -> None:
 # A stop
 
 
-async def test_a_stop_ends_the_one_under_way_and_those_behind_it(reported: Notified) -> None:
+async def test_stop_ends_the_current_task_and_the_queue(reported: Notified) -> None:
     reported.put("a", 5.0)
     reported.put("b")
     await asyncio.sleep(0.01)
@@ -177,7 +177,7 @@ async def test_a_stop_ends_the_one_under_way_and_those_behind_it(reported: Notif
     assert (reported.queue.stops, reported.queue.stopped_by) == (1, "F12")
 
 
-async def test_a_stop_disarms_and_says_so(reported: Notified) -> None:
+async def test_stop_disarms_with_a_message(reported: Notified) -> None:
     reported.queue.stop()
     assert not reported.arming.armed
     with pytest.raises(NotArmed, match="Stopped: no longer armed"):
@@ -187,7 +187,7 @@ async def test_a_stop_disarms_and_says_so(reported: Notified) -> None:
     assert await reported.idle() == ["b begun", "b done"]
 
 
-async def test_a_task_behind_a_stop_neither_waits_for_ever_nor_brings_old_ones_along(
+async def test_task_after_a_stop_runs_without_earlier_tasks(
     reported: Notified,
 ) -> None:
     reported.put("a")
@@ -199,9 +199,7 @@ async def test_a_task_behind_a_stop_neither_waits_for_ever_nor_brings_old_ones_a
 
 
 @pytest.mark.parametrize("sees_it", [False, True])
-async def test_a_worker_that_hears_late_of_a_stop_touches_no_task_behind_it(
-    reported: Notified, sees_it: bool
-) -> None:
+async def test_late_stop_notice_does_not_end_later_tasks(reported: Notified, sees_it: bool) -> None:
     reported.line.cancels_late = True
     going = asyncio.Event()
 
@@ -224,7 +222,7 @@ async def test_a_worker_that_hears_late_of_a_stop_touches_no_task_behind_it(
 # The count of stops under which a task was typed
 
 
-async def test_a_task_typed_before_a_stop_is_refused_at_entry(reported: Notified) -> None:
+async def test_task_typed_before_a_stop_is_refused_at_entry(reported: Notified) -> None:
     stamp = reported.queue.stops
     reported.queue.stop("F12")
     reported.arming.arm()
@@ -238,7 +236,7 @@ async def test_a_task_typed_before_a_stop_is_refused_at_entry(reported: Notified
 
 
 @pytest.mark.parametrize("armed", [True, False])
-async def test_a_task_is_refused_when_its_turn_comes_behind_a_stop(
+async def test_task_is_refused_at_its_turn_after_a_stop(
     reported: Notified, monkeypatch: pytest.MonkeyPatch, armed: bool
 ) -> None:
     taken = reported.queue._next
@@ -257,7 +255,7 @@ async def test_a_task_is_refused_when_its_turn_comes_behind_a_stop(
     assert reported.outcome() == (OutcomeKind.REFUSED, "Not sent: a stop came after it (F12).")
 
 
-async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(
+async def test_task_is_refused_at_its_turn_if_disarmed(
     reported: Notified,
 ) -> None:
     reported.put("a", 0.02)
@@ -268,7 +266,7 @@ async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(
     assert reported.outcome() == (OutcomeKind.REFUSED, "Disarmed: no key pressed for 60 s.")
 
 
-async def test_a_task_that_needs_no_arming_is_done_without(reported: Notified) -> None:
+async def test_task_that_needs_no_arming_runs_disarmed(reported: Notified) -> None:
     reported.arming.disarm()
     with pytest.raises(NotArmed):
         reported.put("a")
@@ -276,7 +274,7 @@ async def test_a_task_that_needs_no_arming_is_done_without(reported: Notified) -
     assert await reported.idle() == ["b begun", "b done"]
 
 
-async def test_a_permit_ends_with_a_stop_and_stays_ended(reported: Notified) -> None:
+async def test_permit_ends_with_a_stop_and_stays_ended(reported: Notified) -> None:
     permit = reported.queue.permit()
     permit.check()
     assert permit.refusal() == ""
@@ -292,7 +290,7 @@ async def test_a_permit_ends_with_a_stop_and_stays_ended(reported: Notified) -> 
     assert reported.queue.permit().refusal() == ""
 
 
-async def test_a_permit_pauses_while_nothing_is_armed(reported: Notified) -> None:
+async def test_permit_pauses_while_disarmed(reported: Notified) -> None:
     permit = reported.queue.permit()
     reported.arming.disarm("The line was lost: no longer armed.")
     assert permit.refusal() == "The line was lost: no longer armed."
@@ -303,7 +301,7 @@ async def test_a_permit_pauses_while_nothing_is_armed(reported: Notified) -> Non
 
 
 @pytest.mark.parametrize("end", ["stop", "disarm"])
-async def test_a_task_asks_before_each_frame(reported: Notified, end: str) -> None:
+async def test_task_checks_its_permit_before_each_frame(reported: Notified, end: str) -> None:
     # it sees the end itself, before the worker hears of being cancelled
     reported.line.cancels_late = True
     frames: list[int] = []
@@ -328,7 +326,7 @@ async def test_a_task_asks_before_each_frame(reported: Notified, end: str) -> No
 # Tasks that fail
 
 
-async def test_tasks_after_a_failed_one_are_dropped(reported: Notified) -> None:
+async def test_tasks_after_a_failed_task_are_dropped(reported: Notified) -> None:
     refused = OrderRefused("The drive is in fault.")
     reported.put("a", error=refused)
     reported.put("b")
@@ -343,13 +341,13 @@ async def test_tasks_after_a_failed_one_are_dropped(reported: Notified) -> None:
     assert reported.outcome() == (OutcomeKind.DONE, "d is done")
 
 
-async def test_a_failed_task_with_nothing_behind_it_drops_nothing(reported: Notified) -> None:
+async def test_failed_last_task_drops_nothing(reported: Notified) -> None:
     reported.put("a", error=OrderRefused("The drive is in fault."))
     assert await reported.idle() == ["a begun", "a given up"]
     assert reported.outcome() == (OutcomeKind.REFUSED, "The drive is in fault.")
 
 
-async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(reported: Notified) -> None:
+async def test_unforeseen_error_clears_the_queue(reported: Notified) -> None:
     reported.put("a", error=ZeroDivisionError("none"))
     reported.put("b")
     assert await reported.idle() == ["a begun", "b given up", "a given up"]
@@ -360,7 +358,7 @@ async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(reported: Noti
     assert (await reported.idle())[3:] == ["c begun", "c done"]
 
 
-async def test_a_task_given_up_says_what_was_done_of_it(reported: Notified) -> None:
+async def test_cancelled_task_reports_what_was_done(reported: Notified) -> None:
     reported.put("a", error=OrderRefused("No."), left="2 written, 6 still staged.")
     await reported.idle()
     assert reported.outcome() == (OutcomeKind.REFUSED, "No. 2 written, 6 still staged.")
@@ -374,7 +372,7 @@ async def test_a_task_given_up_says_what_was_done_of_it(reported: Notified) -> N
     )
 
 
-async def test_one_that_gave_way_to_a_newer_value_says_nothing(reported: Notified) -> None:
+async def test_superseded_task_is_not_reported(reported: Notified) -> None:
     reported.put("a")
     reported.put("b", error=Superseded(1, 8502))
     reported.put("c")
@@ -385,7 +383,7 @@ async def test_one_that_gave_way_to_a_newer_value_says_nothing(reported: Notifie
     assert reported.before["b"].text == "a is done"
 
 
-async def test_the_drive_is_looked_at_again_behind_every_task(reported: Notified) -> None:
+async def test_drive_is_read_again_after_every_task(reported: Notified) -> None:
     seen: list[str] = []
     reported.queue.on_change = lambda: seen.append(reported.output[-1])
     reported.put("a")

@@ -90,7 +90,7 @@ def writer(session: DriveSession, journal: Journal, permit: Permit | None = None
     return Writer(session, journal, permit or session.work.permit())
 
 
-async def test_a_value_that_the_drive_keeps_is_known_and_recorded(
+async def test_verified_value_is_known_and_recorded(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     await Reader(session).read(["ACC"])
@@ -102,7 +102,7 @@ async def test_a_value_that_the_drive_keeps_is_known_and_recorded(
 
 
 @pytest.mark.parametrize("kept", [30, 49, 51, 0xFFFF])
-async def test_another_value_than_was_written_is_reported_and_known(
+async def test_different_value_read_back_is_reported_and_known(
     line: WilfulLine, session: DriveSession, journal: Journal, kept: int
 ) -> None:
     line.drive.keeps = lambda _address, _word: kept
@@ -113,7 +113,7 @@ async def test_another_value_than_was_written_is_reported_and_known(
     assert (entry.answer, entry.read_back) == ("holds another value", kept)
 
 
-async def test_only_the_bits_that_are_checked_must_be_held(
+async def test_only_checked_bits_must_match(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     line.drive.keeps = lambda _address, word: word | 0x8000
@@ -122,7 +122,7 @@ async def test_only_the_bits_that_are_checked_must_be_held(
         await writer(session, journal).write_parameter(PROFILE["INR"], 1, why="bits", check=0x80FF)
 
 
-async def test_a_refused_write_leaves_nothing_known(
+async def test_refused_write_makes_the_word_unknown(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     """Only confirmed reads are known: neither the new value nor the old one is."""
@@ -135,7 +135,7 @@ async def test_a_refused_write_leaves_nothing_known(
     assert session.image.raws["ACC"] == 30
 
 
-async def test_an_unanswered_write_makes_the_word_unknown(
+async def test_unanswered_write_makes_the_word_unknown(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     await Reader(session).read(["ACC"])
@@ -151,7 +151,7 @@ async def test_an_unanswered_write_makes_the_word_unknown(
 @pytest.mark.parametrize(
     "answer", [RequestRefused("The line is read-only: nothing is written."), Superseded(1, 10)]
 )
-async def test_a_write_that_was_never_sent_changes_nothing_of_what_is_known(
+async def test_unsent_write_keeps_the_known_value(
     line: WilfulLine, session: DriveSession, journal: Journal, answer: LineError
 ) -> None:
     await Reader(session).read(["ACC"])
@@ -190,7 +190,7 @@ async def test_setting_counts_as_unsaved_if_its_frame_was_sent_and_not_refused(
     assert session.unsaved_settings.codes == unsaved
 
 
-async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
+async def test_reply_from_before_the_write_is_not_used(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     held = (await Reader(session).read(["ACC"]))["ACC"]
@@ -210,7 +210,7 @@ async def test_unreadable_value_is_unknown(
     assert line.requested == []
 
 
-async def test_the_journal_tells_units_though_the_scale_was_never_read(
+async def test_journal_has_units_although_the_scale_was_not_read(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
@@ -229,7 +229,7 @@ async def test_nothing_is_written_unarmed(
     assert line.written == []
 
 
-async def test_nothing_is_written_behind_a_stop(
+async def test_nothing_is_written_after_a_stop(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     permit = session.work.permit()
@@ -240,7 +240,7 @@ async def test_nothing_is_written_behind_a_stop(
     assert line.written == []
 
 
-async def test_a_stop_while_the_frame_waits_for_the_line_keeps_it_from_going_out(
+async def test_stop_cancels_a_frame_waiting_for_the_line(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     permit = session.work.permit()
@@ -250,7 +250,7 @@ async def test_a_stop_while_the_frame_waits_for_the_line_keeps_it_from_going_out
     assert line.written == []
 
 
-async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
+async def test_slow_drive_is_read_after_its_reply(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     """The read-back is asked behind the answer, never beside it."""
@@ -281,7 +281,7 @@ def abilities_in(journal: Journal) -> list[Entry]:
 
 
 @pytest.mark.parametrize("taken", [True, False])
-async def test_a_lost_answer_is_completed_once_the_drive_is_read(
+async def test_lost_reply_is_completed_by_a_later_read(
     line: WilfulLine, session: DriveSession, journal: Journal, taken: bool
 ) -> None:
     await Reader(session).read(["ACC"])
@@ -300,7 +300,7 @@ async def test_a_lost_answer_is_completed_once_the_drive_is_read(
     assert entry.read_back == later.read_back
 
 
-async def test_a_write_that_a_stop_cuts_short_is_not_kept_as_done(
+async def test_write_cut_by_a_stop_is_not_recorded_as_done(
     line: WilfulLine,
     session: DriveSession,
     journal: Journal,
@@ -324,7 +324,7 @@ async def test_a_write_that_a_stop_cuts_short_is_not_kept_as_done(
     assert (cut.answer, later.answer) == (CUT_SHORT, found)
 
 
-async def test_a_word_that_the_drive_may_change_is_reported_and_not_judged(
+async def test_word_the_drive_may_change_is_reported_but_not_judged(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     line.fail_write(1, 11, NoAnswer(1, 6, 11), taken=True)
@@ -337,7 +337,7 @@ async def test_a_word_that_the_drive_may_change_is_reported_and_not_judged(
     assert abilities_in(journal)[-1].answer == "It holds 1, read back later."
 
 
-async def test_a_lost_answer_is_not_completed_by_what_a_later_write_left(
+async def test_lost_reply_is_not_completed_by_a_later_write(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     line.fail_write(1, 10, NoAnswer(1, 6, 10), times=1)
@@ -347,7 +347,7 @@ async def test_a_lost_answer_is_not_completed_by_what_a_later_write_left(
     assert [entry.kind for entry in abilities_in(journal)] == ["write", "write"]
 
 
-async def test_a_refused_write_has_its_answer(
+async def test_refused_write_is_journaled_with_its_reply(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     line.fail_write(1, 10, 4)
