@@ -11,7 +11,7 @@ import pytest
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, ProfileData, State
-from tui.simulator.charts.own_words import with_bit, word_of
+from tui.simulator.charts.own import with_bit, word_of
 
 from .exchange import Exchange
 from .small import head, parameter, profile

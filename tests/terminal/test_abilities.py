@@ -18,8 +18,14 @@ from textual.color import Color
 
 import tui
 from tui.terminal.abilities import ASCII, UTF_8, Abilities, abilities_of, encoding_of
-from tui.terminal.few_colors import in_sixteen, without_colors
-from tui.terminal.plain_signs import NO_SIGN, PLAIN_SIGNS, PlainSigns, in_encoding
+from tui.terminal.few_colors import (
+    NO_SIGN,
+    PLAIN_SIGNS,
+    PlainSigns,
+    in_encoding,
+    in_sixteen,
+    without_colors,
+)
 from tui.widgets import palette
 
 LOCALES = [

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from textual.driver import Driver
 
-from tui.terminal.held_input import with_held_input
+from tui.terminal.driver import with_held_input
 
 
 class RawDriver(Driver):

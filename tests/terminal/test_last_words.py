@@ -11,7 +11,7 @@ import pytest
 from textual.app import App
 from textual.driver import Driver
 
-from tui.terminal.held_input import with_held_input
+from tui.terminal.driver import with_held_input
 from tui.terminal.last_words import END_NOT_SEEN, FAILED, LastWords
 
 BEGUN, RESULT, SENTENCE = "It is being done.", "It is done.", "It had to end."

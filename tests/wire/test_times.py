@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tui.simulator.spec import LineTiming
-from tui.wire.times import bits_per_character, character_seconds, is_format, silent_seconds
+from tui.wire.frames import bits_per_character, character_seconds, is_format, silent_seconds
 
 
 @pytest.mark.parametrize(

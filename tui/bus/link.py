@@ -6,7 +6,7 @@ import os
 import re
 from dataclasses import dataclass, replace
 
-from tui.wire.times import FAST, character_seconds, is_format, silent_seconds
+from tui.wire.frames import FAST, character_seconds, is_format, silent_seconds
 
 from .errors import LinkSyntaxError
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TypeVar
 
-from tui.wire.times import character_seconds, silent_seconds
+from tui.wire.frames import character_seconds, silent_seconds
 
 from .profile.profile import Profile
 from .profile.schema import LinkSettings

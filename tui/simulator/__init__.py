@@ -2,11 +2,10 @@
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
-from .input_lines import check_inputs, set_inputs
 from .plc import PlcOnLine, plc_cycle
 from .server.client_settings import ClientSettings
 from .server.stream import ByteStream
-from .simulation import Simulation
+from .simulation import Simulation, check_inputs, set_inputs
 from .spec import DriveSpec, LineTiming, parse_drives
 from .troubles import TROUBLES, FaultRates, Habits, troubles_of
 

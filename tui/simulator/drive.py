@@ -16,12 +16,10 @@ from .body import ActiveFault, Body
 from .charts.altivar21 import Altivar21Chart
 from .charts.families import CHARTS
 from .plant.fault_history import fault_raw
-from .plant.first_values import first_values
-from .plant.load import Load, Wanderer
+from .plant.first_values import first_values, model_words
 from .plant.memory import SettingsMemory
-from .plant.models import model_words
 from .plant.monitoring import show_motor
-from .plant.motor import MotorDemand, MotorState, Stop, rating_of, step
+from .plant.motor import Load, MotorDemand, MotorState, Stop, Wanderer, rating_of, step
 from .plant.terminals import BY_KIND, COMPACT, Terminals
 from .plant.watch import SilenceWatch
 from .registers import Registers, typed_raw

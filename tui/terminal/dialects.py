@@ -12,10 +12,25 @@ from typing import Any, Final
 
 from tui.safety import BURST_GAP
 
-from . import sequences
 from .names import SPACE, SPACE_ALONE, STOP_KEYS, Named, character_name, sequence_name, with_alt
-from .sequences import ESC, PASTE_ENDS
-from .tokens import KeyToken, Paste, Report, Token
+from .tokens import (
+    EIGHT_BIT,
+    ESC,
+    ESCAPED,
+    LONGEST_KEY,
+    LONGEST_REPLY,
+    MOUSE,
+    PASTE_BEGINS,
+    PASTE_ENDS,
+    REPLY_BEGINS,
+    REPLY_ENDS,
+    REPORT,
+    RXVT,
+    KeyToken,
+    Paste,
+    Report,
+    Token,
+)
 
 ESCAPE_DELAY: Final = 0.1
 """Seconds after which ESC alone is the key Escape, unless Textual is given another time."""
@@ -112,7 +127,7 @@ class Tokenizer:
         elif character == ESC:
             self._begin(ESC)
             self._state = self._escape
-        elif (second := sequences.EIGHT_BIT.get(character)) is not None:
+        elif (second := EIGHT_BIT.get(character)) is not None:
             self._begin(ESC)
             self._introduce(second)
         else:
@@ -128,7 +143,7 @@ class Tokenizer:
             self._late_before = self._began + self._escape_delay + SEQUENCE_WITHIN
             self._begin(ESC)
             self._alt = together  # ESC twice at once is Alt with what follows
-        elif (second := sequences.EIGHT_BIT.get(character, character)) in sequences.ESCAPED:
+        elif (second := EIGHT_BIT.get(character, character)) in ESCAPED:
             self._introduce(second)
         else:
             self._key(SPACE_ALONE if character == " " else with_alt(character))
@@ -140,7 +155,7 @@ class Tokenizer:
 
     def _broken(self, character: str) -> bool:
         """Return True if a character ends a sequence of keys that it cannot belong to."""
-        if character == ESC or character in sequences.EIGHT_BIT:
+        if character == ESC or character in EIGHT_BIT:
             cut = self._state, self._text, self._began, self._mark, self._alt, self._mute
             self._ground(character)
             self._cut = *cut, self._before
@@ -159,7 +174,7 @@ class Tokenizer:
             return
         if character == "[" and self._text == "\x1b[":
             self._state = self._linux
-        ends = character >= "\x40" or (character == "$" and sequences.RXVT.fullmatch(self._text))
+        ends = character >= "\x40" or (character == "$" and RXVT.fullmatch(self._text))
         self._text += character
         if self._text == "\x1b[M" and self._mouse:
             self._state = self._mouse_place
@@ -184,7 +199,7 @@ class Tokenizer:
     def _mouse_place(self, character: str) -> None:
         """After ESC [ M where the mouse is reported: a button and a place."""
         self._text += character
-        if character == ESC or character in sequences.EIGHT_BIT:
+        if character == ESC or character in EIGHT_BIT:
             self._ground(character)  # no button and no place: the rest of the report was lost
         elif len(self._text) == len("\x1b[M") + 3:
             self._finish()
@@ -192,13 +207,13 @@ class Tokenizer:
     def _finish(self) -> None:
         """A sequence is complete."""
         text, self._state = self._text, self._ground
-        if text == sequences.PASTE_BEGINS:
+        if text == PASTE_BEGINS:
             self._state = self._paste
-        elif sequences.REPORT.fullmatch(text) or (self._mouse and sequences.MOUSE.fullmatch(text)):
+        elif REPORT.fullmatch(text) or (self._mouse and MOUSE.fullmatch(text)):
             self._found.append(Report(text))
             self._go_on()
         else:
-            named = sequence_name(text[: sequences.LONGEST_KEY + 1], kitty=self._mouse)
+            named = sequence_name(text[: LONGEST_KEY + 1], kitty=self._mouse)
             self._key(named)
             if named is None:
                 self._go_on()
@@ -215,7 +230,7 @@ class Tokenizer:
     def _opening(self, character: str) -> None:
         """After ESC ], ESC P or ESC _: a reply, or a key with Alt."""
         second = self._text[-1]
-        if character in sequences.REPLY_BEGINS[second]:
+        if character in REPLY_BEGINS[second]:
             self._state = self._reply
         else:
             self._key(with_alt(second))
@@ -226,20 +241,20 @@ class Tokenizer:
         if character == ESC:
             self._began, self._mark = self._now, self._here
             self._state = self._reply_escape
-        elif character in sequences.REPLY_ENDS:
+        elif character in REPLY_ENDS:
             self._state = self._ground
             self._go_on()
-        elif character in sequences.EIGHT_BIT:
+        elif character in EIGHT_BIT:
             self._ground(character)  # the end was lost: this begins another sequence
         else:
             self._long.append(character)
-            if len(self._long) > sequences.LONGEST_REPLY:
+            if len(self._long) > LONGEST_REPLY:
                 self._no_reply()
 
     def _reply_escape(self, character: str) -> None:
         """After ESC in a reply: its end, or the first of another sequence."""
         if character == "\\":
-            self._reply(sequences.REPLY_ENDS[0])
+            self._reply(REPLY_ENDS[0])
             return
         began, mark = self._began, self._mark
         self._begin(ESC)
@@ -271,7 +286,7 @@ class Tokenizer:
         """
         if self._state not in (self._paste, self._reply) or self._now - self._last <= BURST_GAP:
             return False
-        named = SPACE_ALONE if text == " " else sequence_name(text[: sequences.LONGEST_KEY])
+        named = SPACE_ALONE if text == " " else sequence_name(text[:LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:
             return False
         self._found.append(KeyToken(*named, self._now, self._now, self._here))

@@ -180,7 +180,7 @@ def filters_for(abilities: Abilities) -> list[LineFilter]:
     """Return the filters that adapt a picture to the terminal; none if it can show everything."""
     found: list[LineFilter] = []
     if abilities.encoding != UTF_8:
-        from .plain_signs import PlainSigns
+        from .few_colors import PlainSigns
 
         found.append(PlainSigns(abilities.encoding))
     if abilities.colors is None:

@@ -12,8 +12,7 @@ from tui.session.monitor.line_watch import GLANCE
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot, stale_after
 
-from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text
-from .palette import ALARM, FAINT, PLAIN, STALE, STRONG
+from .palette import ALARM, FAINT, PLAIN, STALE, STATE_SIGNS, STATE_STYLES, STRONG, age_text
 
 QUANTITIES_NOW: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 """Quantities shown beside the state."""

@@ -1,4 +1,4 @@
-"""The colors of the panel: grey while all is well, color for a state that wants to be seen."""
+"""Colors and signs of the panel: grey while all is well, color for a state to be seen."""
 
 from __future__ import annotations
 
@@ -61,3 +61,21 @@ BAR = Style(color="#8fa3b3")
 BAR_REST = Style(color="#3a4046")
 CURSOR = Style(bgcolor="#2f4f6b")
 MARK = Style(color="#ffffff", bold=True)
+
+
+STATE_STYLES: dict[str, Style] = {
+    "running": RUNNING,
+    "fault": FAULT_BLOCK,
+    "unknown": ALARM,
+    "stopping": PLAIN,
+}
+STATE_SIGNS = {"running": "▶", "fault": "■", "unknown": "?"}
+
+
+def age_text(seconds: float) -> str:
+    """An age in at most five characters."""
+    if seconds < 100:
+        return f"{seconds:.0f}s"
+    if seconds < 6000:
+        return f"{seconds / 60:.0f}m"
+    return f"{seconds / 3600:.0f}h"

@@ -7,8 +7,17 @@ from rich.text import Text
 from tui.drive.plain import plain
 
 from .drawing import wrapped
-from .drive_signs import STATE_SIGNS, age_text
-from .palette import ALARM, ATTENTION_BLOCK, FAINT, FAULT, STALE, STOP_KEY, STRONG
+from .palette import (
+    ALARM,
+    ATTENTION_BLOCK,
+    FAINT,
+    FAULT,
+    STALE,
+    STATE_SIGNS,
+    STOP_KEY,
+    STRONG,
+    age_text,
+)
 from .strip import STRIP_STYLES, DriveNow, StripView
 
 LEAST_WIDTH, LEAST_HEIGHT = 60, 16

@@ -16,7 +16,6 @@ from rich.text import Text
 from tui.drive.plain import plain
 
 from .drawing import armed_text, cut, cut_at_word, short
-from .drive_signs import STATE_SIGNS, age_text
 from .palette import (
     ALARM,
     ATTENTION,
@@ -29,7 +28,9 @@ from .palette import (
     PLAIN,
     RUNNING,
     STALE,
+    STATE_SIGNS,
     STRONG,
+    age_text,
 )
 
 STATE_WIDTH = 14

@@ -41,7 +41,7 @@ def seconds(shortest: float = 0.0, *, above: bool = False) -> FiniteRange:
 def check_rate(link: Link, every: float, drives: int) -> None:
     """Raise Failure if a serial line cannot read each drive once in `every` seconds."""
     from tui.bus.link import SerialLink
-    from tui.wire.times import character_seconds, silent_seconds
+    from tui.wire.frames import character_seconds, silent_seconds
 
     if not isinstance(link, SerialLink):
         return

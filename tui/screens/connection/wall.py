@@ -10,7 +10,6 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.widgets.drawing import cut, rule, short
-from tui.widgets.drive_signs import STATE_SIGNS
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
@@ -22,6 +21,7 @@ from tui.widgets.palette import (
     LINE,
     PLAIN,
     RUNNING,
+    STATE_SIGNS,
     STRONG,
 )
 

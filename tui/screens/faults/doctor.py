@@ -15,7 +15,6 @@ from tui.drive.profile.schema import FaultHelp, Quantity
 from tui.drive.values import NOT_AVAILABLE, Value, set_bits
 from tui.session.shown import Shown
 from tui.widgets.drawing import cut, cut_at_word, wrapped
-from tui.widgets.drive_signs import age_text
 from tui.widgets.palette import (
     ALARM_BLOCK,
     CURSOR,
@@ -26,6 +25,7 @@ from tui.widgets.palette import (
     PLAIN,
     STALE,
     STRONG,
+    age_text,
 )
 
 from .doctor_view import DoctorView

@@ -12,9 +12,8 @@ from tui.drive.profile.schema import MonitoringValue, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.shown import Quality
 from tui.widgets.drawing import short
-from tui.widgets.drive_signs import age_text
 from tui.widgets.gauge import gauge
-from tui.widgets.palette import FAINT, STALE, STRONG
+from tui.widgets.palette import FAINT, STALE, STRONG, age_text
 
 from .view import View, end_of, readout_parameter
 

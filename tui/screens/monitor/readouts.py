@@ -12,9 +12,8 @@ from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, Value, decimals_of
 from tui.session.shown import Quality, Shown
 from tui.widgets.drawing import cut, short
-from tui.widgets.drive_signs import age_text
 from tui.widgets.gauge import gauge
-from tui.widgets.palette import BAR, BAR_REST, FAINT, STALE, STRONG
+from tui.widgets.palette import BAR, BAR_REST, FAINT, STALE, STRONG, age_text
 from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
 from .view import View, bar_number, directed, end_of, readout_parameter

@@ -12,7 +12,6 @@ from tui.safety import WARNED_AT_SHARE
 from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
 from tui.widgets.drawing import short, wrapped
-from tui.widgets.drive_signs import age_text
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
@@ -22,6 +21,7 @@ from tui.widgets.palette import (
     RUNNING,
     STALE,
     STRONG,
+    age_text,
 )
 
 from .view import View, directed

@@ -15,7 +15,7 @@ from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.monitor.trend import TrendPoint
 from tui.session.shown import Shown
 from tui.session.timeout_report import TimeoutWatch
-from tui.widgets.drive_signs import age_text
+from tui.widgets.palette import age_text
 
 USUAL_SPAN = 60.0
 SPANS = (10.0, USUAL_SPAN, 600.0)

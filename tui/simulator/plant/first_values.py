@@ -1,16 +1,49 @@
-"""Initial words of a simulated drive with factory settings, set up for its motor."""
+"""Initial words of a simulated drive with factory settings, set up for its motor and model."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from decimal import ROUND_HALF_UP, Decimal
 
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.profile.schema import Model, Parameter, Quantity
 from tui.drive.settings.multiple import counts_of
 from tui.drive.values import is_enumeration, raw_range, type_range
 
-from .motor import RatingPlate
+from .motor import RatingPlate, rating_of
+
+REFERENCE_OBJECT = 1
+
+
+def model_words(profile: Profile, identity: Mapping[int, bytes]) -> dict[str, int]:
+    """Raw values by code of the model parameter and the class parameter, as far as known."""
+    identification = profile.data.identification
+    reference = identity.get(REFERENCE_OBJECT, b"").decode("ascii", "replace")
+    model = _model(identification.models, reference)
+    words: dict[str, int] = {}
+    if model is None:
+        return words
+    if identification.model_parameter:
+        words[identification.model_parameter] = model.code
+    if identification.class_parameter and identification.class_bit is not None:
+        words[identification.class_parameter] = int(model.class_b) << identification.class_bit
+    return words
+
+
+def _model(models: list[Model], reference: str) -> Model | None:
+    """The model with this reference, or, where models have none, with its power."""
+    named = next((m for m in models if m.reference == reference), None)
+    if named is not None or not reference:
+        return named
+    power = rating_of(reference).power
+    unnamed = (m for m in models if not m.reference and m.power_kw)
+    return next((m for m in unnamed if _has_power(m, power)), None)
+
+
+def _has_power(model: Model, power: float) -> bool:
+    """Return True if a model has this power: 0.37/0.4 kW by 50 Hz and 60 Hz motors."""
+    return any(math.isclose(float(part), power) for part in model.power_kw.split("/"))
 
 
 def first_values(
