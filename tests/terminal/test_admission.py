@@ -80,6 +80,9 @@ class Panel(App[None]):
     def stop_stamp(self) -> object:
         return self.stops
 
+    def only_shows(self, key: str, character: str | None) -> bool:
+        return key == "f"
+
     def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
         self.not_taken.append(count)
         self.late += late
@@ -126,6 +129,21 @@ async def test_a_key_alone_acts_and_one_of_a_piece_does_not() -> None:
         assert app.done == ["run"]
         app.send("r", stroke=Stroke(time.monotonic(), 0, alone=False, held=True))
         await until(pilot, lambda: app.done == ["run", "run"])
+
+
+async def test_a_key_at_once_acts_only_while_it_can_do_no_harm() -> None:
+    """When its turn has come, another screen may be there, on which it would command."""
+    app = Panel()
+    async with app.run_test() as pilot:
+        at_once = Stroke(time.monotonic(), 0, alone=False, steps=False, at_once=True)
+        app.send("r", stroke=at_once)
+        await until(pilot, lambda: app.not_taken == [1])
+        assert app.done == []
+        app.send("f", stroke=at_once)
+        await until(pilot, lambda: isinstance(app.screen, Question))
+        app.send("r", stroke=at_once)
+        await until(pilot, lambda: app.not_taken == [1, 1])
+        assert app.screen.query_one("#answer", Input).value == ""
 
 
 async def test_each_piece_is_reported_once() -> None:

@@ -230,6 +230,35 @@ def test_a_key_waits_for_a_sequence_that_began_beside_it() -> None:
     assert [given.stroke.alone for given in keys_of(bursts.given(2.1, pending=2.06))] == [True]
 
 
+def test_a_harmless_key_does_not_wait_but_counts_as_one_of_its_burst() -> None:
+    bursts = Bursts()
+    bursts.key(pressed("2", 1.0), at_once=True)
+    (shows,) = keys_of(bursts.given(1.0))
+    stroke = shows.stroke
+    assert (shows.name, stroke.at_once, stroke.acts, stroke.steps) == ("2", True, False, False)
+    assert bursts.deadline() is None
+    bursts.key(pressed("r", 1.0 + CLOSE))
+    assert bursts.holds_back
+    (run,) = keys_of(bursts.given(1.0 + CLOSE + QUIET))
+    assert (run.name, run.stroke.acts, run.stroke.at_once) == ("r", False, False)
+    assert not bursts.holds_back
+
+
+def test_only_the_first_key_after_a_pause_begins_a_burst() -> None:
+    bursts = Bursts()
+    assert bursts.begins(pressed("2", 1.0))
+    bursts.key(pressed("2", 1.0), at_once=True)
+    assert not bursts.begins(pressed("3", 1.0 + BURST_GAP - 0.001))
+    assert bursts.begins(pressed("3", 1.0 + BURST_GAP + 0.001))
+
+
+def test_a_stop_voids_a_harmless_key_that_was_not_handed_over() -> None:
+    bursts = Bursts()
+    bursts.key(pressed("2", 1.0), at_once=True)
+    bursts.stop(pressed("space", 1.0))
+    assert bursts.given(1.2) == []
+
+
 NAMES = st.sampled_from(["r", "enter", "up", "up", "up", "down", "pageup", "space", "f12", "1"])
 READS = st.lists(
     st.tuples(

@@ -39,6 +39,9 @@ class Stops:
     def sequence_swallowed(self, data: bytes) -> None:
         """No test of these looks at it."""
 
+    def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
+        return False
+
     def stop_stamp(self) -> object:
         return len(self.taken)
 

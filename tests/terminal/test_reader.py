@@ -21,8 +21,12 @@ LATER = 10.0
 class Stops:
     """An app that counts its stops; with a text field in focus, Space is text."""
 
-    def __init__(self, *, typing: bool = False) -> None:
+    def __init__(self, *, typing: bool = False, harmless: str = "", done_to: float = -1.0) -> None:
         self.typing = typing
+        self.harmless = harmless
+        """Keys that only show something."""
+        self.done_to = done_to
+        """When the last key was read that had its whole effect."""
         self.taken: list[str] = []
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
@@ -36,6 +40,9 @@ class Stops:
 
     def sequence_swallowed(self, data: bytes) -> None:
         """No test of these looks at it."""
+
+    def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
+        return key in self.harmless and begins and after <= self.done_to
 
     def stop_stamp(self) -> object:
         return len(self.taken)
@@ -60,6 +67,41 @@ def read(
 def acting(keys: Sequence[Pressed], stamp: object) -> list[str]:
     """The keys that may act where no stop came since."""
     return [key.name for key in keys if key.stroke.acts and key.stroke.stamp == stamp]
+
+
+def test_a_key_that_only_shows_something_does_not_wait() -> None:
+    reader = KeyReader(Stops(harmless="2m"))
+    (key,) = reader.read(b"2", 1.0, 0)
+    assert isinstance(key, Pressed)
+    assert (key.name, key.stroke.at_once, key.stroke.acts) == ("2", True, False)
+    assert reader.deadline is None
+    # the key before has not had its effect: this one waits
+    assert reader.read(b"m", 2.0, 0) == []
+    assert [key.stroke.acts for key in reader.tick(LATER) if isinstance(key, Pressed)] == [True]
+
+
+def test_a_key_that_only_shows_something_overtakes_none() -> None:
+    reader = KeyReader(Stops(harmless="2", done_to=LATER))
+    assert reader.read(b"x2", 1.0, 0) == []
+    keys = [key for key in reader.tick(LATER) if isinstance(key, Pressed)]
+    assert [(key.name, key.stroke.acts) for key in keys] == [("x", False), ("2", False)]
+
+
+def test_keys_behind_one_that_acted_at_once_are_a_burst() -> None:
+    reader = KeyReader(Stops(harmless="2"))
+    (first,) = reader.read(b"2", 1.0, 0)
+    assert isinstance(first, Pressed)
+    assert first.name == "2"
+    assert reader.read(b"r\r", 1.04, 0) == []
+    rest = [key for key in reader.tick(LATER) if isinstance(key, Pressed)]
+    assert [(key.name, key.stroke.acts) for key in rest] == [("r", False), ("enter", False)]
+
+
+@pytest.mark.parametrize("data", [b"2\t", b"2m", b"2\x1b", b"2\x1b["])
+def test_a_key_with_more_in_its_read_waits(data: bytes) -> None:
+    """Those keys have one time: a Space behind Tab would be text once the 2 had its effect."""
+    reader = KeyReader(Stops(harmless="2m", done_to=LATER))
+    assert reader.read(data, 1.0, 0) == []
 
 
 def test_a_stop_in_one_write_with_a_run_leaves_nothing_that_acts() -> None:

@@ -18,13 +18,15 @@ from textual.widgets import Input
 
 from tests.sources import PACKAGE, modules, nodes_of
 from tests.sweeps import kept
+from tui.app import DrivePanelApp
 from tui.drive.profile import library
 from tui.screens.command.control import Control
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.keys.action import CONNECTION, LISTENING, OPENING, Action
 from tui.screens.keys.screens import EVERYWHERE, TABBED
-from tui.screens.keys.table import ACTIONS, elsewhere, keys_line
+from tui.screens.keys.table import ACTIONS, elsewhere, key_meanings, keys_line
 from tui.screens.monitor.commands import order_keys
+from tui.screens.open_lines import LineOpening
 from tui.screens.parameters.screen import ParametersScreen
 from tui.widgets.palette import ATTENTION
 
@@ -311,6 +313,93 @@ async def back_to(made: Bench, screen: str) -> None:
     elif screen != "monitor":
         await made.pilot.press({**KEY_OF, **OVER}[screen])
     await until(made.pilot, lambda: app.place == screen)
+
+
+# Keys that do not wait until it is known whether they came alone
+
+SHOW_EVERYWHERE = {*"1234567", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l"}
+ARROWS = {"up", "down", "pageup", "pagedown"}
+SHOW = {
+    "line": set(),
+    "monitor": {"tab", "<", ">"},
+    "opening": set(),
+    "parameters": {
+        *ARROWS, "home", "end", "tab", "right", "shift+tab", "left", "d", "D"
+    },
+    "scanner": {"up", "down", "tab", "left", "right"},
+    "faults": {"up", "down", "left", "right", "tab"},
+    "control": set(),
+    "frames": {*ARROWS, "tab"},
+    "listening": {*ARROWS, "tab"},
+    "messages": ARROWS,
+    "wiring": {*ARROWS, "tab", "shift+tab"},
+}  # fmt: skip
+
+
+def test_only_keys_that_move_or_show_act_at_once() -> None:
+    found = {
+        screen: {key for key, only_shows in key_meanings(screen).items() if only_shows}
+        for screen in EVERYWHERE
+    }
+    assert found == {screen: SHOW_EVERYWHERE | keys for screen, keys in SHOW.items()}
+
+
+def test_no_action_that_writes_or_asks_acts_at_once() -> None:
+    words = ("arming", "asks", "write", "stop", "propose", "leave")
+    careful = [a for a in ACTIONS if any(word in a.help.lower() for word in words)]
+    assert len(careful) > 20
+    assert [a.id for a in careful if a.only_shows] == []
+
+
+def at_once(app: DrivePanelApp, *keys: str) -> list[str]:
+    """Those of these keys that do not wait now."""
+    return [
+        key
+        for key in keys
+        if app.acts_at_once(
+            key, key if len(key) == 1 else None, begins=True, after=float("-inf")
+        )
+    ]  # fmt: skip
+
+
+async def test_a_key_that_commands_waits_wherever_it_is_pressed() -> None:
+    async with bench("atv71") as made:
+        app = made.app
+        keys = ("r", "x", "k", "up", "left", "2", "enter", "y", "a", "]", "q", "5", "escape")
+        await until(made.pilot, lambda: app.place == "monitor")
+        assert at_once(app, *keys) == ["left", "2", "5"]
+        # in the run line a digit is typed, an arrow steps the reference, a letter closes it
+        await made.pilot.press("a", "r")
+        await until(made.pilot, lambda: "Enter" in shown(app, "message"))
+        assert at_once(app, *keys) == ["2", "5"]
+        await made.pilot.press("escape", "x")
+        assert not isinstance(app.screen, ModalScreen)  # there is no fault to reset
+        await made.pilot.press("t")
+        await until(made.pilot, lambda: isinstance(app.screen, ModalScreen))
+        assert at_once(app, *keys) == ["up", "left"]
+        await made.pilot.press("escape", "slash")
+        await until(made.pilot, lambda: app.place == "parameters")
+        await until(made.pilot, lambda: isinstance(app.focused, Input))
+        assert at_once(app, *keys) == [key for key in keys if key not in ("enter", "escape")]
+
+
+async def test_a_key_waits_while_the_one_before_has_its_effect_or_a_line_opens() -> None:
+    async with bench("atv71") as made:
+        app = made.app
+        await until(made.pilot, lambda: app.place == "monitor")
+        done = app._typed.done_to
+        assert app.acts_at_once("3", "3", begins=True, after=done)
+        assert not app.acts_at_once("3", "3", begins=True, after=done + 0.001)
+        assert not app.acts_at_once("3", "3", begins=False, after=done)
+        assert app.acts_at_once("left", None, begins=False, after=done)
+        app.opening = LineOpening("sim:atv71")
+        assert not app.acts_at_once("3", "3", begins=True, after=done)
+
+
+async def test_a_key_waits_if_its_effect_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with bench("atv71") as made:
+        monkeypatch.setattr(made.app, "only_shows", None)
+        assert at_once(made.app, "3") == []
 
 
 # The line of keys

@@ -15,10 +15,10 @@ from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
-from tui.terminal.type_ahead import TypeAhead
 from tui.widgets.small import is_too_small
 
 from .app_port import Panel
+from .harmless_keys import HarmlessKeys
 from .keys.table import STOPS_ALL, STOPS_NOBODY
 
 if TYPE_CHECKING:
@@ -39,15 +39,11 @@ UNREACHED = (
     " its profile on Line, then s."
 )
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
-TOGETHER_KEYS = "{count} keys came together and were ignored."
-TOO_LATE_KEYS = "{count} keys came too late and were ignored."
-NOT_ALONE_KEY = "A key was ignored: it did not come alone."
-TOO_LATE_KEY = "A key was ignored: it came too late."
 IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
 TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it again."
 
 
-class KeyDispatcher(Panel):
+class KeyDispatcher(HarmlessKeys):
     """Keys for the whole panel; their first part runs in the thread of the keys."""
 
     def __init__(self) -> None:
@@ -55,7 +51,6 @@ class KeyDispatcher(Panel):
         self._stops = 0
         self._trying_f12 = False
         self.unreached = ("", 0.0)
-        self._typed = TypeAhead(self, self)
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
         """Stop, if the key means that now; may be called in any thread.
@@ -126,14 +121,6 @@ class KeyDispatcher(Panel):
     def stroke(self) -> Stroke | None:
         """Facts about the key that has its effect now; None if there is none."""
         return self._typed.stroke
-
-    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
-        """Report that keys came at once, or too late, and did nothing."""
-        if count > 1:
-            text = TOO_LATE_KEYS if late else TOGETHER_KEYS
-        else:
-            text = TOO_LATE_KEY if late else NOT_ALONE_KEY
-        self.notify(text.format(count=count), severity="warning")
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""

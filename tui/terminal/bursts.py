@@ -1,7 +1,8 @@
 """Which keys came alone, which together, and which because a key is held down.
 
 A person types one key after another; a paste without brackets, or a link that hung, brings many at
-once. Times are seconds of one clock, given with each key; nothing here looks at a clock.
+once. A key that can do no harm in a burst does not wait, but counts as one of its keys. Times are
+seconds of one clock, given with each key; nothing here looks at a clock.
 """
 
 from __future__ import annotations
@@ -44,14 +45,27 @@ class Bursts:
         self._stepped = False
         self._given: list[Pressed | Paste] = []
 
-    def key(self, key: KeyToken) -> None:
-        """Take a key; `given` decides about it."""
+    def begins(self, key: KeyToken) -> bool:
+        """Return True if this key would be the first of its burst."""
+        return key.began - self._last > BURST_GAP
+
+    @property
+    def holds_back(self) -> bool:
+        """True if a key waits: a later one must not overtake it."""
+        return bool(self._waiting)
+
+    def key(self, key: KeyToken, *, at_once: bool = False) -> None:
+        """Add a key: `given` decides about it, or returns it in any case if it acts `at_once`."""
         self._join(key.began, key.at)
         if not self._reads or self._reads[-1][-1].at != key.at:
             self._reads = [*self._reads[1 - REPEATS :], []]
         self._reads[-1].append(key)
         self._names.add(key.name)
-        self._waiting.append(key)
+        if at_once:
+            stroke = Stroke(key.began, key.mark, alone=False, steps=False, at_once=True)
+            self._given.append(Pressed(key.name, key.character, stroke))
+        else:
+            self._waiting.append(key)
 
     def stop(self, key: KeyToken) -> None:
         """A stop key was taken: whatever was typed before it and still waits is void."""

@@ -33,6 +33,13 @@ class Stops(Protocol):
         `left_at` is when a key was read that may leave the text which a Space would belong to.
         """
 
+    def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
+        """Return True if a key need not wait until it is known whether it came alone.
+
+        It can then only move a cursor, write text or, if it `begins` a burst, show something. The
+        keys up to the one that was read at the time `after` have had their whole effect.
+        """
+
     def stop_stamp(self) -> object:
         """Another object after every stop."""
 
@@ -63,6 +70,8 @@ class KeyReader:
         self._tokens = Tokenizer(mouse=self._mouse, escape_delay=self._escape_delay)
         self._bursts = Bursts()
         self._left_at: float | None = None
+        self._read_at = float("-inf")
+        """When the last key was read that was no stop."""
 
     def read(self, data: bytes, now: float, stamp: object = None) -> list[TerminalInput]:
         """Bytes that were read at this time, when the app's stamp of stops was this."""
@@ -104,6 +113,8 @@ class KeyReader:
 
     def _sorted(self, tokens: list[Token], now: float) -> list[TerminalInput]:
         reports: list[TerminalInput] = []
+        # keys of one read have one time: which of them had its effect would not be known
+        single = len(tokens) == 1 and self._tokens.pending is None
         for token in tokens:
             if isinstance(token, Report):
                 reports.append(token)
@@ -114,8 +125,16 @@ class KeyReader:
                 self._left_at = None
             else:
                 self._left_at = self._left(token)
-                self._bursts.key(token)
+                self._bursts.key(token, at_once=single and self._at_once(token))
+                self._read_at = token.began
         return [*reports, *self._bursts.given(now, self._tokens.pending)]
+
+    def _at_once(self, key: KeyToken) -> bool:
+        """Return True if a key does not wait: it can do no harm, and overtakes none."""
+        begins, last = self._bursts.begins(key), self._read_at
+        return not self._bursts.holds_back and self._stops.acts_at_once(
+            key.name, key.character, begins=begins, after=last
+        )
 
     def _stopped(self, key: KeyToken) -> bool:
         """Return True if a key was a stop."""

@@ -22,6 +22,8 @@ class Stroke(NamedTuple):
     """True if it may step a value: alone, held, or the first of a piece of one arrow only."""
     piece: int = 1
     """Number of keys that came together, as far as known."""
+    at_once: bool = False
+    """True if it did not wait to be known as alone: it may only move, write text or show."""
 
     @property
     def acts(self) -> bool:

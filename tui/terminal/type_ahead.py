@@ -52,6 +52,9 @@ class Stamps(Protocol):
     def stop_stamp(self) -> object:
         """Another object after every stop."""
 
+    def only_shows(self, key: str, character: str | None) -> bool:
+        """Return True if a key can only move a cursor, write text or show something now."""
+
     def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
         """Report that keys came at once, or too late, and did nothing."""
 
@@ -161,6 +164,9 @@ class TypeAhead:
         """Return True if a key of a piece can only write text or move a cursor."""
         if event.key in CURSOR_KEYS:
             return True
+        stroke = stroke_of(event)
+        if stroke is not None and stroke.at_once:
+            return self._stamps.only_shows(event.key, event.character)
         typed = event.is_printable or event.key in EDITS
         return typed and (takes_text(self._app.focused) or takes_text(self._app.screen))
 

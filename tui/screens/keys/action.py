@@ -33,6 +33,19 @@ KEY_NAMES = {
 """Keys that a person reads otherwise than Textual writes them, capitals aside."""
 
 
+SHOWING = frozenset(
+    {
+        *("goto", "find", "messages", "wiring", "command_palette", "help", "redraw"),
+        *("move", "page", "end", "group", "scroll", "section", "move_record", "filter"),
+        *("other_page", "other_table", "next_word", "trend_window"),
+    }
+)
+"""Actions that move a cursor or show something, and do nothing else: their keys act at once.
+
+`step_drive` is not among them: it changes which motor the stop key stops.
+"""
+
+
 class Action(NamedTuple):
     """One thing a person can do."""
 
@@ -52,6 +65,11 @@ class Action(NamedTuple):
     """True if the key counts before any widget that has the focus."""
     bound: bool = True
     """False where the widget that has the focus takes the key."""
+
+    @property
+    def only_shows(self) -> bool:
+        """True if it only moves a cursor or shows something."""
+        return self.id.partition("(")[0] in SHOWING
 
     @property
     def shown(self) -> str:

@@ -5,8 +5,8 @@ Bindings, the key bar, the help screen and the palette are made from this table.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, partial
 
 from textual.binding import Binding, BindingType
 
@@ -114,6 +114,15 @@ def screen_actions(screen: str) -> list[Action]:
 
 def _own(screen: str) -> tuple[Action, ...]:
     return next(registered.actions for registered in SCREENS if registered.name == screen)
+
+
+@cache
+def key_meanings(screen: str) -> Mapping[str, bool]:
+    """By key of a registered screen: True if it only moves a cursor or shows something."""
+    actions = screen_actions(screen) if screen in EVERYWHERE else []
+    return {
+        key: action.only_shows for action in reversed(actions) for key in action.keys.split(",")
+    }
 
 
 def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
